@@ -1,0 +1,121 @@
+"""The one registry of quantities: name, unit, valid range, meaning.
+
+Configuration, logs, networks, reports and the status page all read a quantity here, so that one thing has
+one name and one unit everywhere. Times are UTC; a fraction is 0 to 1, an opening or closure 0 to 100 %.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from types import MappingProxyType
+
+
+class Kind(Enum):
+    """What part a quantity plays in the loop."""
+
+    WEATHER = "weather"
+    CLIMATE = "climate"
+    GROWTH = "growth"
+    YIELD = "yield"
+    SETPOINT = "setpoint"
+    ACTUATOR = "actuator"
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One measured, simulated or commanded quantity."""
+
+    name: str
+    unit: str
+    low: float
+    """Smallest value a working sensor or a sane command can have."""
+    high: float
+    """Largest value a working sensor or a sane command can have."""
+    kind: Kind
+    meaning: str
+    optional: bool = False
+    """A site that lacks it loses nothing but that knowledge (all actuators are optional too)."""
+
+    def holds(self, value: float) -> bool:
+        """Tell whether `value` lies in the valid range (NaN does not)."""
+        return self.low <= value <= self.high
+
+
+def _quantity_table() -> Mapping[str, Quantity]:
+    def rows(kind: Kind, *table: tuple[str, str, float, float, str], optional: bool = False) -> list[Quantity]:
+        return [Quantity(name, unit, low, high, kind, meaning, optional) for name, unit, low, high, meaning in table]
+
+    quantities = [
+        *rows(
+            Kind.WEATHER,
+            ("outdoor_temperature", "degC", -50.0, 60.0, "air temperature outside"),
+            ("outdoor_humidity", "%", 0.0, 100.0, "relative humidity outside"),
+            ("outdoor_co2", "ppm", 200.0, 1500.0, "carbon dioxide outside"),
+            ("global_radiation", "W m-2", -20.0, 1500.0, "short-wave radiation on a horizontal plane outside"),
+            ("wind_speed", "m s-1", 0.0, 60.0, "wind speed outside"),
+            ("sky_temperature", "degC", -90.0, 60.0, "black-body temperature of the sky"),
+        ),
+        *rows(
+            Kind.WEATHER,
+            ("wind_direction", "deg", 0.0, 360.0, "direction the wind blows from, clockwise from north"),
+            ("rain", "1", 0.0, 1.0, "fraction of the time it rained"),
+            optional=True,
+        ),
+        *rows(
+            Kind.CLIMATE,
+            ("air_temperature", "degC", -20.0, 60.0, "greenhouse air temperature"),
+            ("air_humidity", "%", 0.0, 100.0, "greenhouse relative humidity"),
+            ("air_co2", "ppm", 150.0, 5000.0, "greenhouse carbon dioxide"),
+            ("par", "umol m-2 s-1", 0.0, 3000.0, "photosynthetically active radiation above the crop"),
+        ),
+        *rows(
+            Kind.GROWTH,
+            ("leaf_area_index", "m2 m-2", 0.0, 10.0, "leaf area per floor area"),
+            ("plant_load", "fruits m-2", 0.0, 3000.0, "growing fruits per floor area"),
+            ("net_growth", "kg m-2", 0.0, 100.0, "cumulative net growth, dry matter"),
+        ),
+        *rows(
+            Kind.YIELD,
+            ("fruit_fresh_weight", "kg m-2", 0.0, 150.0, "cumulative harvested fresh weight"),
+        ),
+        *rows(
+            Kind.SETPOINT,
+            ("heating_setpoint", "degC", 5.0, 35.0, "air temperature below which the PLC heats"),
+            ("co2_setpoint", "ppm", 300.0, 2000.0, "carbon dioxide below which the PLC doses"),
+            ("lamp_on", "1", 0.0, 1.0, "fraction of the time the lamps are asked to burn"),
+            ("irrigation_on", "1", 0.0, 1.0, "fraction of the time irrigation is asked to run"),
+        ),
+        *rows(
+            Kind.ACTUATOR,
+            ("rail_pipe_temperature", "degC", 0.0, 110.0, "temperature of the pipe rail"),
+            ("grow_pipe_temperature", "degC", 0.0, 110.0, "temperature of the grow pipe"),
+            ("vent_lee", "%", 0.0, 100.0, "opening of the vents on the lee side"),
+            ("vent_wind", "%", 0.0, 100.0, "opening of the vents on the wind side"),
+            ("energy_screen", "%", 0.0, 100.0, "closure of the energy screen, 100 is closed"),
+            ("blackout_screen", "%", 0.0, 100.0, "closure of the blackout screen, 100 is closed"),
+            ("lamp_power", "W m-2", 0.0, 500.0, "electric power of the lamps per floor area"),
+            ("co2_dosing", "kg m-2 h-1", 0.0, 0.1, "carbon dioxide dosed per floor area"),
+            ("irrigation", "L m-2 h-1", 0.0, 60.0, "irrigation water per floor area"),
+            optional=True,
+        ),
+    ]
+    return MappingProxyType({quantity.name: quantity for quantity in quantities})
+
+
+QUANTITIES: Mapping[str, Quantity] = _quantity_table()
+"""Every quantity by its name, in the registry's order."""
+
+
+def names(kind: Kind) -> tuple[str, ...]:
+    """Return the names of all quantities of one kind, in the registry's order."""
+    return tuple(quantity.name for quantity in QUANTITIES.values() if quantity.kind is kind)
+
+
+WEATHER = names(Kind.WEATHER)
+CLIMATE = names(Kind.CLIMATE)
+GROWTH = names(Kind.GROWTH)
+YIELD = names(Kind.YIELD)
+SETPOINTS = names(Kind.SETPOINT)
+ACTUATORS = names(Kind.ACTUATOR)
