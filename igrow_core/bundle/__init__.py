@@ -1,0 +1,69 @@
+"""The bundle: what the trainer ships to a gateway, one folder that proves itself.
+
+A bundle holds `simulator.onnx` (candidate strategies over a day), `optimizer.onnx` (one generation of the
+genetic algorithm), where there is one `policy.onnx`, further files that the manifest lists, `golden.npz`
+(inputs and the outputs they must give) and `manifest.json`. The story of a bundle:
+
+1. The trainer fills a `Manifest` and calls `write_bundle`: files are checksummed, written into a folder next
+   to the target and renamed into place, so that nobody ever sees half a bundle.
+2. A reader calls `read_bundle`: the manifest is read strictly, every checksum is compared, and what is wrong
+   is said in one line.
+3. `self_test` runs the golden inputs through onnxruntime on the machine that will use the bundle.
+"""
+
+from igrow_core.bundle.files import (
+    GOLDEN_FILE,
+    GRAPHS,
+    MANIFEST_FILE,
+    REQUIRED_FILES,
+    Bundle,
+    Golden,
+    read_bundle,
+    read_golden,
+    write_bundle,
+)
+from igrow_core.bundle.manifest import (
+    FORMAT_VERSION,
+    BundleError,
+    EffectRecord,
+    Estimate,
+    GraphSignature,
+    HeldOutError,
+    Manifest,
+    Onset,
+    Parameter,
+    Span,
+    Tensor,
+    manifest_from_json,
+    manifest_to_json,
+)
+from igrow_core.bundle.self_test import Deviation, open_session, run_graph, self_test
+
+__all__ = [
+    "FORMAT_VERSION",
+    "GOLDEN_FILE",
+    "GRAPHS",
+    "MANIFEST_FILE",
+    "REQUIRED_FILES",
+    "Bundle",
+    "BundleError",
+    "Deviation",
+    "EffectRecord",
+    "Estimate",
+    "Golden",
+    "GraphSignature",
+    "HeldOutError",
+    "Manifest",
+    "Onset",
+    "Parameter",
+    "Span",
+    "Tensor",
+    "manifest_from_json",
+    "manifest_to_json",
+    "open_session",
+    "read_bundle",
+    "read_golden",
+    "run_graph",
+    "self_test",
+    "write_bundle",
+]

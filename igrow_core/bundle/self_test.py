@@ -1,0 +1,106 @@
+"""The self-test: golden inputs through onnxruntime on this machine must give the golden outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnxruntime
+from numpy.typing import NDArray
+
+from igrow_core.bundle.files import Bundle, read_golden
+from igrow_core.bundle.manifest import BundleError
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """How far one output lies from its golden value, as a fraction of the largest expected magnitude."""
+
+    graph: str
+    output: str
+    relative: float
+
+
+def open_session(path: Path, *, threads: int = 1) -> Any:
+    """Open a graph in onnxruntime with an explicit number of threads; raises BundleError where it cannot.
+
+    A gateway shares its cores with the control cycle, so the thread count is never left to the library.
+    """
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = threads
+    options.inter_op_num_threads = 1
+    options.log_severity_level = 4  # its reasons reach the user through the exception below
+    try:
+        return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+    except Exception as error:
+        raise BundleError(f"{path}: onnxruntime cannot load the graph: {_first_line(error)}") from None
+
+
+def run_graph(session: Any, inputs: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Run one graph; returns its outputs by name. Raises BundleError where onnxruntime refuses the inputs."""
+    names = [output.name for output in session.get_outputs()]
+    try:
+        return dict(zip(names, session.run(names, dict(inputs)), strict=True))
+    except Exception as error:
+        raise BundleError(f"the graph does not run: {_first_line(error)}") from None
+
+
+def self_test(bundle: Bundle, *, threads: int = 1) -> tuple[Deviation, ...]:
+    """Run every graph on its golden inputs and compare.
+
+    Returns the deviation of each output. Raises BundleError at the first output that is not finite where it
+    should be, of another shape, or off by more than the manifest's `golden_tolerance`; and where a graph has
+    no golden values, or other inputs and outputs than the manifest says.
+    """
+    golden = read_golden(bundle)
+    deviations = []
+    for graph, signature in bundle.manifest.graphs.items():
+        if graph not in golden:
+            raise BundleError(f"{bundle.folder}: no golden values for {graph}.onnx, so it cannot be tested")
+        session = open_session(bundle.graph(graph), threads=threads)
+        _compare_names(bundle, graph, "input", [t.name for t in signature.inputs], session.get_inputs())
+        _compare_names(bundle, graph, "output", [t.name for t in signature.outputs], session.get_outputs())
+        outputs = run_graph(session, golden[graph].inputs)
+        for name, expected in golden[graph].outputs.items():
+            if name not in outputs:
+                raise BundleError(f"{bundle.folder}: {graph}.onnx has no output {name}")
+            relative = _relative_deviation(outputs[name], expected)
+            if not relative <= bundle.manifest.golden_tolerance:
+                raise BundleError(
+                    f"{bundle.folder}: self-test failed: {graph}.onnx, output {name} is off by {relative:.2g} "
+                    f"(at most {bundle.manifest.golden_tolerance:.2g})"
+                )
+            deviations.append(Deviation(graph, name, relative))
+    return tuple(deviations)
+
+
+def _relative_deviation(found: NDArray[Any], expected: NDArray[Any]) -> float:
+    """Return the largest deviation over the largest expected magnitude; infinite where shape or NaN differ."""
+    if found.shape != expected.shape:
+        return float("inf")
+    if expected.size == 0:
+        return 0.0
+    first, second = found.astype(np.float64), expected.astype(np.float64)
+    if not np.array_equal(np.isfinite(first), np.isfinite(second)):
+        return float("inf")
+    finite = np.isfinite(second)
+    if not finite.any():
+        return 0.0
+    scale = max(float(np.abs(second[finite]).max()), 1e-9)
+    return float(np.abs(first[finite] - second[finite]).max()) / scale
+
+
+def _compare_names(bundle: Bundle, graph: str, side: str, listed: list[str], actual: Any) -> None:
+    names = [item.name for item in actual]
+    if names != listed:
+        raise BundleError(
+            f"{bundle.folder}: {graph}.onnx: the manifest lists the {side}s {', '.join(listed)}, "
+            f"the graph has {', '.join(names)}"
+        )
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).strip().splitlines() or [type(error).__name__])[0][:200]
