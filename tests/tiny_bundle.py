@@ -51,7 +51,7 @@ def write_tiny_bundle(
     quantity: str = "outdoor_temperature",
     created: datetime = datetime(2026, 3, 14, tzinfo=UTC),
 ) -> Bundle:
-    """Write a bundle whose simulator adds `offset`; `golden_offset` other than it makes the self-test fail."""
+    """Write a bundle whose simulator adds `offset`; another `golden_offset` makes the self-test fail."""
     signature = GraphSignature(
         inputs=(Tensor("weather", ("batch", "hour"), (quantity,), ("degC",)),),
         outputs=(Tensor("air_temperature", ("batch", "hour"), ("air_temperature",), ("degC",)),),

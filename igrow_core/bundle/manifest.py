@@ -178,7 +178,8 @@ def _check(manifest: Manifest, where: str) -> None:
         for tensor in (*signature.inputs, *signature.outputs):
             if len(tensor.units) != len(tensor.quantities):
                 raise BundleError(
-                    f"{where}: graphs.{graph}: {tensor.name} names as many units as quantities, please"
+                    f"{where}: graphs.{graph}: {tensor.name}: expected one unit for each of its "
+                    f"{len(tensor.quantities)} quantities, found {len(tensor.units)}"
                 )
 
 

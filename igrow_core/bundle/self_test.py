@@ -70,15 +70,15 @@ def self_test(bundle: Bundle, *, threads: int = 1) -> tuple[Deviation, ...]:
             relative = _relative_deviation(outputs[name], expected)
             if not relative <= bundle.manifest.golden_tolerance:
                 raise BundleError(
-                    f"{bundle.folder}: self-test failed: {graph}.onnx, output {name} is off by {relative:.2g} "
-                    f"(at most {bundle.manifest.golden_tolerance:.2g})"
+                    f"{bundle.folder}: self-test failed: {graph}.onnx, output {name} "
+                    f"is off by {relative:.2g} (at most {bundle.manifest.golden_tolerance:.2g})"
                 )
             deviations.append(Deviation(graph, name, relative))
     return tuple(deviations)
 
 
 def _relative_deviation(found: NDArray[Any], expected: NDArray[Any]) -> float:
-    """Return the largest deviation over the largest expected magnitude; infinite where shape or NaN differ."""
+    """Return the largest deviation over the largest expected magnitude; infinite if shape or NaN differ."""
     if found.shape != expected.shape:
         return float("inf")
     if expected.size == 0:
