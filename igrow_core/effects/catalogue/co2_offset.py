@@ -1,0 +1,27 @@
+"""A CO2 sensor that reads too much by a constant."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from igrow_core.effects.definition import Array, Drivers, Effect, Parameter, Values
+
+
+def _contribution(xp: Any, drivers: Drivers, parameters: Values, _memory: Array) -> Mapping[str, Array]:
+    return {"air_co2": parameters["offset"] + 0.0 * drivers["air_co2"]}
+
+
+EFFECT = Effect(
+    name="co2_offset",
+    kind="sensor",
+    balances=(),
+    drivers=("air_co2",),
+    parameters=(Parameter("offset", "ppm", 40.0, -400.0, 400.0, "what the sensor reads too much"),),
+    contribution=_contribution,
+    signature="the reading is off from one moment on, no balance answers",
+    separating_test="hold a calibrated hand sensor beside it",
+    sentence="the CO2 sensor reads {value} ppm too much",
+    source="sensor practice",
+    measured=("air_co2",),
+)
