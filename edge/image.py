@@ -1,0 +1,69 @@
+"""The process image: what one control cycle knows, frozen for the length of that cycle.
+
+Every value carries its quality and its age, so that nothing downstream has to guess whether a number may be
+believed. `edge.sensors` builds an image from raw readings; decisions, guard and log only read it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from types import MappingProxyType
+
+
+class Quality(Enum):
+    """Whether a value may be believed, and if not, why."""
+
+    GOOD = "good"
+    STALE = "stale"
+    """The last value that was read, older than it should be."""
+    OUT_OF_RANGE = "out_of_range"
+    FROZEN = "frozen"
+    """Unchanged to the last digit for longer than this sensor can stand still."""
+    MISSING = "missing"
+    """Never read, or not for so long that the old value means nothing."""
+    IMPLAUSIBLE = "implausible"
+    """It moved faster than physics allows, or contradicts another sensor."""
+
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """One point of the image."""
+
+    value: float | None
+    """In the quantity's unit; None when nothing was ever read. Bad values are kept, for the log and the page."""
+    quality: Quality
+    age: float
+    """Seconds since the value was read; infinite when nothing was ever read."""
+    why: str = ""
+    """One line for people when the quality is not good."""
+
+
+MISSING = Value(None, Quality.MISSING, float("inf"), "never read")
+
+
+@dataclass(frozen=True, slots=True)
+class Image(Mapping[str, Value]):
+    """All values of one cycle by point name; a point that is not there reads as missing through `value_of`."""
+
+    monotonic: float
+    """Seconds on the daemon's own clock, which never jumps."""
+    true_time: float | None
+    """Seconds since 1970 UTC; None while the clock cannot be trusted."""
+    values: Mapping[str, Value] = field(default_factory=lambda: MappingProxyType({}))
+    link_ok: bool = True
+    """At least one point was read in this cycle."""
+
+    def __getitem__(self, name: str) -> Value:
+        return self.values[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.values)
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def value_of(self, name: str) -> Value:
+        """Return the value of a point, `MISSING` for a point that this plant does not have."""
+        return self.values.get(name, MISSING)
