@@ -6,7 +6,7 @@ believed. `edge.sensors` builds an image from raw readings; decisions, guard and
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from types import MappingProxyType
@@ -44,7 +44,7 @@ MISSING = Value(None, Quality.MISSING, float("inf"), "never read")
 
 
 @dataclass(frozen=True, slots=True)
-class Image(Mapping[str, Value]):
+class Image:
     """All values of one cycle by point name; a point that is not there reads as missing through `value_of`."""
 
     monotonic: float
@@ -54,15 +54,6 @@ class Image(Mapping[str, Value]):
     values: Mapping[str, Value] = field(default_factory=lambda: MappingProxyType({}))
     link_ok: bool = True
     """At least one point was read in this cycle."""
-
-    def __getitem__(self, name: str) -> Value:
-        return self.values[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.values)
-
-    def __len__(self) -> int:
-        return len(self.values)
 
     def value_of(self, name: str) -> Value:
         """Return the value of a point, `MISSING` for a point that this plant does not have."""
