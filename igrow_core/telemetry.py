@@ -1,8 +1,8 @@
 """The telemetry format: a table with a time and any of the registry's quantities, in memory and as CSV.
 
-A file is CSV, gzip where its name ends in `.gz`. Its header is `time` and names of quantities; times are UTC in
-ISO 8601 (`2020-01-31T12:05:00Z`), an empty cell is a missing value. Rows may stand in any order. Where several
-rows share one time they become one row, in which a later row's value counts before an earlier one's.
+A file is CSV, gzip where its name ends in `.gz`. Its header is `time` and names of quantities; times are UTC
+in ISO 8601 (`2020-01-31T12:05:00Z`), an empty cell is a missing value. Rows may stand in any order. Where
+several rows share one time they become one row, in which a later row's value counts before an earlier one's.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import csv
 import difflib
 import gzip
 import io
+import math
 import os
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
@@ -64,9 +65,7 @@ class Telemetry:
         try:
             return self.columns[name]
         except KeyError:
-            raise TelemetryError(
-                f"the telemetry has no column {name}{_nearest(name, self.columns)}"
-            ) from None
+            raise TelemetryError(f"the telemetry has no column {name}{_nearest(name, self.columns)}") from None
 
     def __contains__(self, name: object) -> bool:
         return name in self.columns
@@ -86,47 +85,40 @@ class Telemetry:
 
     def select(self, start: np.datetime64 | None = None, end: np.datetime64 | None = None) -> Telemetry:
         """Return the rows with start <= time < end; None leaves that side open."""
-        first = 0 if start is None else int(np.searchsorted(self.time, np.datetime64(start, "s")))
-        last = len(self.time) if end is None else int(np.searchsorted(self.time, np.datetime64(end, "s")))
-        return Telemetry(
-            self.time[first:last], {name: column[first:last] for name, column in self.columns.items()}
-        )
+        first = 0 if start is None else int(np.searchsorted(self.time, start.astype("datetime64[s]")))
+        last = len(self.time) if end is None else int(np.searchsorted(self.time, end.astype("datetime64[s]")))
+        return Telemetry(self.time[first:last], {name: column[first:last] for name, column in self.columns.items()})
 
     def with_columns(self, columns: Mapping[str, Values]) -> Telemetry:
         """Return the same rows with these columns added, or put in the place of those with the same name."""
         return Telemetry(self.time, {**self.columns, **columns})
 
     def only(self, names: Iterable[str]) -> Telemetry:
-        """Return the same rows with these columns alone, in this order; raises TelemetryError where one is absent."""
+        """Return the same rows with these columns alone, in this order; TelemetryError if one is absent."""
         return Telemetry(self.time, {name: self[name] for name in names})
 
 
 def from_rows(time: Times, columns: Mapping[str, Values]) -> Telemetry:
-    """Build a table from rows in any order; rows of one time become one, in which later values count first."""
+    """Build a table from rows in any order; rows of one time become one, in which later values win."""
     time = np.asarray(time, dtype="datetime64[s]")
     order = np.argsort(time, kind="stable")
     time = time[order]
-    starts = (
-        np.flatnonzero(np.diff(time, prepend=time[:1] - 1) > np.timedelta64(0, "s")) if len(time) else order
-    )
-    if len(starts) == len(time):
-        return Telemetry(
-            time, {name: np.asarray(values, dtype=np.float64)[order] for name, values in columns.items()}
-        )
-    group = np.cumsum(np.isin(np.arange(len(time)), starts)) - 1
+    new = np.ones(len(time), dtype=bool)
+    new[1:] = time[1:] > time[:-1]
+    group = np.cumsum(new) - 1
     merged: dict[str, Values] = {}
     for name, values in columns.items():
         ordered = np.asarray(values, dtype=np.float64)[order]
-        column = np.full(len(starts), np.nan)
+        column = np.full(int(new.sum()), np.nan)
         present = ~np.isnan(ordered)
         # An assignment with repeated indices keeps the last value, which is the rule of the format.
         column[group[present]] = ordered[present]
         merged[name] = column
-    return Telemetry(time[starts], merged)
+    return Telemetry(time[new], merged)
 
 
 def concatenate(tables: Sequence[Telemetry]) -> Telemetry:
-    """Join tables in time; a column that one lacks is NaN there, and a later table counts before an earlier one."""
+    """Join tables in time; a column that one lacks is NaN there; a later table wins over an earlier one."""
     if not tables:
         return Telemetry(np.empty(0, dtype="datetime64[s]"), {})
     names = dict.fromkeys(name for table in tables for name in table.columns)
@@ -142,8 +134,8 @@ def concatenate(tables: Sequence[Telemetry]) -> Telemetry:
 def to_grid(telemetry: Telemetry, step_seconds: int) -> Telemetry:
     """Return the table on a regular grid: each row is the mean of the values with row <= time < row + step.
 
-    The grid lies on whole multiples of `step_seconds` since 1970-01-01T00:00Z. A cell without a value is NaN. Angles (unit deg) are
-    averaged on the circle.
+    The grid lies on whole multiples of `step_seconds` since 1970-01-01T00:00Z. A cell without a value is NaN.
+    Angles (unit deg) are averaged on the circle.
     """
     if step_seconds <= 0:
         raise TelemetryError(f"a grid needs a step of at least 1 s, not {step_seconds}")
@@ -175,19 +167,14 @@ def read_csv(path: str | os.PathLike[str]) -> Telemetry:
     path = Path(path)
     header, cells, lines = read_cells(path)
     if not header or header[0] != "time":
-        raise TelemetryError(
-            f"{path}:1: the first column must be time, not {header[0] if header else 'nothing'}"
-        )
+        raise TelemetryError(f"{path}:1: the first column must be time, not {header[0] if header else 'nothing'}")
     for name in header[1:]:
         if name not in QUANTITIES:
             raise TelemetryError(f"{path}:1: column {name} is no known quantity{_nearest(name, QUANTITIES)}")
     time = _parse_times(path, cells[0], lines)
     return from_rows(
         time,
-        {
-            name: parse_numbers(path, name, column, lines)
-            for name, column in zip(header[1:], cells[1:], strict=True)
-        },
+        {name: parse_numbers(path, name, column, lines) for name, column in zip(header[1:], cells[1:], strict=True)},
     )
 
 
@@ -198,12 +185,8 @@ def write_csv(path: str | os.PathLike[str], telemetry: Telemetry) -> None:
         if name not in QUANTITIES:
             raise TelemetryError(f"column {name} is no known quantity{_nearest(name, QUANTITIES)}")
     texts = [np.char.add(np.datetime_as_string(telemetry.time, unit="s"), "Z").tolist()]
-    texts += [
-        ["" if value != value else f"{value:.7g}" for value in c.tolist()] for c in telemetry.columns.values()
-    ]
-    body = "\n".join(
-        [",".join(["time", *telemetry.columns]), *map(",".join, zip(*texts, strict=True)), ""]
-    ).encode()
+    texts += [["" if math.isnan(value) else f"{value:.7g}" for value in c.tolist()] for c in telemetry.columns.values()]
+    body = "\n".join([",".join(["time", *telemetry.columns]), *map(",".join, zip(*texts, strict=True)), ""]).encode()
     # Without a time stamp inside, equal telemetry gives an equal file.
     data = gzip.compress(body, mtime=0) if path.suffix == ".gz" else body
     partial = path.with_name(path.name + ".part")
@@ -217,7 +200,7 @@ def write_csv(path: str | os.PathLike[str], telemetry: Telemetry) -> None:
 def read_cells(path: Path, delimiter: str = ",") -> tuple[list[str], list[Sequence[str]], list[int]]:
     """Return the header, the cells by column and the line number of each row of a CSV file, gzip by suffix.
 
-    Raises TelemetryError where the file cannot be read, a row's length differs from the header's, or a name repeats.
+    Raises TelemetryError where the file cannot be read, a row is not as long as the header, or names repeat.
     """
     try:
         data = path.read_bytes()
@@ -243,9 +226,7 @@ def read_cells(path: Path, delimiter: str = ",") -> tuple[list[str], list[Sequen
             if not any(cell.strip() for cell in row):
                 continue
             if len(row) < width or any(cell.strip() for cell in row[width:]):
-                raise TelemetryError(
-                    f"{path}:{reader.line_num}: {len(row)} cells where the header has {width}"
-                )
+                raise TelemetryError(f"{path}:{reader.line_num}: {len(row)} cells where the header has {width}")
             row = row[:width]  # noqa: PLW2901
         rows.append(row)
         lines.append(reader.line_num)
@@ -258,9 +239,7 @@ def parse_numbers(
 ) -> Values:
     """Return one column of cells as float64; empty cells, `nan` and the texts in `missing` become NaN."""
     try:
-        values = np.array(
-            [float(cell) if cell and cell not in missing else np.nan for cell in cells], dtype=np.float64
-        )
+        values = np.array([float(cell) if cell and cell not in missing else np.nan for cell in cells], dtype=np.float64)
     except ValueError:
         values = np.empty(len(cells))
         for position, cell in enumerate(cells):
@@ -269,9 +248,7 @@ def parse_numbers(
                 values[position] = float(text) if text and text not in missing else np.nan
             except ValueError:
                 where = f"{path}:{lines[position]}"
-                raise TelemetryError(
-                    f"{where}: {name} is {text!r}: a number or an empty cell is needed"
-                ) from None
+                raise TelemetryError(f"{where}: {name} is {text!r}: a number or an empty cell is needed") from None
     if np.isinf(values).any():
         line = lines[int(np.flatnonzero(np.isinf(values))[0])]
         raise TelemetryError(f"{path}:{line}: {name} is infinite: a number or an empty cell is needed")

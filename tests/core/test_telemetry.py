@@ -109,7 +109,7 @@ def test_a_cut_gzip_file_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(TelemetryError, match="none.csv: cannot be read: No such file"):
+    with pytest.raises(TelemetryError, match=r"none\.csv: cannot be read: No such file"):
         read_csv(tmp_path / "none.csv")
 
 
