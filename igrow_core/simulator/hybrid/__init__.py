@@ -1,0 +1,1 @@
+"""The default simulator: physical balances, named effects, and a measurement path of its own."""

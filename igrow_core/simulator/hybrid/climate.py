@@ -1,0 +1,282 @@
+"""The hybrid climate stage: balances of heat, vapour and CO2 of the greenhouse air, with named effects.
+
+The stage is driven by what the actuators did, not by setpoints: the PLC's own control fights every
+disturbance, so that a missing effect hides from the temperature and shows in heat, vents and CO2.
+
+Four states per greenhouse: air temperature (degC), vapour (kg m-3), CO2 (kg m-3) and the temperature of the
+floor that follows within a day (degC); one more for each effect with a memory. All functions are pure and
+elementwise over arrays of one shape, and work in numpy and while an ONNX graph is traced (`xp`).
+
+Over one step each balance C dx/dt = F(x) is advanced by its exponential: x + F/G (1 - exp(-G dt / C)), where G
+is the sum of the conductances that pull x back. It is exact for a linear balance with constant inputs, stable
+for any step (Hochbruck and Ostermann (2010), Acta Numerica 19, exponential Rosenbrock-Euler).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from igrow_core import air
+from igrow_core.effects import EFFECTS
+from igrow_core.effects.definition import Array, Drivers, Values
+
+STATES = ("air_temperature", "vapour_concentration", "co2_concentration", "mass_temperature")
+"""The states without the memories of effects."""
+
+INPUTS = (
+    "outdoor_temperature",
+    "outdoor_humidity",
+    "outdoor_co2",
+    "global_radiation",
+    "wind_speed",
+    "sky_temperature",
+    "rail_pipe_temperature",
+    "grow_pipe_temperature",
+    "vent_lee",
+    "vent_wind",
+    "energy_screen",
+    "blackout_screen",
+    "lamp_power",
+    "co2_dosing",
+    "leaf_area_index",
+)
+"""What drives the balances themselves; effects may read more (`igrow_core.effects`)."""
+
+ActiveEffects = Mapping[str, Values]
+"""Name of an effect -> values of its parameters. A sensor effect may stand here too: the plant ignores it."""
+
+_VOLUMETRIC_HEAT = 1.2 * air.SPECIFIC_HEAT_AIR
+"""Heat capacity of air, J m-3 K-1, at 20 degC."""
+_PAR_PER_GLOBAL = 2.1
+"""Photons of PAR in outdoor radiation, umol J-1 (46 % of the energy, 4.57 umol J-1)."""
+_ENERGY_SCREEN_SHADE, _BLACKOUT_SCREEN_SHADE = 0.25, 0.98
+"""Light that a closed screen takes (data documentation of the 2019 challenge)."""
+_EXTINCTION = 0.7
+"""Extinction of radiation in a tomato canopy (Stanghellini 1987)."""
+
+
+def memory_name(effect: str) -> str:
+    """Return the name of the state that holds the memory of an effect."""
+    return f"memory:{effect}"
+
+
+def derive(xp: Any, state: Values, inputs: Drivers, parameters: Values, lamp_efficacy: Array) -> dict[str, Array]:
+    """Return the drivers: all inputs, the states in the log's quantities, and what effects read beside them.
+
+    Args:
+        xp: the array namespace.
+        state: `STATES` by name.
+        inputs: `INPUTS` and whatever the active effects read, by name; must hold ``mean_height``.
+        parameters: `igrow_core.simulator.hybrid.parameters.PARAMETERS` by name.
+        lamp_efficacy: photons of PAR per electric energy of the lamps, umol J-1.
+    """
+    temperature, vapour, co2 = (state[name] for name in STATES[:3])
+    zero = 0.0 * temperature
+    shade = (1.0 - 0.01 * _ENERGY_SCREEN_SHADE * inputs["energy_screen"]) * (
+        1.0 - 0.01 * _BLACKOUT_SCREEN_SHADE * inputs["blackout_screen"]
+    )
+    sun = xp.maximum(inputs["global_radiation"], 0.0 * inputs["global_radiation"])
+    radiation_inside = parameters["transmissivity"] * shade * sun
+    par = radiation_inside * _PAR_PER_GLOBAL + lamp_efficacy * inputs["lamp_power"]
+    deficit = air.vapour_pressure_deficit(xp, temperature, vapour)
+    canopy = 1.0 - xp.exp(-_EXTINCTION * inputs["leaf_area_index"])
+    radiation_on_crop = radiation_inside + parameters["lamp_radiation_share"] * inputs["lamp_power"]
+    night = parameters["transpiration_night_share"]
+    day_share = night + (1.0 - night) * radiation_on_crop / (radiation_on_crop + 20.0)
+    evaporation = (
+        parameters["transpiration_radiation"] * canopy * radiation_on_crop
+        + 0.001 * parameters["transpiration_deficit"] * inputs["leaf_area_index"] * day_share * deficit
+    )
+    ppm = air.co2_fraction(temperature, co2)
+    assimilation = (
+        parameters["assimilation_maximum"]
+        / 3.6e6
+        * canopy
+        * (par / (par + parameters["assimilation_light"]))
+        * (ppm / (ppm + parameters["assimilation_co2"]))
+    )
+    opening = 0.01 * (inputs["vent_lee"] + parameters["vent_windward_ratio"] * inputs["vent_wind"])
+    blocked = 1.0 - 0.01 * parameters["screen_air_blocking"] * xp.maximum(
+        inputs["energy_screen"], inputs["blackout_screen"]
+    )
+    buoyancy = xp.sqrt(xp.abs(temperature - inputs["outdoor_temperature"]) + 0.01)
+    ventilation = (
+        0.5 * opening * blocked * (parameters["vent_wind"] * inputs["wind_speed"] + parameters["vent_stack"] * buoyancy)
+    )
+    return dict(inputs) | {
+        "air_temperature": temperature,
+        "air_humidity": air.relative_humidity(xp, temperature, vapour),
+        "air_co2": ppm,
+        "par": par,
+        "radiation_inside": radiation_inside,
+        "vapour_concentration": vapour,
+        "outdoor_vapour_concentration": air.vapour_concentration(
+            xp, inputs["outdoor_temperature"], inputs["outdoor_humidity"]
+        ),
+        "vapour_deficit": deficit,
+        "ventilation": ventilation,
+        "transpiration": evaporation / air.LATENT_HEAT,
+        "assimilation": assimilation,
+        "rail_pipe_excess": xp.maximum(inputs["rail_pipe_temperature"] - temperature, zero),
+        "grow_pipe_excess": xp.maximum(inputs["grow_pipe_temperature"] - temperature, zero),
+    }
+
+
+def contributions(xp: Any, drivers: Drivers, state: Values, effects: ActiveEffects) -> dict[str, Array]:
+    """Return the sum over the active process effects of what they add to each channel they enter."""
+    total: dict[str, Array] = {}
+    for name, values in effects.items():
+        effect = EFFECTS[name]
+        if effect.kind == "process":
+            memory = state[memory_name(name)] if effect.memory else None
+            for channel, flux in effect.contribution(xp, drivers, values, memory).items():
+                total[channel] = total[channel] + flux if channel in total else flux
+    return total
+
+
+def balances(
+    xp: Any, state: Values, drivers: Drivers, parameters: Values, added: Mapping[str, Array]
+) -> dict[str, tuple[Array, Array, Array]]:
+    """Return (net flux, restoring conductance, capacity) of each of `STATES`.
+
+    Heat in W m-2, W m-2 K-1 and J m-2 K-1; vapour and CO2 in kg m-2 s-1, m s-1 and m.
+
+    Args:
+        xp: the array namespace.
+        state: `STATES` by name.
+        drivers: from `derive`.
+        parameters: by name.
+        added: what effects, a learned remainder or a disturbance add, by channel.
+    """
+    temperature, vapour, co2, mass = (state[name] for name in STATES)
+    height = drivers["mean_height"]
+    outdoor = drivers["outdoor_temperature"]
+    leakage = (parameters["leakage_still"] + parameters["leakage_wind"] * drivers["wind_speed"]) * height / 3600.0
+    exchange = leakage + drivers["ventilation"] + added.get("air_exchange", 0.0)
+    light = 1.0 - added.get("light_loss", 0.0)
+
+    screens = (1.0 - 0.01 * parameters["energy_screen_saving"] * drivers["energy_screen"]) * (
+        1.0 - 0.01 * parameters["blackout_screen_saving"] * drivers["blackout_screen"]
+    )
+    cover = screens * (
+        parameters["cover_heat_transfer"] + parameters["cover_wind_heat_transfer"] * drivers["wind_speed"]
+    )
+    surroundings = outdoor + parameters["sky_share"] * (drivers["sky_temperature"] - outdoor)
+    rail = parameters["rail_pipe_heat_transfer"] * drivers["rail_pipe_excess"]
+    grow = parameters["grow_pipe_heat_transfer"] * drivers["grow_pipe_excess"]
+    sun = drivers["radiation_inside"] * light
+    transpiration = drivers["transpiration"]
+    to_mass = parameters["mass_heat_transfer"] * (temperature - mass)
+    heat = (
+        rail
+        + grow
+        + (parameters["lamp_heat_share"] + parameters["lamp_radiation_share"]) * drivers["lamp_power"]
+        + parameters["solar_heat_share"] * sun
+        - air.LATENT_HEAT * transpiration
+        - cover * (temperature - surroundings)
+        - exchange * _VOLUMETRIC_HEAT * (temperature - outdoor)
+        - to_mass
+        + added.get("heat", 0.0)
+    )
+    heat_conductance = (
+        cover
+        + exchange * _VOLUMETRIC_HEAT
+        + parameters["mass_heat_transfer"]
+        + parameters["rail_pipe_heat_transfer"] * xp.tanh(drivers["rail_pipe_excess"])
+    )
+
+    cover_temperature = outdoor + parameters["cover_share"] * (temperature - outdoor)
+    dew = vapour - air.saturation_concentration(xp, cover_temperature)
+    condensing = parameters["condensation_transfer"] * screens
+    condensation = condensing * xp.maximum(dew, 0.0 * dew)
+    outdoor_vapour = drivers["outdoor_vapour_concentration"]
+    vapour_flux = transpiration - exchange * (vapour - outdoor_vapour) - condensation + added.get("vapour", 0.0)
+    # One kg m-3 more vapour lowers the deficit by R T / M pascal, and with it the transpiration.
+    deficit_response = (
+        0.001 * parameters["transpiration_deficit"] * drivers["leaf_area_index"] * 1.36e5 / air.LATENT_HEAT
+    )
+    vapour_conductance = exchange + condensing * 0.5 + deficit_response * 0.5
+
+    outdoor_co2 = air.co2_concentration(outdoor, drivers["outdoor_co2"])
+    respiration = parameters["respiration"] / 3.6e6 * xp.exp(0.0693147 * (temperature - 20.0))
+    assimilation = drivers["assimilation"] * light + added.get("assimilation", 0.0)
+    co2_flux = (
+        parameters["dosing_share"] * drivers["co2_dosing"] / 3600.0
+        - exchange * (co2 - outdoor_co2)
+        - assimilation
+        + respiration
+        + added.get("co2", 0.0)
+    )
+    co2_conductance = exchange + 0.5 * drivers["assimilation"] / co2
+
+    mass_flux = to_mass + parameters["mass_solar_share"] * sun
+    mass_capacity = 1000.0 * parameters["mass_heat_capacity"]
+    air_capacity = parameters["heat_capacity_factor"] * _VOLUMETRIC_HEAT * height
+    return {
+        "air_temperature": (heat, heat_conductance, air_capacity),
+        "vapour_concentration": (vapour_flux, vapour_conductance, height),
+        "co2_concentration": (co2_flux, co2_conductance, height),
+        "mass_temperature": (mass_flux, parameters["mass_heat_transfer"], mass_capacity),
+    }
+
+
+def advance(
+    xp: Any,
+    state: Values,
+    inputs: Drivers,
+    parameters: Values,
+    effects: ActiveEffects,
+    *,
+    seconds: float,
+    lamp_efficacy: Array,
+    added: Mapping[str, Array] | None = None,
+) -> dict[str, Array]:
+    """Return the state `seconds` later, the inputs held.
+
+    Args:
+        xp: the array namespace.
+        state: `STATES` and the memories of the active effects, by name.
+        inputs: see `derive`; pipes are corrected for sensor faults beforehand (`measurement.correct_inputs`).
+        parameters: by name.
+        effects: the active effects.
+        seconds: length of the step; at most 900 s keeps a day within 0.1 K of the limit of small steps.
+        lamp_efficacy: umol J-1.
+        added: further fluxes by channel (a learned remainder, a disturbance).
+    """
+    drivers = derive(xp, state, inputs, parameters, lamp_efficacy)
+    total = contributions(xp, drivers, state, effects)
+    for channel, flux in (added or {}).items():
+        total[channel] = total[channel] + flux if channel in total else flux
+    following = {}
+    for name, (flux, conductance, capacity) in balances(xp, state, drivers, parameters, total).items():
+        decay = xp.exp(-seconds * conductance / capacity)
+        following[name] = state[name] + flux / conductance * (1.0 - decay)
+    for name, values in effects.items():
+        memory = EFFECTS[name].memory
+        if memory is not None:
+            key = memory_name(name)
+            following[key] = memory.advance(xp, state[key], drivers, values, seconds)
+    return following
+
+
+def initial_state(
+    xp: Any, climate: Drivers, inputs: Drivers, parameters: Values, effects: ActiveEffects, lamp_efficacy: Array
+) -> dict[str, Array]:
+    """Return the state that agrees with measured air temperature (degC), humidity (%) and CO2 (ppm).
+
+    The floor starts at ``mass_temperature`` where `climate` holds it, else at the air's; memories start at rest.
+    """
+    temperature = climate["air_temperature"]
+    state = {
+        "air_temperature": temperature,
+        "vapour_concentration": air.vapour_concentration(xp, temperature, climate["air_humidity"]),
+        "co2_concentration": air.co2_concentration(temperature, climate["air_co2"]),
+        "mass_temperature": climate.get("mass_temperature", temperature),
+    }
+    drivers = derive(xp, state, inputs, parameters, lamp_efficacy)
+    for name, values in effects.items():
+        memory = EFFECTS[name].memory
+        if memory is not None:
+            state[memory_name(name)] = memory.start(xp, drivers, values)
+    return state
