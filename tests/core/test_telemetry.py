@@ -41,9 +41,7 @@ def refused(path: Path, text: str) -> str:
 @pytest.mark.parametrize("name", ["log.csv", "log.csv.gz"])
 def test_what_is_written_is_read_back(tmp_path: Path, name: str) -> None:
     values = np.array([20.123456, np.nan, -3.5])
-    telemetry = Telemetry(
-        times("2020-01-01", "2020-01-02T03:04:05", "2020-01-03"), {"air_temperature": values}
-    )
+    telemetry = Telemetry(times("2020-01-01", "2020-01-02T03:04:05", "2020-01-03"), {"air_temperature": values})
     write_csv(tmp_path / name, telemetry)
     back = read_csv(tmp_path / name)
     np.testing.assert_array_equal(back.time, telemetry.time)
@@ -72,10 +70,7 @@ def test_rows_in_any_order_are_sorted_and_the_later_row_of_one_time_wins_where_i
 
 def test_an_unknown_column_is_refused_with_the_nearest_name(tmp_path: Path) -> None:
     message = refused(tmp_path / "log.csv", "time,air_temprature\n2020-01-01T00:00:00Z,1\n")
-    assert (
-        message
-        == f"{tmp_path}/log.csv:1: column air_temprature is no known quantity: did you mean air_temperature?"
-    )
+    assert message == f"{tmp_path}/log.csv:1: column air_temprature is no known quantity: did you mean air_temperature?"
 
 
 @pytest.mark.parametrize(
@@ -167,9 +162,7 @@ def test_a_grid_holds_the_mean_of_each_step_and_nan_in_gaps() -> None:
 
 
 def test_directions_are_averaged_on_the_circle() -> None:
-    telemetry = Telemetry(
-        times("2020-01-01T00:00", "2020-01-01T00:30"), {"wind_direction": np.array([350.0, 20.0])}
-    )
+    telemetry = Telemetry(times("2020-01-01T00:00", "2020-01-01T00:30"), {"wind_direction": np.array([350.0, 20.0])})
     np.testing.assert_allclose(to_grid(telemetry, 3600)["wind_direction"], [5.0], atol=1e-9)
 
 
@@ -184,6 +177,4 @@ def test_merging_rows_keeps_the_last_value_of_every_time(rows: list[tuple[int, f
         {"air_temperature": np.array([np.nan if value is None else value for _, value in rows], dtype=float)},
     )
     assert merged.time.astype(int).tolist() == sorted(expected)
-    np.testing.assert_array_equal(
-        merged["air_temperature"], [expected[second] for second in sorted(expected)]
-    )
+    np.testing.assert_array_equal(merged["air_temperature"], [expected[second] for second in sorted(expected)])

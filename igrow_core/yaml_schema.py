@@ -1,0 +1,370 @@
+"""Strict YAML: a file is read into a dataclass, and every error says `file:line:column: what, and what would be right`.
+
+A schema is a frozen dataclass whose fields are typed and made by `setting`. The file's own types are not used,
+since YAML 1.1 reads 12:30 as 750, NO as false, 0123 as 83 and 1e3 as text; a scalar is read by the field's type:
+
+| field type | reads |
+|---|---|
+| `float`, `int` | 1200, 1.2e3, -5; `int` also 0x1f; no quotes, no leading zero, no infinity |
+| `bool` | true or false |
+| `str` | the text as written, on and 12:30 too |
+| an `Enum`, `Literal[...]` | one of its values |
+| `datetime.time` | 12:30 or 12:30:15 |
+| `datetime.date`, `datetime.datetime` | 2020-01-31; 2020-01-31T12:30:00Z |
+| `datetime.timedelta` | a number and a unit: 30 s, 5 min, 1 h, 2 days, 1 week |
+| `X | None` | null, or X |
+| `tuple[X, ...]`, `Mapping[str, X]`, a dataclass | a list, a mapping, the keys of the dataclass |
+| `A | B` of dataclasses | the one whose `Literal` field (such as `kind: Literal["tcp"]`) has the file's value |
+
+Duplicate keys, unknown keys, tags and merge keys are refused. A dataclass may check itself in `__post_init__` and
+raise `SettingError(what, key)`; the loader adds the place.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import datetime
+import difflib
+import os
+import re
+import types
+from collections.abc import Iterable, Mapping
+from enum import Enum
+from pathlib import Path
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+import yaml
+
+from igrow_core.errors import IgrowError
+
+T = TypeVar("T")
+
+_NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?")
+_LEADING_ZERO = re.compile(r"[-+]?0\d")
+_DURATION = re.compile(r"(\d+(?:\.\d+)?)\s*([a-z]+)")
+_SECONDS = {
+    **dict.fromkeys(("s", "second", "seconds"), 1.0),
+    **dict.fromkeys(("min", "minute", "minutes"), 60.0),
+    **dict.fromkeys(("h", "hour", "hours"), 3600.0),
+    **dict.fromkeys(("day", "days"), 86_400.0),
+    **dict.fromkeys(("week", "weeks"), 604_800.0),
+}
+
+
+class SchemaError(IgrowError):
+    """An error in a configuration file, with its place."""
+
+
+class SettingError(IgrowError):
+    """What a dataclass of a schema finds wrong with itself; `path` leads from it to the key at fault."""
+
+    def __init__(self, what: str, *path: str | int) -> None:
+        super().__init__(what)
+        self.path = path
+
+
+def setting(
+    *,
+    help: str,  # noqa: A002 - the word that users of argparse know
+    unit: str = "",
+    low: float | datetime.timedelta | None = None,
+    high: float | datetime.timedelta | None = None,
+    default: Any = dataclasses.MISSING,
+    default_factory: Any = dataclasses.MISSING,
+    keys: Iterable[str] | None = None,
+) -> Any:
+    """Define one field of a schema: what it means, its unit, its bounds and its default (without one it is required).
+
+    Bounds are inclusive and hold for each number of a list or mapping too; `keys` are the only names that a
+    mapping may have.
+    """
+    metadata = {"help": help, "unit": unit, "low": low, "high": high, "keys": None if keys is None else tuple(keys)}
+    return dataclasses.field(default=default, default_factory=default_factory, metadata=metadata)
+
+
+def load(path: str | os.PathLike[str], schema: type[T]) -> T:
+    """Read a YAML file into `schema`, a dataclass; raises SchemaError with the place of the first error."""
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except OSError as error:
+        raise SchemaError(f"{path}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise SchemaError(f"{path}: is not UTF-8 text") from None
+    return parse(text, schema, str(path))
+
+
+def parse(text: str, schema: type[T], name: str = "text") -> T:
+    """Read YAML text into `schema`; `name` stands for the file in errors."""
+    try:
+        node = yaml.compose(text, Loader=yaml.SafeLoader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        place = f"{name}:{mark.line + 1}:{mark.column + 1}" if mark else name
+        raise SchemaError(f"{place}: not valid YAML: {error.problem or error.context}") from None
+    except yaml.YAMLError as error:
+        raise SchemaError(f"{name}: not valid YAML: {str(error).splitlines()[0]}") from None
+    if node is None:
+        raise SchemaError(f"{name}:1:1: the file is empty: it needs {_required(schema)}")
+    value: T = _Reader(name).read(node, schema, "", types.MappingProxyType({}))
+    return value
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Return `did you mean X?` for a misspelt name, or the list of what is known."""
+    choices = list(known)
+    found = difflib.get_close_matches(name, choices, n=1)
+    return f"did you mean {found[0]}?" if found else f"known here: {', '.join(choices)}"
+
+
+class _Reader:
+    """Reads nodes by type; knows the file's name for its errors."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def error(self, node: yaml.Node, what: str) -> SchemaError:
+        return SchemaError(f"{self._name}:{node.start_mark.line + 1}:{node.start_mark.column + 1}: {what}")
+
+    def read(self, node: yaml.Node, kind: Any, where: str, limits: Mapping[str, Any]) -> Any:
+        if not node.tag.startswith("tag:yaml.org,2002:") or "python" in node.tag:
+            raise self.error(node, f"the tag {node.tag} is not allowed: write the plain value")
+        origin, arguments = get_origin(kind), get_args(kind)
+        if origin in (Union, types.UnionType):
+            return self._union(node, arguments, where, limits)
+        if dataclasses.is_dataclass(kind) and isinstance(kind, type):
+            return self._dataclass(node, kind, where)
+        if origin is tuple:
+            if not isinstance(node, yaml.SequenceNode):
+                raise self.error(node, f"{where} must be a list, such as [a, b]")
+            return tuple(self.read(item, arguments[0], f"{where}[{i}]", limits) for i, item in enumerate(node.value))
+        if origin is not None and isinstance(origin, type) and issubclass(origin, Mapping):
+            pairs = self._pairs(node, where)
+            known = limits.get("keys")
+            for key, (key_node, _) in pairs.items():
+                if known is not None and key not in known:
+                    raise self.error(key_node, f"{_join(where, key)} is not known: {nearest(key, known)}")
+            values = {k: self.read(v, arguments[1], _join(where, k), limits) for k, (_, v) in pairs.items()}
+            return types.MappingProxyType(values)
+        if not isinstance(node, yaml.ScalarNode):
+            found = "a list" if isinstance(node, yaml.SequenceNode) else "a mapping"
+            raise self.error(node, f"{where or 'the file'} is {found}: {_wanted(kind, limits)} is needed")
+        return self._scalar(node, kind, where, limits)
+
+    def _pairs(self, node: yaml.Node, where: str) -> dict[str, tuple[yaml.Node, yaml.Node]]:
+        if not isinstance(node, yaml.MappingNode):
+            raise self.error(node, f"{where or 'the file'} must be a mapping of keys to values, such as `key: value`")
+        pairs: dict[str, tuple[yaml.Node, yaml.Node]] = {}
+        for key_node, value_node in node.value:
+            if not isinstance(key_node, yaml.ScalarNode):
+                raise self.error(key_node, "a key must be a plain name")
+            key = key_node.value
+            if key in pairs:
+                first = pairs[key][0].start_mark.line + 1
+                raise self.error(key_node, f"{_join(where, key)} stands twice: remove it here or in line {first}")
+            pairs[key] = (key_node, value_node)
+        return pairs
+
+    def _dataclass(self, node: yaml.Node, schema: type[Any], where: str) -> Any:
+        if isinstance(node, yaml.ScalarNode) and node.value == "":
+            raise self.error(
+                node, f"{where or 'the file'} is empty: it needs {_required(schema) or 'keys, or remove it'}"
+            )
+        pairs = self._pairs(node, where)
+        fields = {field.name: field for field in dataclasses.fields(schema) if field.init}
+        hints = get_type_hints(schema)
+        for key, (key_node, _) in pairs.items():
+            if key not in fields:
+                raise self.error(key_node, f"{_join(where, key)} is not known: {nearest(key, fields)}")
+        values: dict[str, Any] = {}
+        for name, field in fields.items():
+            if name in pairs:
+                values[name] = self.read(pairs[name][1], hints[name], _join(where, name), field.metadata)
+            elif field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:
+                needed = f"{_join(where, name)} is missing: add `{name}:` with {_wanted(hints[name], field.metadata)}"
+                raise self.error(node, f"{needed}{_meaning(field)}")
+        try:
+            return schema(**values)
+        except SettingError as error:
+            raise self.error(_find(node, error.path), str(error)) from None
+
+    def _union(self, node: yaml.Node, kinds: tuple[Any, ...], where: str, limits: Mapping[str, Any]) -> Any:
+        if type(None) in kinds:
+            if isinstance(node, yaml.ScalarNode) and node.style is None and node.value in ("", "null", "~"):
+                return None
+            kinds = tuple(kind for kind in kinds if kind is not type(None))
+        if len(kinds) == 1:
+            return self.read(node, kinds[0], where, limits)
+        pairs = self._pairs(node, where)
+        tags = {_tag(kind): kind for kind in kinds}
+        key = next(iter(tags))[0]
+        if key not in pairs:
+            raise self.error(
+                node, f"{_join(where, key)} is missing: add `{key}:` with one of {_listed(t[1] for t in tags)}"
+            )
+        value = pairs[key][1].value
+        if (key, value) not in tags:
+            choices = [tag[1] for tag in tags]
+            raise self.error(pairs[key][1], f"{_join(where, key)} is {value!r}: {nearest(str(value), choices)}")
+        return self.read(node, tags[(key, value)], where, limits)
+
+    def _scalar(self, node: yaml.ScalarNode, kind: Any, where: str, limits: Mapping[str, Any]) -> Any:
+        text: str = node.value
+        if text == "" and node.style is None:
+            raise self.error(node, f"{where} is empty: {_wanted(kind, limits)} is needed")
+        if node.style is not None and kind in (float, int, bool):
+            raise self.error(node, f"{where} is the text {text!r}: write it without quotes")
+        try:
+            value = _convert(text, kind)
+        except ValueError as error:
+            hint = str(error) or f"{_wanted(kind, limits)} is needed"
+            raise self.error(node, f"{where} is {text!r}: {hint}") from None
+        low, high = limits.get("low"), limits.get("high")
+        if isinstance(value, (int, float, datetime.timedelta)) and not isinstance(value, bool):
+            self._bounds(node, value, low, high, f"{where} is {text}: {_wanted(kind, limits)} is needed")
+        return value
+
+    def _bounds(self, node: yaml.Node, value: Any, low: Any, high: Any, what: str) -> None:
+        if (low is not None and value < low) or (high is not None and value > high):
+            raise self.error(node, what)
+
+
+def _convert(text: str, kind: Any) -> Any:
+    """Return the scalar `text` as `kind`; raises ValueError, with a hint where there is a better one than the type."""
+    if kind is str:
+        return text
+    if kind is bool:
+        if text not in ("true", "false"):
+            raise ValueError("true or false is needed")
+        return text == "true"
+    if kind is int and re.fullmatch(r"0x[0-9a-fA-F]+", text):
+        return int(text, 16)
+    if kind in (int, float):
+        if _LEADING_ZERO.match(text):
+            raise ValueError("a number does not begin with 0; write it without")
+        if not _NUMBER.fullmatch(text):
+            raise ValueError
+        number = float(text)
+        if number in (float("inf"), float("-inf")):
+            raise ValueError("the number is too large")
+        if kind is int:
+            if number != int(number):
+                raise ValueError("a whole number is needed")
+            return int(number) if "." in text or "e" in text.lower() else int(text)
+        return number
+    if get_origin(kind) is Literal:
+        return _choice(text, {str(value): value for value in get_args(kind)})
+    if isinstance(kind, type) and issubclass(kind, Enum):
+        return _choice(text, {str(member.value): member for member in kind})
+    if kind is datetime.time:
+        if not re.fullmatch(r"\d\d?:\d\d(:\d\d)?", text):
+            raise ValueError
+        hour, minute, second = (int(part) for part in (text + ":0").split(":")[:3])
+        try:
+            return datetime.time(hour, minute, second)
+        except ValueError:
+            raise ValueError("a time of day from 00:00 to 23:59 is needed") from None
+    if kind is datetime.timedelta:
+        match = _DURATION.fullmatch(text)
+        if not match or match[2] not in _SECONDS:
+            raise ValueError
+        return datetime.timedelta(seconds=float(match[1]) * _SECONDS[match[2]])
+    if kind is datetime.date:
+        if not re.fullmatch(r"\d{4}-\d\d-\d\d", text):
+            raise ValueError
+        try:
+            return datetime.date.fromisoformat(text)
+        except ValueError:
+            raise ValueError("there is no such day") from None
+    if kind is datetime.datetime:
+        if not re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d(:\d\d)?Z", text):
+            raise ValueError
+        return datetime.datetime.fromisoformat(text)
+    raise TypeError(f"a schema cannot have a field of type {kind}")
+
+
+def _choice(text: str, choices: Mapping[str, Any]) -> Any:
+    if text not in choices:
+        raise ValueError(nearest(text, choices))
+    return choices[text]
+
+
+def _tag(kind: Any) -> tuple[str, str]:
+    """Return the name and the value of the first `Literal` field of a dataclass."""
+    for name, hint in get_type_hints(kind).items():
+        if get_origin(hint) is Literal:
+            return name, str(get_args(hint)[0])
+    raise TypeError(f"{kind} needs a Literal field to be told from the others")
+
+
+def _find(node: yaml.Node, path: tuple[str | int, ...]) -> yaml.Node:
+    """Return the node that `path` leads to, or the last one on the way that the file has."""
+    for step in path:
+        if isinstance(node, yaml.MappingNode):
+            values = [value for key, value in node.value if key.value == step]
+            if not values:
+                return node
+            node = values[0]
+        elif isinstance(node, yaml.SequenceNode) and isinstance(step, int) and step < len(node.value):
+            node = node.value[step]
+    return node
+
+
+def _wanted(kind: Any, limits: Mapping[str, Any]) -> str:
+    """Say in words what a field of this type and these limits takes."""
+    arguments = [argument for argument in get_args(kind) if argument is not type(None)]
+    if get_origin(kind) in (Union, types.UnionType) and len(arguments) == 1:
+        return _wanted(arguments[0], limits)
+    words = {
+        float: "a number",
+        int: "a whole number",
+        bool: "true or false",
+        str: "a text",
+        datetime.time: "a time of day such as 07:30",
+        datetime.date: "a date such as 2020-01-31",
+        datetime.datetime: "a time in UTC such as 2020-01-31T12:30:00Z",
+        datetime.timedelta: "a duration such as 30 s, 5 min, 1 h or 2 days",
+    }
+    if kind in words:
+        unit, low, high = limits.get("unit"), limits.get("low"), limits.get("high")
+        text = words[kind] + (f" in {unit}" if unit and unit != "1" else "")
+        if low is not None and high is not None:
+            return f"{text} from {_plain(low)} to {_plain(high)}"
+        if low is not None:
+            return f"{text} of at least {_plain(low)}"
+        return f"{text} of at most {_plain(high)}" if high is not None else text
+    if get_origin(kind) is Literal:
+        return f"one of {_listed(str(value) for value in arguments)}"
+    if isinstance(kind, type) and issubclass(kind, Enum):
+        return f"one of {_listed(str(member.value) for member in kind)}"
+    return "a list" if get_origin(kind) is tuple else "its keys below it"
+
+
+def _plain(value: float | datetime.timedelta) -> str:
+    if isinstance(value, datetime.timedelta):
+        seconds = value.total_seconds()
+        for size, name in ((86_400, "days"), (3600, "h"), (60, "min")):
+            if seconds >= size and seconds % size == 0:
+                return f"{seconds / size:g} {name}"
+        return f"{seconds:g} s"
+    return f"{value:g}"
+
+
+def _required(schema: type[Any]) -> str:
+    names = [
+        field.name
+        for field in dataclasses.fields(schema)
+        if field.init and field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
+    ]
+    return _listed(names)
+
+
+def _meaning(field: dataclasses.Field[Any]) -> str:
+    return f" ({field.metadata['help']})" if field.metadata.get("help") else ""
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(names)
+
+
+def _join(where: str, key: str) -> str:
+    return f"{where}.{key}" if where else key
