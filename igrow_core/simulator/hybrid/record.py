@@ -1,0 +1,320 @@
+"""A log made ready to drive the hybrid stage, the states it implies, and free runs from any of its instants.
+
+Row k of a record holds the measurements at its time, and the inputs from that time to the next row's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow_core import sun
+from igrow_core.effects import EFFECTS
+from igrow_core.effects.definition import Array, Values
+from igrow_core.simulator.hybrid import climate, measurement
+from igrow_core.simulator.hybrid.climate import ActiveEffects, memory_name
+from igrow_core.telemetry import Telemetry, to_grid
+
+Floats = NDArray[np.float64]
+
+LONGEST_FILL = 1800.0
+"""Inputs are bridged over gaps of at most this many seconds; longer ones make their rows unusable."""
+SUBSTEP = 900.0
+"""Longest step of the balances in seconds."""
+
+_MEANS = ("outdoor_temperature", "outdoor_humidity", "global_radiation", "wind_speed", "sky_temperature", "rain")
+"""Inputs that change smoothly, taken as the mean of both ends of the interval."""
+_ABSENT: Mapping[str, float] = {
+    "outdoor_co2": 420.0,
+    "wind_speed": 3.0,
+    "outdoor_humidity": 80.0,
+    "global_radiation": 0.0,
+    "rail_pipe_temperature": 0.0,
+    "grow_pipe_temperature": 0.0,
+    "vent_lee": 0.0,
+    "vent_wind": 0.0,
+    "energy_screen": 0.0,
+    "blackout_screen": 0.0,
+    "lamp_power": 0.0,
+    "co2_dosing": 0.0,
+    "irrigation": 0.0,
+    "wind_direction": 0.0,
+    "rain": 0.0,
+}
+"""What stands in for a column that the log lacks; the record names it in `unknown`."""
+_SKY_BELOW_AIR = 12.0
+"""K, sky below outdoor air under a half-clouded sky, where no sky temperature is measured."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """A log on a regular grid of n rows."""
+
+    time: NDArray[np.datetime64]
+    step: float
+    """Seconds between rows."""
+    inputs: Mapping[str, Floats]
+    """What drives the balances and the effects from each row to the next, by name, (n,), without gaps."""
+    measured: Mapping[str, Floats]
+    """`measurement.PREDICTED` by name, (n,), NaN where missing."""
+    usable: NDArray[np.bool_]
+    """The inputs of this row were measured, or bridged over a short gap, (n,)."""
+    unknown: tuple[str, ...]
+    """Inputs that the log lacks."""
+    lamp_efficacy: float
+    """umol J-1."""
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def slice(self, first: int, last: int) -> Record:
+        """Return rows first <= k < last."""
+        return replace(
+            self,
+            time=self.time[first:last],
+            inputs={name: values[first:last] for name, values in self.inputs.items()},
+            measured={name: values[first:last] for name, values in self.measured.items()},
+            usable=self.usable[first:last],
+        )
+
+    def since(self, onset: np.datetime64 | None) -> Record:
+        """Return the record with ``elapsed_days`` counted from `onset` (None: from the first row)."""
+        start = self.time[0] if onset is None else onset
+        elapsed = (self.time - start).astype("timedelta64[s]").astype(np.float64) / 86_400.0
+        return replace(self, inputs=dict(self.inputs) | {"elapsed_days": np.maximum(elapsed, 0.0)})
+
+
+def make_record(
+    telemetry: Telemetry,
+    *,
+    step: float,
+    latitude: float,
+    longitude: float,
+    mean_height: float,
+    lamp_efficacy: float,
+    leaf_area_index: float,
+) -> Record:
+    """Return the record of a log.
+
+    Args:
+        telemetry: any columns of the registry; outdoor and air temperature must be among them.
+        step: seconds between rows of the record.
+        latitude: degrees north.
+        longitude: degrees east.
+        mean_height: m, air volume per floor area.
+        lamp_efficacy: umol J-1.
+        leaf_area_index: m2 m-2, for rows without one.
+
+    Raises:
+        TelemetryError: the log has no outdoor_temperature or no air_temperature.
+    """
+    table = to_grid(telemetry, int(step))
+    count = len(table)
+    usable = np.ones(count, dtype=bool)
+    longest = max(1, round(LONGEST_FILL / step))
+    inputs: dict[str, Floats] = {}
+    unknown: list[str] = []
+    outdoor, bridged = _bridge(table["outdoor_temperature"], longest, smooth=True)
+    inputs["outdoor_temperature"] = outdoor
+    usable &= bridged
+    if _present(table, "sky_temperature"):
+        inputs["sky_temperature"], bridged = _bridge(table["sky_temperature"], longest, smooth=True)
+        usable &= bridged
+    else:
+        inputs["sky_temperature"] = outdoor - _SKY_BELOW_AIR
+        unknown.append("sky_temperature")
+    for name, stand_in in _ABSENT.items():
+        if _present(table, name):
+            inputs[name], bridged = _bridge(table[name], longest, smooth=name in _MEANS)
+            usable &= bridged
+        else:
+            inputs[name] = np.full(count, stand_in)
+            unknown.append(name)
+    if _present(table, "leaf_area_index"):
+        inputs["leaf_area_index"] = _bridge(table["leaf_area_index"], count, smooth=True)[0]
+    else:
+        inputs["leaf_area_index"] = np.full(count, leaf_area_index)
+        unknown.append("leaf_area_index")
+    for name in _MEANS:
+        values = inputs[name]
+        inputs[name] = np.append(0.5 * (values[1:] + values[:-1]), values[-1:])
+    inputs["mean_height"] = np.full(count, mean_height)
+    middle = sun.unix_seconds(table.time) + 0.5 * step
+    elevation, azimuth, hour = sun.position(np, middle, latitude, longitude)
+    inputs |= {"sun_elevation": elevation, "sun_azimuth": azimuth, "hour": hour, "elapsed_days": np.zeros(count)}
+    missing = np.full(count, np.nan)
+    measured = {name: np.array(table.columns.get(name, missing)) for name in measurement.PREDICTED}
+    measured["air_temperature"] = np.array(table["air_temperature"])
+    return Record(table.time, float(step), inputs, measured, usable, tuple(unknown), lamp_efficacy).since(None)
+
+
+def observe(record: Record, parameters: Values, effects: ActiveEffects) -> dict[str, Floats]:
+    """Return the states that the log implies, by name, (n,): the measured ones without sensor faults, the rest run.
+
+    The temperature of the floor and the memories of effects follow the measured air; over a gap in the
+    measurements the last value stands. Parameters are floats or arrays of shape (n,).
+    """
+    clean = {name: _bridge(values, len(record), smooth=True)[0] for name, values in record.measured.items()}
+    for name, stand_in in (("air_humidity", 75.0), ("air_co2", 500.0)):
+        clean[name] = np.where(np.isfinite(clean[name]), clean[name], stand_in)
+    if any(EFFECTS[name].kind == "sensor" for name in effects):
+        raw_state = climate.initial_state(np, clean, record.inputs, parameters, effects, record.lamp_efficacy)
+        raw_drivers = climate.derive(np, raw_state, record.inputs, parameters, record.lamp_efficacy)
+        _run_memories(record, raw_state, raw_drivers, effects)
+        errors = measurement.sensor_errors(np, raw_drivers, raw_state, effects)
+        clean = {name: values - errors.get(name, 0.0) for name, values in clean.items()}
+    state = climate.initial_state(np, clean, record.inputs, parameters, effects, record.lamp_efficacy)
+    drivers = climate.derive(np, state, record.inputs, parameters, record.lamp_efficacy)
+    state["mass_temperature"] = _run_mass(record, state, drivers, parameters)
+    _run_memories(record, state, drivers, effects)
+    return {name: np.broadcast_to(values, (len(record),)) for name, values in state.items()}
+
+
+def free_run(
+    record: Record,
+    states: Mapping[str, Floats],
+    starts: Sequence[int] | NDArray[np.int64],
+    steps: int,
+    parameters: Values,
+    effects: ActiveEffects,
+    added: Mapping[str, Floats] | None = None,
+) -> dict[str, Floats]:
+    """Run the stage freely from several instants of a record, driven by its inputs.
+
+    Args:
+        record: with n rows.
+        states: from `observe`, (n,) each.
+        starts: rows to start from, (s,); start + steps must be less than n.
+        steps: rows to run.
+        parameters: floats, or arrays of shape (m, 1) for m variants at once.
+        effects: the active effects; their values are floats, (m, 1), or functions of time as (n,).
+        added: further fluxes by channel, (n,).
+
+    Returns:
+        What the sensors would show at rows start + 1 ... start + steps, by quantity, (steps, s) or (steps, m, s).
+    """
+    begin = np.asarray(starts, dtype=np.int64)
+    substeps = max(1, round(record.step / SUBSTEP))
+    names = list(record.inputs)
+    table = np.stack([record.inputs[name] for name in names])
+    extra = {channel: np.asarray(flux) for channel, flux in (added or {}).items()}
+    state: dict[str, Array] = {name: values[begin] for name, values in states.items()}
+    shown: dict[str, list[Floats]] = {name: [] for name in measurement.PREDICTED}
+    for k in range(steps):
+        row = begin + k
+        inputs: dict[str, Array] = dict(zip(names, table[:, row], strict=True))
+        active = _at_rows(effects, row, len(record))
+        fluxes = {channel: flux[row] for channel, flux in extra.items()}
+        for _ in range(substeps):
+            drivers_inputs = _corrected(inputs, state, parameters, active, record.lamp_efficacy)
+            state = climate.advance(
+                np,
+                state,
+                drivers_inputs,
+                parameters,
+                active,
+                seconds=record.step / substeps,
+                lamp_efficacy=record.lamp_efficacy,
+                added=fluxes,
+            )
+        following = dict(zip(names, table[:, row + 1], strict=True))
+        active = _at_rows(effects, row + 1, len(record))
+        drivers = climate.derive(np, state, following, parameters, record.lamp_efficacy)
+        for name, values in measurement.measured(np, drivers, state, active).items():
+            shown[name].append(values)
+    return {name: np.stack(np.broadcast_arrays(*values)) for name, values in shown.items()}
+
+
+def complete_starts(record: Record, steps: int, every: int, first: int = 0) -> NDArray[np.int64]:
+    """Return the rows, `every` apart from `first` on, from which `steps` rows can be run on usable inputs.
+
+    The climate must have been measured in the start row itself.
+    """
+    known = record.usable.copy()
+    bad = np.concatenate([[0], np.cumsum(~known)])
+    starts = np.arange(first, len(record) - steps, every)
+    whole = bad[starts + steps] - bad[starts] == 0
+    measured_at_start = np.all([np.isfinite(values[starts]) for values in _given(record)], axis=0)
+    chosen: NDArray[np.int64] = starts[whole & measured_at_start]
+    return chosen
+
+
+def _given(record: Record) -> list[Floats]:
+    return [values for values in record.measured.values() if np.isfinite(values).any()]
+
+
+def _corrected(
+    inputs: Values, state: Values, parameters: Values, effects: ActiveEffects, lamp_efficacy: float
+) -> Values:
+    """Take the pipe sensors' error out of the inputs, where one is active."""
+    if "pipe_temperature_offset" not in effects:
+        return inputs
+    drivers = climate.derive(np, state, inputs, parameters, lamp_efficacy)
+    return measurement.correct_inputs(np, inputs, drivers, state, effects)
+
+
+def _at_rows(effects: ActiveEffects, rows: NDArray[np.int64], count: int) -> ActiveEffects:
+    """Pick the rows of values that are functions of time."""
+    return {
+        effect: {
+            name: value[rows] if isinstance(value, np.ndarray) and value.shape == (count,) else value
+            for name, value in values.items()
+        }
+        for effect, values in effects.items()
+    }
+
+
+def _present(table: Telemetry, name: str) -> bool:
+    return name in table and bool(np.isfinite(table[name]).any())
+
+
+def _bridge(values: Floats, longest: int, *, smooth: bool) -> tuple[Floats, NDArray[np.bool_]]:
+    """Fill gaps (linearly or by the last value) and tell which rows were measured or lay in a gap of <= longest."""
+    good = np.isfinite(values)
+    if not good.any():
+        return np.array(values), good
+    rows = np.arange(len(values))
+    known = rows[good]
+    before = np.clip(np.searchsorted(known, rows, side="right") - 1, 0, None)
+    after = np.clip(np.searchsorted(known, rows, side="left"), None, len(known) - 1)
+    short = (known[after] - known[before] - 1 <= longest) & (rows >= known[0]) & (rows <= known[-1])
+    filled = np.interp(rows, known, values[good]) if smooth else values[known[before]]
+    return filled, good | short
+
+
+def _run_mass(record: Record, state: Values, drivers: Values, parameters: Values) -> Floats:
+    """Run the floor's balance under the measured air."""
+    added: dict[str, Array] = {}
+    flux, conductance, capacity = climate.balances(np, state, drivers, parameters, added)["mass_temperature"]
+    shape = (len(record),)
+    target = np.broadcast_to(state["mass_temperature"] + flux / conductance, shape)
+    share = np.broadcast_to(1.0 - np.exp(-record.step * conductance / capacity), shape)
+    mass = np.empty(len(record))
+    # Start where a floor would be that has long been under this air.
+    value = float(np.mean(target[: max(1, round(86_400.0 / record.step))]))
+    for k in range(len(record)):
+        mass[k] = value
+        value += (target[k] - value) * share[k]
+    return mass
+
+
+def _run_memories(record: Record, state: dict[str, Array], drivers: Values, effects: ActiveEffects) -> None:
+    """Run the memories of the active effects under the measured drivers; they become arrays (n,) in `state`."""
+    substeps = max(1, round(record.step / SUBSTEP))
+    for effect, values in effects.items():
+        memory = EFFECTS[effect].memory
+        if memory is None:
+            continue
+        read = {name: np.broadcast_to(drivers[name], (len(record),)).tolist() for name in EFFECTS[effect].drivers}
+        still = {name: float(np.mean(value)) for name, value in values.items()}
+        course = np.empty(len(record))
+        value = float(memory.start(np, {name: column[0] for name, column in read.items()}, still))
+        for k in range(len(record)):
+            course[k] = value
+            now = {name: column[k] for name, column in read.items()}
+            for _ in range(substeps):
+                value = float(memory.advance(np, value, now, still, record.step / substeps))
+        state[memory_name(effect)] = course
