@@ -16,6 +16,7 @@ since YAML 1.1 reads 12:30 as 750, NO as false, 0123 as 83 and 1e3 as text; a sc
 | `tuple[X, ...]`, `Mapping[str, X]`, a dataclass | a list, a mapping, the keys of the dataclass |
 | `A | B` of dataclasses | the one whose `Literal` field (such as `kind: Literal["tcp"]`) has the file's value |
 
+A mapping in the file changes only the keys it names; the others keep the default of the field it stands for.
 Duplicate keys, unknown keys, tags and merge keys are refused. A dataclass may check itself in `__post_init__` and
 raise `SettingError(what, key)`; the loader adds the place.
 """
@@ -125,14 +126,14 @@ class _Reader:
     def error(self, node: yaml.Node, what: str) -> SchemaError:
         return SchemaError(f"{self._name}:{node.start_mark.line + 1}:{node.start_mark.column + 1}: {what}")
 
-    def read(self, node: yaml.Node, kind: Any, where: str, limits: Mapping[str, Any]) -> Any:
+    def read(self, node: yaml.Node, kind: Any, where: str, limits: Mapping[str, Any], base: Any = None) -> Any:
         if not node.tag.startswith("tag:yaml.org,2002:") or "python" in node.tag:
             raise self.error(node, f"the tag {node.tag} is not allowed: write the plain value")
         origin, arguments = get_origin(kind), get_args(kind)
         if origin in (Union, types.UnionType):
-            return self._union(node, arguments, where, limits)
+            return self._union(node, arguments, where, limits, base)
         if dataclasses.is_dataclass(kind) and isinstance(kind, type):
-            return self._dataclass(node, kind, where)
+            return self._dataclass(node, kind, where, base)
         if origin is tuple:
             if not isinstance(node, yaml.SequenceNode):
                 raise self.error(node, f"{where} must be a list, such as [a, b]")
@@ -143,7 +144,11 @@ class _Reader:
             for key, (key_node, _) in pairs.items():
                 if known is not None and key not in known:
                     raise self.error(key_node, f"{_join(where, key)} is not known: {nearest(key, known)}")
-            values = {k: self.read(v, arguments[1], _join(where, k), limits) for k, (_, v) in pairs.items()}
+            bases = base if isinstance(base, Mapping) else {}
+            values = {
+                key: self.read(value, arguments[1], _join(where, key), limits, bases.get(key))
+                for key, (_, value) in pairs.items()
+            }
             return types.MappingProxyType(values)
         if not isinstance(node, yaml.ScalarNode):
             found = "a list" if isinstance(node, yaml.SequenceNode) else "a mapping"
@@ -164,7 +169,7 @@ class _Reader:
             pairs[key] = (key_node, value_node)
         return pairs
 
-    def _dataclass(self, node: yaml.Node, schema: type[Any], where: str) -> Any:
+    def _dataclass(self, node: yaml.Node, schema: type[Any], where: str, base: Any) -> Any:
         if isinstance(node, yaml.ScalarNode) and node.value == "":
             raise self.error(
                 node, f"{where or 'the file'} is empty: it needs {_required(schema) or 'keys, or remove it'}"
@@ -177,23 +182,27 @@ class _Reader:
                 raise self.error(key_node, f"{_join(where, key)} is not known: {nearest(key, fields)}")
         values: dict[str, Any] = {}
         for name, field in fields.items():
+            default = getattr(base, name) if type(base) is schema else _default(field)
             if name in pairs:
-                values[name] = self.read(pairs[name][1], hints[name], _join(where, name), field.metadata)
-            elif field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:
-                needed = f"{_join(where, name)} is missing: add `{name}:` with {_wanted(hints[name], field.metadata)}"
-                raise self.error(node, f"{needed}{_meaning(field)}")
+                inside = _join(where, name)
+                values[name] = self.read(pairs[name][1], hints[name], inside, field.metadata, default)
+            elif default is not dataclasses.MISSING:
+                values[name] = default
+            else:
+                needed = f"{_join(where, name)} is missing: add `{name}:` with"
+                raise self.error(node, f"{needed} {_wanted(hints[name], field.metadata)}{_meaning(field)}")
         try:
             return schema(**values)
         except SettingError as error:
             raise self.error(_find(node, error.path), str(error)) from None
 
-    def _union(self, node: yaml.Node, kinds: tuple[Any, ...], where: str, limits: Mapping[str, Any]) -> Any:
+    def _union(self, node: yaml.Node, kinds: tuple[Any, ...], where: str, limits: Mapping[str, Any], base: Any) -> Any:
         if type(None) in kinds:
             if isinstance(node, yaml.ScalarNode) and node.style is None and node.value in ("", "null", "~"):
                 return None
             kinds = tuple(kind for kind in kinds if kind is not type(None))
         if len(kinds) == 1:
-            return self.read(node, kinds[0], where, limits)
+            return self.read(node, kinds[0], where, limits, base)
         pairs = self._pairs(node, where)
         tags = {_tag(kind): kind for kind in kinds}
         key = next(iter(tags))[0]
@@ -349,11 +358,13 @@ def _plain(value: float | datetime.timedelta) -> str:
     return f"{value:g}"
 
 
+def _default(field: dataclasses.Field[Any]) -> Any:
+    return field.default if field.default_factory is dataclasses.MISSING else field.default_factory()
+
+
 def _required(schema: type[Any]) -> str:
     names = [
-        field.name
-        for field in dataclasses.fields(schema)
-        if field.init and field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
+        field.name for field in dataclasses.fields(schema) if field.init and _default(field) is dataclasses.MISSING
     ]
     return _listed(names)
 

@@ -158,6 +158,20 @@ def test_an_error_says_where_what_and_what_would_be_right(text: str, message: st
     assert "\n" not in found
 
 
+@dataclass(frozen=True)
+class Outer:
+    inner: Inner = setting(help="", default_factory=lambda: Inner(2.0, 5.0))
+    named: Mapping[str, Inner] = setting(help="", default_factory=lambda: {"a": Inner(3.0, 4.0)})
+    maybe: Inner | None = setting(help="", default_factory=lambda: Inner(6.0, 7.0))
+
+
+def test_a_mapping_changes_only_the_keys_it_names() -> None:
+    assert parse("inner: {high: 9}", Outer).inner == Inner(2.0, 9.0)
+    assert parse("named: {a: {high: 9}, b: {}}", Outer).named == {"a": Inner(3.0, 9.0), "b": Inner(0.0, 1.0)}
+    assert parse("maybe: {high: 9}", Outer).maybe == Inner(6.0, 9.0)
+    assert parse("maybe: null", Outer).maybe is None
+
+
 def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     with pytest.raises(SchemaError, match="cannot be read: No such file"):
         load(tmp_path / "none.yaml", Everything)
