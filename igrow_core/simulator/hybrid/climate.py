@@ -248,15 +248,23 @@ def advance(
     total = contributions(xp, drivers, state, effects)
     for channel, flux in (added or {}).items():
         total[channel] = total[channel] + flux if channel in total else flux
-    following = {}
-    for name, (flux, conductance, capacity) in balances(xp, state, drivers, parameters, total).items():
-        decay = xp.exp(-seconds * conductance / capacity)
-        following[name] = state[name] + flux / conductance * (1.0 - decay)
+    following = relax(xp, state, drivers, parameters, total, seconds)
     for name, values in effects.items():
         memory = EFFECTS[name].memory
         if memory is not None:
             key = memory_name(name)
             following[key] = memory.advance(xp, state[key], drivers, values, seconds)
+    return following
+
+
+def relax(
+    xp: Any, state: Values, drivers: Drivers, parameters: Values, added: Mapping[str, Array], seconds: float
+) -> dict[str, Array]:
+    """Return `STATES` by name `seconds` later, by the exponential of each balance (see the module's docstring)."""
+    following = {}
+    for name, (flux, conductance, capacity) in balances(xp, state, drivers, parameters, added).items():
+        decay = xp.exp(-seconds * conductance / capacity)
+        following[name] = state[name] + flux / conductance * (1.0 - decay)
     return following
 
 
