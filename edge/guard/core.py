@@ -1,0 +1,297 @@
+"""The guard's decision as a pure function: what is asked for, what was written, what is measured -> what to write.
+
+For each point, in this order:
+
+1. a request that is no number is refused;
+2. absolute limits cut it;
+3. interlocks force it between their bounds, the earlier interlock first;
+4. slew lets a ramp run towards it (an interlock that forces the value does not wait for the ramp);
+5. a change by hand at the PLC is left alone while it is respected (an interlock still comes first);
+6. dead band, minimum interval and daily budget say whether this is the moment to write.
+
+Invariants, tested with arbitrary input: a write never leaves the limits; two writes never differ by more than the
+slew allows for the time between them, unless an interlock, the stop or a hand at the PLC moved the point in
+between; no 24 h see more writes than the budget.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from edge.guard.interlocks import Force, evaluate
+from edge.guard.rules import GuardRules, PointRule
+from edge.image import Image
+
+DAY = 86_400.0
+LONGEST_RAMP = 900.0
+"""A ramp never makes up for more than this many seconds at once, however long the daemon was away."""
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What a source asks for at one point."""
+
+    value: float
+    source: str
+
+
+@dataclass(frozen=True, slots=True)
+class Write:
+    """A value to be written now."""
+
+    point: str
+    value: float
+    requested: float | None
+    source: str
+    reason: str
+    """Why the value differs from the request; empty when it does not."""
+    urgent: bool = False
+    """An interlock or the stop: these leave first."""
+
+
+@dataclass(frozen=True, slots=True)
+class Clamp:
+    """The guard changed a request or held it back."""
+
+    point: str
+    requested: float | None
+    applied: float | None
+    """None when the request was refused or nothing may be written now."""
+    reason: str
+    kind: str
+    """limit, interlock, slew, hand, minimum_interval, budget or refused."""
+    source: str
+
+
+@dataclass(frozen=True, slots=True)
+class PointState:
+    """What the guard remembers about one point."""
+
+    ramp: float | None = None
+    written: float | None = None
+    written_at: float = -math.inf
+    budget: tuple[float, ...] = ()
+    """When the writes of the last 24 h happened, oldest first; kept only for points with a budget."""
+
+
+@dataclass(frozen=True, slots=True)
+class GuardState:
+    """What the guard remembers between two cycles."""
+
+    points: Mapping[str, PointState] = field(default_factory=dict)
+    engaged: frozenset[str] = frozenset()
+    at: float | None = None
+    """When it last decided."""
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What to write, what was changed, and what to remember."""
+
+    writes: tuple[Write, ...]
+    clamps: tuple[Clamp, ...]
+    state: GuardState
+    engaged: tuple[Force, ...] = ()
+
+
+@dataclass(slots=True)
+class _Target:
+    """Where a point should go, and what had to be changed on the way there."""
+
+    value: float
+    kind: str = ""
+    reason: str = ""
+    urgent: bool = False
+
+
+def guard(
+    requests: Mapping[str, Request],
+    shown: Mapping[str, float | None],
+    held: Mapping[str, float],
+    image: Image,
+    state: GuardState,
+    rules: GuardRules,
+    *,
+    stopping: bool = False,
+) -> Verdict:
+    """Decide what to write now.
+
+    `shown` is what stands in the PLC as far as we know (None: unknown); `held` maps points that somebody changed
+    by hand to the seconds that this is still respected. With `stopping` every point goes to its safe value
+    at once, without slew, dead band or interval, as the PLC's own fallback would do it.
+    """
+    now = image.monotonic
+    forces, engaged = evaluate(rules.interlocks, image, state.engaged)
+    passed = 0.0 if state.at is None else min(max(0.0, now - state.at), LONGEST_RAMP)
+    writes: list[Write] = []
+    clamps: list[Clamp] = []
+    points: dict[str, PointState] = {}
+    for name, rule in rules.points.items():
+        memory = state.points.get(name, PointState())
+        request = Request(rule.safe, "stop") if stopping else requests.get(name)
+        current = shown.get(name)
+        if request is not None and not math.isfinite(request.value):
+            clamps.append(Clamp(name, None, None, "the request is not a finite number", "refused", request.source))
+            request = None
+        point = _Point(name, rule, memory, current, now, passed)
+        points[name] = point.decide(request, forces, held.get(name), stopping, writes, clamps)
+    writes.sort(key=lambda write: not write.urgent)
+    return Verdict(tuple(writes), tuple(clamps), GuardState(points, engaged, now), tuple(forces))
+
+
+def never_sent(state: GuardState, before: GuardState, point: str) -> GuardState:
+    """Return `state` as if the write to `point` had not been decided, since it certainly never left."""
+    earlier = before.points.get(point, PointState())
+    ramp = state.points[point].ramp
+    restored = replace(state.points[point], ramp=ramp, written=earlier.written, written_at=earlier.written_at)
+    return replace(state, points={**state.points, point: replace(restored, budget=earlier.budget)})
+
+
+def begin_again(state: GuardState, points: Collection[str]) -> GuardState:
+    """Return `state` with the ramps of these points to begin where the PLC now stands (a fallback, a hand)."""
+    return replace(state, points={n: replace(p, ramp=None) if n in points else p for n, p in state.points.items()})
+
+
+def with_earlier_writes(state: GuardState, writes: Mapping[str, Sequence[float]]) -> GuardState:
+    """Return `state` knowing the times of writes before this start, so that a restart frees no daily budget."""
+    points = dict(state.points)
+    for name, times in writes.items():
+        points[name] = replace(points.get(name, PointState()), budget=tuple(sorted(times)))
+    return replace(state, points=points)
+
+
+@dataclass(slots=True)
+class _Point:
+    """One point in one cycle."""
+
+    name: str
+    rule: PointRule
+    memory: PointState
+    current: float | None
+    now: float
+    passed: float
+
+    def decide(
+        self,
+        request: Request | None,
+        forces: list[Force],
+        held: float | None,
+        stopping: bool,
+        writes: list[Write],
+        clamps: list[Clamp],
+    ) -> PointState:
+        """Add to writes and clamps; return the point's new memory."""
+        if request is None:
+            # Nobody asks: the point stays as it is, unless an interlock forces it away from there.
+            stands = self.current if self.current is not None else self.memory.written
+            if stands is None or not math.isfinite(stands):
+                stands = self.rule.safe
+            target = self._forced(_Target(stands), forces)
+            requested, source = None, "interlock"
+            if not target.urgent:
+                return self._rested()
+        else:
+            target = self._forced(self._limited(request.value), forces)
+            requested, source = request.value, request.source
+            if held is not None and not stopping and not target.urgent:
+                text = f"changed by hand at the PLC, respected for {held / 60:.0f} min more"
+                clamps.append(Clamp(self.name, requested, self.current, text, "hand", source))
+                return self._rested()
+        if stopping:
+            target.urgent = True
+        value = target.value
+        if not target.urgent:
+            value = self._ramped(value)
+            if abs(value - target.value) > 1e-9:
+                slew = f"slew of {3600 * (self.rule.slew or 0.0):g} per hour on the way to {target.value:g}"
+                target.reason = f"{target.reason}; {slew}" if target.reason else slew
+                target.kind = target.kind or "slew"
+        if target.kind:
+            clamps.append(Clamp(self.name, requested, value, target.reason, target.kind, source))
+        return self._written(value, target, requested, source, writes, clamps)
+
+    def _limited(self, value: float) -> _Target:
+        if value < self.rule.low:
+            return _Target(self.rule.low, "limit", f"below the limit of {self.rule.low:g}")
+        if value > self.rule.high:
+            return _Target(self.rule.high, "limit", f"above the limit of {self.rule.high:g}")
+        return _Target(value)
+
+    def _forced(self, target: _Target, forces: list[Force]) -> _Target:
+        low, high = self.rule.low, self.rule.high
+        by: tuple[Force | None, Force | None] = (None, None)
+        for force in forces:
+            bound = force.bounds.get(self.name)
+            if bound is None:
+                continue
+            wants_low, wants_high = bound.limits(self.rule.safe)
+            # Later interlocks may only narrow what earlier ones left.
+            if wants_low > low:
+                low, by = min(wants_low, high), (force, by[1])
+            if wants_high < high:
+                high, by = max(wants_high, low), (by[0], force)
+        value = min(max(target.value, low), high)
+        cause = by[0] if value > target.value else by[1]
+        if value == target.value or cause is None:
+            return target
+        return _Target(value, "interlock", f"interlock {cause.name}: {cause.why}", urgent=True)
+
+    def _ramped(self, target: float) -> float:
+        start = self._start()
+        if self.rule.slew is None:
+            return target
+        step = self.rule.slew * self.passed
+        return min(max(target, start - step), start + step)
+
+    def _start(self) -> float:
+        """Where the ramp stands: a value within the limits, taken from the PLC when we do not know better."""
+        start = self.memory.ramp
+        if start is None:
+            start = self.current if self.current is not None and math.isfinite(self.current) else self.rule.safe
+        return min(max(start, self.rule.low), self.rule.high)
+
+    def _rested(self) -> PointState:
+        """Nothing is asked of the point: the next ramp begins where the PLC then stands."""
+        return replace(self.memory, ramp=self.current, budget=self._recent())
+
+    def _recent(self) -> tuple[float, ...]:
+        return tuple(at for at in self.memory.budget if self.now - at < DAY)
+
+    def _written(
+        self,
+        value: float,
+        target: _Target,
+        requested: float | None,
+        source: str,
+        writes: list[Write],
+        clamps: list[Clamp],
+    ) -> PointState:
+        """Write now, or say what stands against it."""
+        rule, memory, budget = self.rule, self.memory, self._recent()
+        waiting = PointState(value, memory.written, memory.written_at, budget)
+        since = self.now - memory.written_at
+        due = rule.refresh is not None and since >= rule.refresh
+        if not due and self.current is not None and self._close_enough(value, self.current, target.urgent):
+            return waiting
+        if not target.urgent and since < rule.minimum_interval:
+            text = f"written {since:.0f} s ago, at least {rule.minimum_interval:.0f} s apart"
+            clamps.append(Clamp(self.name, requested, None, text, "minimum_interval", source))
+            return waiting
+        if rule.daily_budget is not None:
+            left = rule.daily_budget - len(budget) - (0 if target.urgent else rule.reserve)
+            if left <= 0:
+                text = f"{len(budget)} of {rule.daily_budget} writes of the last 24 h are used"
+                clamps.append(Clamp(self.name, requested, None, text, "budget", source))
+                return waiting
+            budget = (*budget, self.now)
+        writes.append(Write(self.name, value, requested, source, target.reason, target.urgent))
+        return PointState(value, value, self.now, budget)
+
+    def _close_enough(self, value: float, current: float, urgent: bool) -> bool:
+        if self.rule.same(value, current):
+            return True
+        # What stands in the PLC may lie outside our limits (a hand, a fallback): then no dead band excuses us.
+        inside = self.rule.low <= current <= self.rule.high
+        return inside and not urgent and abs(value - current) <= self.rule.dead_band

@@ -1,0 +1,70 @@
+"""The one place from which anything is written to a PLC.
+
+It takes `Write`s, which only `edge.guard.core.guard` makes, and the heartbeat. A test reads the sources and fails
+when a second place calls `write`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from edge.bus.errors import BusError
+from edge.guard.core import Write
+
+HEARTBEAT = "heartbeat"
+HEARTBEAT_MODULUS = 65_536
+"""The counter wraps where an unsigned register of 16 bits does."""
+
+
+class WritablePlc(Protocol):
+    """What the writer needs of a PLC."""
+
+    async def write(self, name: str, value: float) -> None:
+        """Write one point; raises BusError."""
+
+
+@dataclass(frozen=True, slots=True)
+class WriteOutcome:
+    """How one write ended, as far as the bus knows; only a later read tells whether it holds."""
+
+    write: Write
+    error: BusError | None
+
+    @property
+    def may_have_arrived(self) -> bool:
+        """Tell whether the PLC may have taken the value."""
+        return self.error is None or self.error.sent
+
+
+class GuardedWriter:
+    """Carries out what the guard decided, in its order, and beats the heart."""
+
+    def __init__(self, plc: WritablePlc, *, has_heartbeat: bool, first_beat: int = 0) -> None:
+        self._plc = plc
+        self._has_heartbeat = has_heartbeat
+        self._beat = first_beat % HEARTBEAT_MODULUS
+
+    async def carry_out(self, writes: Sequence[Write]) -> list[WriteOutcome]:
+        """Write each value once; a failure is returned, never repeated here."""
+        outcomes = []
+        for write in writes:
+            try:
+                await self._plc.write(write.point, write.value)
+            except BusError as error:
+                outcomes.append(WriteOutcome(write, error))
+            else:
+                outcomes.append(WriteOutcome(write, None))
+        return outcomes
+
+    async def heartbeat(self) -> BusError | None:
+        """Change the heartbeat register, so that the PLC knows that a whole cycle was completed."""
+        if not self._has_heartbeat:
+            return None
+        self._beat = (self._beat + 1) % HEARTBEAT_MODULUS
+        try:
+            await self._plc.write(HEARTBEAT, float(self._beat))
+        except BusError as error:
+            return error
+        return None

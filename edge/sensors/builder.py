@@ -1,0 +1,131 @@
+"""Builds the process image of a cycle from raw readings, remembering per point what quality needs.
+
+Order of the checks of one sensor: missing or stale (age), out of range, frozen, rate. Pair checks run on what is
+still good after that, and last a twin sensor takes the place of a bad one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from edge.image import MISSING, Image, Quality, Value
+from edge.sensors.pairs import PAIR_CHECKS, PairContext, TwinSensors, suspects
+from edge.sensors.rules import SensorRule
+
+
+class RawReading(Protocol):
+    """What the bus gives for one point: a value or an error, and when, on any clock."""
+
+    @property
+    def value(self) -> float | None: ...  # noqa: D102
+
+    @property
+    def error(self) -> Exception | None: ...  # noqa: D102
+
+    @property
+    def at(self) -> float: ...  # noqa: D102
+
+
+@dataclass(slots=True)
+class _Track:
+    """Memory of one point."""
+
+    rule: SensorRule
+    reading_at: float | None = None
+    """The bus' time stamp of the newest successful reading; only compared, never subtracted."""
+    value: float | None = None
+    read_at: float = -math.inf
+    """When that reading first appeared, on the daemon's clock."""
+    changed_at: float = -math.inf
+    accepted: float | None = None
+    """The last value that passed range and rate, and when."""
+    accepted_at: float = -math.inf
+    too_fast: bool = False
+    error: str = ""
+
+
+class ImageBuilder:
+    """Makes one frozen image per cycle; times are the daemon's monotonic seconds."""
+
+    def __init__(
+        self,
+        rules: Mapping[str, SensorRule],
+        twins: Sequence[TwinSensors] = (),
+        sun_elevation: Callable[[float], float] | None = None,
+    ) -> None:
+        """`sun_elevation` maps seconds since 1970 UTC to degrees; without it light by night is not suspected."""
+        self._tracks = {name: _Track(rule) for name, rule in rules.items()}
+        self._twins = tuple(twins)
+        self._sun_elevation = sun_elevation
+
+    def build(self, readings: Mapping[str, RawReading], monotonic: float, true_time: float | None) -> Image:
+        """Return the image of this cycle. `readings` may lack points that were not due."""
+        fresh = False
+        values: dict[str, Value] = {}
+        for name, track in self._tracks.items():
+            reading = readings.get(name)
+            if reading is not None:
+                fresh |= _take(track, reading, monotonic)
+            values[name] = _judge(track, monotonic)
+        sun = self._sun_elevation(true_time) if self._sun_elevation and true_time is not None else None
+        for name, why in suspects(PAIR_CHECKS, PairContext(values, sun)):
+            values[name] = _suspected(values[name], why)
+        for twin in self._twins:
+            twin.compare(values)
+        return Image(monotonic, true_time, values, link_ok=fresh or not readings)
+
+
+def _suspected(value: Value, why: str) -> Value:
+    return Value(value.value, Quality.IMPLAUSIBLE, value.age, why)
+
+
+def _take(track: _Track, reading: RawReading, now: float) -> bool:
+    """Remember a reading; tell whether it is a new successful one."""
+    if reading.error is not None or reading.value is None:
+        track.error = str(reading.error) if reading.error is not None else "no value"
+        return False
+    if reading.at == track.reading_at:
+        return False
+    track.reading_at = reading.at
+    track.error = ""
+    value = float(reading.value)
+    # NaN never equals itself, so a sensor that reports NaN does not count as frozen but as out of range.
+    if value != track.value:
+        track.changed_at = now
+    track.value, track.read_at = value, now
+    rule = track.rule
+    if not rule.low <= value <= rule.high:
+        track.too_fast = False
+    elif track.accepted is None or abs(value - track.accepted) <= rule.jump + rule.rate * (now - track.accepted_at):
+        track.accepted, track.accepted_at, track.too_fast = value, now, False
+    else:
+        track.too_fast = True
+    return True
+
+
+def _judge(track: _Track, now: float) -> Value:
+    value, rule = track.value, track.rule
+    if value is None:
+        return Value(None, Quality.MISSING, math.inf, track.error or "never read") if track.error else MISSING
+    age = now - track.read_at
+    if not math.isfinite(value):
+        return Value(None, Quality.OUT_OF_RANGE, age, "the register holds no number")
+    if age > rule.missing_after:
+        return Value(value, Quality.MISSING, age, f"no reading for {age:.0f} s{_because(track)}")
+    if age > rule.stale_after:
+        return Value(value, Quality.STALE, age, f"last read {age:.0f} s ago{_because(track)}")
+    if not rule.low <= value <= rule.high:
+        return Value(value, Quality.OUT_OF_RANGE, age, f"{value:g} is outside {rule.low:g} to {rule.high:g}")
+    still = now - track.changed_at
+    if still > rule.frozen_after and rule.still_low < value < rule.still_high:
+        return Value(value, Quality.FROZEN, age, f"exactly {value:g} for {still / 3600:.1f} h")
+    if track.too_fast:
+        return Value(value, Quality.IMPLAUSIBLE, age, f"moved from {track.accepted:g} to {value:g} too fast")
+    return Value(value, Quality.GOOD, age)
+
+
+def _because(track: _Track) -> str:
+    return f": {track.error}" if track.error else ""
