@@ -1,0 +1,186 @@
+"""The store as the control cycle sees it: `edge.ports.Store` over two kinds of file."""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from edge.image import Value
+from edge.ports import AlarmRecord, WriteRecord
+from edge.store.database import Synchronous, describe
+from edge.store.ledger import NAMES, RESERVE_BYTES, Ledger, Record, read_newest
+from edge.store.packing import Row, pack
+from edge.store.telemetry_file import TelemetryFile, read_file, to_telemetry
+from igrow_core.telemetry import Telemetry, concatenate
+
+TELEMETRY_FILE = "telemetry.db"
+
+
+@dataclass(frozen=True)
+class StoreLimits:
+    """How much the store may take, and how much may be lost."""
+
+    telemetry_bytes: int = 128 * 2**20
+    """Largest telemetry file: about 25 days of 60 points every 5 s."""
+    ledger_bytes: int = 32 * 2**20
+    """Largest of each of the two ledger files."""
+    batch_seconds: float = 60.0
+    """Telemetry is committed when the rows in memory span this long."""
+    batch_rows: int = 500
+    """Telemetry is committed at the latest with this many rows in memory."""
+    waiting_rows: int = 20_000
+    """Rows kept in memory while the disk takes none; then the oldest go."""
+    survive_power_cut: bool = True
+    """False for a simulated plant: what a `kill -9` could lose is the same, a power cut may lose more."""
+
+
+class SqliteStore:
+    """The gateway's memory in one folder; implements `edge.ports.Store`.
+
+    Safe to call from several threads; other processes read with `read_telemetry` and `read_records`.
+    """
+
+    def __init__(self, folder: Path, limits: StoreLimits | None = None) -> None:
+        self.folder = folder
+        self._limits = limits or StoreLimits()
+        durable = self._limits.survive_power_cut
+        telemetry: Synchronous = "NORMAL" if durable else "OFF"
+        ledger: Synchronous = "FULL" if durable else "OFF"
+        self._lock = threading.RLock()
+        self._telemetry = TelemetryFile(
+            folder / TELEMETRY_FILE, max_bytes=self._limits.telemetry_bytes, synchronous=telemetry
+        )
+        self._ledger = Ledger(folder, max_bytes=self._limits.ledger_bytes, synchronous=ledger)
+        self._batch: list[Row] = []
+        self._problem = ""
+        self._dropped = 0
+        self._report()
+
+    def append(self, time: float, values: Mapping[str, Value]) -> None:
+        """Add one row of telemetry; at most the last batch is lost by a power cut."""
+        with self._lock:
+            self._batch.append(pack(time, values))
+            span = self._batch[-1].milliseconds - self._batch[0].milliseconds
+            # A clock set back makes the span negative; the number of rows then bounds the batch.
+            if span >= 1000 * self._limits.batch_seconds or len(self._batch) % self._limits.batch_rows == 0:
+                self.flush()
+
+    def flush(self) -> None:
+        """Commit the rows in memory; where the disk takes none they stay there, within bounds."""
+        with self._lock:
+            if not self._batch:
+                return
+            try:
+                # The last free space belongs to the ledger.
+                if shutil.disk_usage(self.folder).free < RESERVE_BYTES:
+                    raise OSError("the disk is full")
+                self._telemetry.add(self._batch)
+            except (sqlite3.Error, OSError) as error:
+                excess = len(self._batch) - self._limits.waiting_rows
+                if excess > 0:
+                    del self._batch[:excess]
+                    self._dropped += excess
+                lost = f", {self._dropped} lost" if self._dropped else ""
+                self._problem = f"telemetry: {describe(error)}; {len(self._batch)} rows wait in memory{lost}"
+            else:
+                self._batch.clear()
+                self._problem = ""
+            self._report()
+
+    def record_event(self, time: float | None, kind: str, detail: Mapping[str, object]) -> None:
+        """Add one event, durably, before returning."""
+        with self._lock:
+            self._ledger.add("event", time, {"kind": kind, "detail": dict(detail)})
+            self._report()
+
+    def record_write(self, record: WriteRecord) -> None:
+        """Add one row to the ledger of writes and clamps, durably, before returning."""
+        with self._lock:
+            self._ledger.add("write", record.time, asdict(record))
+
+    def record_alarm(self, record: AlarmRecord) -> None:
+        """Add one alarm row, durably, before returning."""
+        with self._lock:
+            self._ledger.add("alarm", record.time, asdict(record))
+
+    def writes_of_last_day(self) -> Sequence[WriteRecord]:
+        """Return the rows with outcome "written" of the 24 h before the newest such row, oldest first."""
+        with self._lock:
+            found: list[WriteRecord] = []
+            newest: float | None = None
+            for record in self._written():
+                if record.time is not None:
+                    newest = record.time if newest is None else max(newest, record.time)
+                    if record.time < newest - 86_400.0:
+                        break
+                found.append(record)
+                if len(found) >= 100_000:
+                    break
+            return found[::-1]
+
+    def records(self, category: str, count: int) -> list[Record]:
+        """Return the newest records of one category ("event", "write", "alarm"), newest first."""
+        with self._lock:
+            return [record for record, _ in zip(self._ledger.newest(category), range(count), strict=False)]
+
+    def telemetry(self, start: float, end: float) -> Telemetry:
+        """Return the stored values with quality good in [start, end), seconds since 1970 UTC; others are NaN."""
+        low, high = round(start * 1000), round(end * 1000)
+        with self._lock:
+            self.flush()
+            waiting = [row for row in self._batch if low <= row.milliseconds < high]
+            try:
+                stored = [self._telemetry.read(low, high)]
+            except (sqlite3.Error, OSError):
+                stored = []
+            self._report()
+        return concatenate([*stored, *(to_telemetry(r.names, [r.milliseconds], [r.packed]) for r in waiting)])
+
+    @property
+    def health(self) -> str:
+        """Empty when all is well, else one line that says what is not."""
+        return "; ".join(filter(None, (self._ledger.problem, self._problem)))
+
+    def close(self) -> None:
+        """Commit what is held and close."""
+        with self._lock:
+            self.flush()
+            self._ledger.close()
+            self._telemetry.close()
+
+    def _written(self) -> Iterator[WriteRecord]:
+        for record in self._ledger.newest("write"):
+            if record.body["outcome"] == "written":
+                yield WriteRecord(**record.body)  # type: ignore[arg-type]  # the body is what asdict made of one
+
+    def _report(self) -> None:
+        """Turn what the files cured by themselves into events."""
+        reports = self._telemetry.reports + self._ledger.reports
+        self._telemetry.reports, self._ledger.reports = [], []
+        for text in reports:
+            self._ledger.add("event", None, {"kind": "store_repaired", "detail": {"text": text}})
+
+
+def read_telemetry(folder: Path, start: float, end: float) -> Telemetry:
+    """Read the committed telemetry of a store that a daemon may be writing, from any thread or process.
+
+    Raises sqlite3.Error where the file cannot be read.
+    """
+    return read_file(folder / TELEMETRY_FILE, round(start * 1000), round(end * 1000))
+
+
+def read_records(folder: Path, category: str) -> list[Record]:
+    """Read one category of the ledger of a store that a daemon may be writing, newest first.
+
+    Raises sqlite3.Error where neither file can be read.
+    """
+    for name in NAMES[:-1]:
+        try:
+            return read_newest(folder / name, category)
+        except sqlite3.Error:
+            continue
+    return read_newest(folder / NAMES[-1], category)
