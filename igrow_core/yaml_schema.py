@@ -106,7 +106,7 @@ def parse(text: str, schema: type[T], name: str = "text") -> T:
         raise SchemaError(f"{name}: not valid YAML: {str(error).splitlines()[0]}") from None
     if node is None:
         raise SchemaError(f"{name}:1:1: the file is empty: it needs {_required(schema)}")
-    value: T = _Reader(name).read(node, schema, "", types.MappingProxyType({}))
+    value: T = _Reader(name).read(node, schema, "", {})
     return value
 
 
@@ -149,7 +149,7 @@ class _Reader:
                 key: self.read(value, arguments[1], _join(where, key), limits, bases.get(key))
                 for key, (_, value) in pairs.items()
             }
-            return types.MappingProxyType(values)
+            return values
         if not isinstance(node, yaml.ScalarNode):
             found = "a list" if isinstance(node, yaml.SequenceNode) else "a mapping"
             raise self.error(node, f"{where or 'the file'} is {found}: {_wanted(kind, limits)} is needed")
@@ -348,14 +348,18 @@ def _wanted(kind: Any, limits: Mapping[str, Any]) -> str:
     return "a list" if get_origin(kind) is tuple else "its keys below it"
 
 
+def duration(value: datetime.timedelta) -> str:
+    """Return a duration as a file has it: `5 min`, `1 h`, `2 days`."""
+    seconds = value.total_seconds()
+    for size, name in ((86_400, "day"), (3600, "h"), (60, "min")):
+        count = seconds / size
+        if seconds >= size and count == int(count):
+            return f"{count:.0f} {name}{'s' if name == 'day' and count > 1 else ''}"
+    return f"{seconds!r} s" if seconds % 1 else f"{seconds:.0f} s"
+
+
 def _plain(value: float | datetime.timedelta) -> str:
-    if isinstance(value, datetime.timedelta):
-        seconds = value.total_seconds()
-        for size, name in ((86_400, "days"), (3600, "h"), (60, "min")):
-            if seconds >= size and seconds % size == 0:
-                return f"{seconds / size:g} {name}"
-        return f"{seconds:g} s"
-    return f"{value:g}"
+    return duration(value) if isinstance(value, datetime.timedelta) else f"{value:g}"
 
 
 def _default(field: dataclasses.Field[Any]) -> Any:

@@ -132,7 +132,7 @@ def test_a_scalar_is_read_by_the_type_of_its_field(text: str, key: str, value: o
         ("mode: quick", "f.yaml:1:7: mode is 'quick': known here: fast, slow"),
         ("clock: 24:00", "f.yaml:1:8: clock is '24:00': a time of day from 00:00 to 23:59 is needed"),
         ("day: 2021-02-29", "f.yaml:1:6: day is '2021-02-29': there is no such day"),
-        ("every: 300", "f.yaml:1:8: every is '300': a duration such as 30 s, 5 min, 1 h or 2 days from 1 s to 1 days"),
+        ("every: 300", "f.yaml:1:8: every is '300': a duration such as 30 s, 5 min, 1 h or 2 days from 1 s to 1 day"),
         ("every: 2 days", "f.yaml:1:8: every is 2 days: a duration"),
         ("values:\n  - 1\n  - -1", "f.yaml:3:5: values[1] is -1: a number of at least 0 is needed"),
         ("values: 3", "f.yaml:1:9: values must be a list"),
