@@ -1,0 +1,48 @@
+# Two commands do everything on a fresh machine with Python 3.11: `make demo` and `make test`.
+# Each target makes the virtual environment that it needs by itself.
+
+PYTHON ?= python3.11
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test lint format soak bench bench-diagnosis bundle clean
+
+help: ## List the targets.
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-16s %s\n", $$1, $$2}'
+
+$(STAMP): pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[edge,trainer,dev]'
+	@touch $@
+
+demo: $(STAMP) ## Run the whole loop on a virtual greenhouse with an undeclared effect (at most 5 minutes).
+	$(BIN)/python -m benchmarks.demo --out out/demo
+
+test: $(STAMP) ## Run the tests (at most 10 minutes).
+	$(BIN)/pytest -n 2 --dist worksteal -m 'not soak' tests
+
+lint: $(STAMP) ## Run ruff and strict mypy.
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+format: $(STAMP) ## Format the code.
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+soak: $(STAMP) ## Run the long tests: fault sequences, kill -9, thirty days of plant time.
+	$(BIN)/pytest -n 2 --dist worksteal -m soak tests
+
+bench: $(STAMP) ## Print the benchmarks, as ratios measured side by side.
+	$(BIN)/python -m benchmarks
+
+bench-diagnosis: $(STAMP) ## Print the diagnosis benchmark (long).
+	$(BIN)/python -m benchmarks.diagnosis
+
+bundle: $(STAMP) ## Rebuild the default bundle in igrow_core/default_bundle.
+	$(BIN)/igrow-trainer bundle --out igrow_core/default_bundle
+
+clean: ## Remove the virtual environment and all output.
+	rm -rf $(VENV) out build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis
