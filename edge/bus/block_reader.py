@@ -1,0 +1,88 @@
+"""Reads planned blocks, and learns which addresses a device refuses: a block that dies on one is split, for good."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterable, Mapping
+
+from edge.bus.errors import AddressRefusedError, BusError
+from edge.bus.protocol import Bus, Priority, ReadRequest
+from edge.registers.model import Device, Point, needed_for_control
+from edge.registers.read_planner import Block, plan_reads, split
+
+_log = logging.getLogger(__name__)
+
+Content = tuple[int, ...]
+Results = dict[Point, tuple[Content | None, BusError | None, float]]
+"""What became of each point: its registers or bits, or the error, and when (monotonic seconds)."""
+
+ASK_REFUSED_AGAIN = 600.0
+"""Seconds after which a point whose address was refused is asked for again: a PLC program may have been loaded."""
+
+
+def _priority(block: Block) -> Priority:
+    return Priority.CONTROL if any(needed_for_control(point.name) for point in block.points) else Priority.LOG
+
+
+class BlockReader:
+    """Reads points of one bus in as few requests as its devices allow."""
+
+    def __init__(self, bus: Bus, devices: Mapping[str, Device], monotonic: Callable[[], float]) -> None:
+        self._bus = bus
+        self._devices = devices
+        self._monotonic = monotonic
+        self._plans: dict[frozenset[str], tuple[Block, ...]] = {}
+        self._pieces: dict[Block, tuple[Block, Block]] = {}
+        self._refused: dict[Point, tuple[float, AddressRefusedError]] = {}
+
+    async def read(self, points: Iterable[Point]) -> Results:
+        """Return for every point its registers or bits, or the error, and the monotonic time of the answer."""
+        results: Results = {}
+        for block in self._plan(tuple(points)):
+            await self._read_block(block, results)
+        return results
+
+    def _plan(self, points: tuple[Point, ...]) -> tuple[Block, ...]:
+        key = frozenset(point.name for point in points)
+        if key not in self._plans:
+            self._plans[key] = tuple(sorted(plan_reads(points, self._devices), key=_priority))
+        return self._plans[key]
+
+    async def _read_block(self, block: Block, results: Results) -> None:
+        known = self._pieces.get(block)
+        if known is not None:
+            for piece in known:
+                await self._read_block(piece, results)
+            return
+        refused = self._refused.get(block.points[0])
+        if refused is not None and self._monotonic() < refused[0]:
+            results.update(dict.fromkeys(block.points, (None, refused[1], self._monotonic())))
+            return
+        device = self._devices[block.device]
+        request = ReadRequest(device.device_id, block.function, block.address, block.count)
+        try:
+            content = await self._bus.read(request, _priority(block))
+        except AddressRefusedError as error:
+            await self._split_and_read(block, error, results)
+        except BusError as error:
+            results.update(dict.fromkeys(block.points, (None, error, self._monotonic())))
+        else:
+            at = self._monotonic()
+            for point in block.points:
+                results[point] = (block.content_of(point, content), None, at)
+
+    async def _split_and_read(self, block: Block, error: AddressRefusedError, results: Results) -> None:
+        try:
+            pieces = split(block)
+        except ValueError:
+            again = self._monotonic() + ASK_REFUSED_AGAIN
+            for point in block.points:
+                if point not in self._refused:
+                    _log.warning("%s cannot be read: %s", point.name, error)
+                self._refused[point] = (again, error)
+                results[point] = (None, error, self._monotonic())
+            return
+        self._pieces[block] = pieces
+        _log.info("%s: reading %s and %s apart from now on", error, *(piece.points[0].name for piece in pieces))
+        for piece in pieces:
+            await self._read_block(piece, results)

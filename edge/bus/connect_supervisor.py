@@ -1,0 +1,113 @@
+"""Keeps a line up: server down at boot, lost later, idle socket closed. It never gives up and never hurries."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable
+from typing import Protocol
+
+from edge.bus.errors import NotConnectedError
+
+_log = logging.getLogger(__name__)
+
+
+class Line(Protocol):
+    """What the supervisor needs to know of a link."""
+
+    @property
+    def connected(self) -> bool:
+        """Tell whether the line is up."""
+        ...
+
+    async def open(self) -> None:
+        """Connect; raises NotConnectedError."""
+        ...
+
+    def close(self) -> None:
+        """Drop the line."""
+        ...
+
+
+class ConnectSupervisor:
+    """Opens the line, waits until it is lost, opens it again.
+
+    The wait between attempts doubles from `first_wait` to `longest_wait`; a line that held for `settled` seconds
+    is opened again at once, one that broke sooner counts as a failed attempt, so that a server which accepts
+    and hangs up is not stormed.
+    """
+
+    def __init__(
+        self,
+        line: Line,
+        name: str,
+        *,
+        monotonic: Callable[[], float],
+        sleep: Callable[[float], Awaitable[None]] = asyncio.sleep,
+        first_wait: float = 0.5,
+        longest_wait: float = 10.0,
+        settled: float = 1.0,
+    ) -> None:
+        self._line = line
+        self._name = name
+        self._monotonic = monotonic
+        self._sleep = sleep
+        self._first_wait = first_wait
+        self._longest_wait = longest_wait
+        self._settled = settled
+        self._lost = asyncio.Event()
+        self._attempt_over = asyncio.Event()
+        self._task: asyncio.Task[None] | None = None
+        self.connects = 0
+        """How often the line came up."""
+
+    def start(self) -> None:
+        """Begin, in the background."""
+        if self._task is None:
+            self._task = asyncio.get_running_loop().create_task(self._run(), name=f"connect {self._name}")
+
+    def lost(self) -> None:
+        """Hear from the line that it is gone."""
+        self._lost.set()
+
+    async def attempt(self) -> None:
+        """Wait for the end of the attempt to connect that is under way, if any."""
+        if self._task is not None and not self._line.connected:
+            await self._attempt_over.wait()
+
+    async def close(self) -> None:
+        """Stop, and drop the line."""
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.gather(self._task, return_exceptions=True)
+            self._task = None
+        self._attempt_over.set()
+        self._line.close()
+
+    async def _run(self) -> None:
+        wait = 0.0
+        complained = ""
+        while True:
+            self._attempt_over.clear()
+            self._lost.clear()
+            try:
+                await self._line.open()
+            except NotConnectedError as error:
+                if str(error) != complained:  # say it once, not every ten seconds of a long night
+                    _log.warning("%s; trying on", error)
+                    complained = str(error)
+                wait = min(max(2 * wait, self._first_wait), self._longest_wait)
+            else:
+                since = self._monotonic()
+                self.connects += 1
+                _log.info("bus %s: connected", self._name)
+                complained = ""
+                self._attempt_over.set()
+                await self._lost.wait()
+                held = self._monotonic() - since
+                _log.warning("bus %s: the line was lost after %.0f s", self._name, held)
+                held_long = held >= self._settled
+                wait = 0.0 if held_long else min(max(2 * wait, self._first_wait), self._longest_wait)
+            self._attempt_over.set()
+            if wait > 0:
+                await self._sleep(wait)

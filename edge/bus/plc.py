@@ -1,0 +1,139 @@
+"""What the control cycle sees of the greenhouse: values by name, read and written, each with its error."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+from edge.bus.block_reader import BlockReader
+from edge.bus.errors import BusError, NoValueError, UnknownPointError, ValueDoesNotFitError
+from edge.bus.modbus_bus import ModbusBus
+from edge.bus.protocol import Bus, Priority, WriteRequest
+from edge.registers.codec import NotEncodableError, decode, encode
+from edge.registers.model import BusSettings, Device, Point, RegisterMap
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One value as it came from the PLC, or why it did not."""
+
+    value: float | None
+    error: BusError | None
+    at: float
+    """Monotonic seconds of the answer."""
+
+
+class Plc(Protocol):
+    """The greenhouse's registers by the names of quantities and system points."""
+
+    async def read(self, names: Collection[str] | None = None) -> Mapping[str, Reading]:
+        """Read the named points, or all that are due. Never raises BusError: each reading carries its own."""
+        ...
+
+    async def write(self, name: str, value: float) -> None:
+        """Write one point; raises BusError. Only the guard's writer may call it."""
+        ...
+
+    async def close(self) -> None:
+        """Drop all lines."""
+        ...
+
+
+def make_bus(settings: BusSettings, devices: Iterable[Device]) -> ModbusBus:
+    """Make the bus for one entry of a register map. To be called inside an event loop."""
+    gaps = {device.device_id: device.gap for device in devices if device.bus == settings.name}
+    return ModbusBus(settings, gaps)
+
+
+class RegisterPlc:
+    """A Plc made of a register map: buses in parallel, on each one request at a time."""
+
+    def __init__(
+        self,
+        register_map: RegisterMap,
+        *,
+        monotonic: Callable[[], float] = time.monotonic,
+        buses: Mapping[str, Bus] | None = None,
+    ) -> None:
+        """`buses` by name replaces the real ones (tests). Made inside an event loop; connects after `start`."""
+        devices = register_map.devices
+        self.register_map = register_map
+        self._monotonic = monotonic
+        self.buses: Mapping[str, Bus] = buses or {
+            name: make_bus(settings, devices.values()) for name, settings in register_map.buses.items()
+        }
+        self._readers = {name: BlockReader(bus, devices, monotonic) for name, bus in self.buses.items()}
+        self._bus_of = {name: devices[point.device].bus for name, point in register_map.points.items()}
+        self._due: dict[str, float] = {}
+
+    def start(self) -> None:
+        """Begin to connect to every bus, in the background. Never waits."""
+        for bus in self.buses.values():
+            bus.start()
+
+    async def close(self) -> None:
+        """Drop all lines."""
+        await asyncio.gather(*(bus.close() for bus in self.buses.values()))
+
+    async def read(self, names: Collection[str] | None = None) -> Mapping[str, Reading]:
+        """Read the named points, or all whose poll period has passed, with as few requests as possible."""
+        points = self._due_points() if names is None else [self._point(name) for name in names]
+        shares: dict[str, list[Point]] = {}
+        for point in points:
+            shares.setdefault(self._bus_of[point.name], []).append(point)
+        readings: dict[str, Reading] = {}
+        jobs = [self._read_share(bus, share, readings) for bus, share in shares.items()]
+        if len(jobs) == 1:
+            await jobs[0]
+        else:
+            await asyncio.gather(*jobs)
+        return readings
+
+    async def write(self, name: str, value: float) -> None:
+        """Write one point, once; returns when the unit has echoed it.
+
+        Raises UnknownPointError, ValueDoesNotFitError (nothing sent), or another BusError; its `sent` tells whether
+        the write may have been done all the same. Range and pace are the guard's affair.
+        """
+        point = self._point(name)
+        if not point.writable:
+            raise UnknownPointError(f"{name}: the register map does not let it be written; `writable: true` would")
+        device = self.register_map.devices[point.device]
+        try:
+            content = encode(point, value)
+        except NotEncodableError as error:
+            raise ValueDoesNotFitError(str(error)) from None
+        request = WriteRequest(device.device_id, point.function, point.address, content)
+        priority = Priority.HEARTBEAT if name == "heartbeat" else Priority.WRITE
+        await self.buses[device.bus].write(request, priority)
+
+    def _point(self, name: str) -> Point:
+        try:
+            return self.register_map.points[name]
+        except KeyError:
+            raise UnknownPointError(f"{name}: the register map has no such point") from None
+
+    def _due_points(self) -> list[Point]:
+        now = self._monotonic()
+        due = []
+        for point in self.register_map.points.values():
+            if point.poll > 0:
+                if now < self._due.get(point.name, now):
+                    continue
+                self._due[point.name] = now + point.poll
+            due.append(point)
+        return due
+
+    async def _read_share(self, bus: str, points: list[Point], readings: dict[str, Reading]) -> None:
+        contents = await self._readers[bus].read(points)
+        for point in points:
+            content, error, at = contents[point]
+            value = None
+            if content is not None:
+                value = decode(point, content)
+                if value is None:
+                    error = NoValueError(f"{point.name}: the device says that it has no value")
+            readings[point.name] = Reading(value, error, at)
