@@ -1,0 +1,126 @@
+"""What both Autonomous Greenhouse Challenges share: weather, climate, actuators, and the way to telemetry."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow_core.air import STEFAN_BOLTZMANN
+from igrow_core.errors import IgrowError
+from igrow_core.local_time import from_local
+from igrow_core.site import Site, load_site
+from igrow_core.telemetry import Telemetry, from_rows
+from trainer.readers import excel_tables, screening
+from trainer.readers.log import DailyTable
+
+Floats = NDArray[np.float64]
+
+TIME_ZONE = "Europe/Amsterdam"
+STEP = 300.0
+
+
+def site(name: str) -> Site:
+    """Return the site description that comes with the reader of a challenge."""
+    with resources.as_file(resources.files("trainer.readers") / "sites" / f"{name}.yaml") as path:
+        return load_site(path)
+
+
+def compartments(folder: Path, *stems: str) -> list[str]:
+    """Return the names of the subfolders that hold a climate file."""
+    return [child.name for child in sorted(folder.iterdir()) if excel_tables.find(child, *stems) is not None]
+
+
+def choose(folder: Path, compartment: str | None, *stems: str) -> str:
+    """Return the name of the compartment to read; raises IgrowError that names those there are."""
+    there = compartments(folder, *stems)
+    if compartment is None:
+        if len(there) == 1:
+            return there[0]
+        raise IgrowError(f"{folder}: name a compartment: {', '.join(there) or 'none has a climate file'}")
+    for name in there:
+        if name.lower() == compartment.lower():
+            return name
+    raise IgrowError(
+        f"{folder}: compartment {compartment} has no climate file; those that have: {', '.join(there) or 'none'}"
+    )
+
+
+def weather(frame: Any) -> dict[str, Floats]:
+    """Return the weather columns of a challenge's weather table by our names."""
+    columns: dict[str, Floats] = {}
+    names = {
+        "outdoor_temperature": "Tout",
+        "outdoor_humidity": "Rhout",
+        "global_radiation": "Iglob",
+        "wind_speed": "Windsp",
+        "rain": "Rain",
+    }
+    for ours, theirs in names.items():
+        values = excel_tables.column(frame, theirs)
+        if values is not None:
+            columns[ours] = screening.without_spikes(ours, values)
+    net = excel_tables.column(frame, "Pyrgeo")
+    if net is not None and "outdoor_temperature" in columns:
+        # A pyrgeometer shows the sky's radiation minus its own, which is that of a body at outdoor temperature.
+        kelvin = columns["outdoor_temperature"] + 273.15
+        columns["sky_temperature"] = np.maximum(net / STEFAN_BOLTZMANN + kelvin**4, 1.0) ** 0.25 - 273.15
+    code = excel_tables.column(frame, "Winddir")
+    if code is not None:
+        # 1, 2, 4 ... 128 are the eight compass points from north on, clockwise (inferred).
+        columns["wind_direction"] = np.log2(np.maximum(np.round(code), 1.0)) * 45.0 % 360.0
+        columns["wind_direction"][~np.isfinite(code)] = np.nan
+    return columns
+
+
+def climate(frame: Any) -> dict[str, Floats]:
+    """Return measured climate and actuators of a challenge's climate table by our names, without lamps and CO2."""
+    columns: dict[str, Floats] = {}
+    names = {"air_temperature": "Tair", "air_humidity": "RHair", "air_co2": "CO2air"}
+    for ours, theirs in names.items():
+        values = excel_tables.column(frame, theirs)
+        if values is None:
+            raise IgrowError(f"the climate table has no column {theirs}")
+        columns[ours] = screening.without_spikes(ours, values)
+    names = {
+        "vent_lee": "VentLee",
+        "vent_wind": "VentWind",
+        "energy_screen": "EnScr",
+        "blackout_screen": "BlackScr",
+    }
+    for ours, theirs in names.items():
+        values = excel_tables.column(frame, theirs)
+        if values is not None:
+            columns[ours] = np.clip(values, 0.0, 100.0)
+    for ours, theirs in {"rail_pipe_temperature": "PipeLow", "grow_pipe_temperature": "PipeGrow"}.items():
+        values = excel_tables.column(frame, theirs)
+        if values is not None:
+            columns[ours] = screening.cooling_pipe(values, columns["air_temperature"], STEP)
+    return columns
+
+
+def to_telemetry(local: NDArray[np.datetime64], columns: Mapping[str, Floats], empty: NDArray[np.bool_]) -> Telemetry:
+    """Return telemetry in UTC of rows in wall time; rows that are `empty` or at times that never were are dropped."""
+    time = from_local(local, TIME_ZONE)
+    keep = ~np.isnat(time) & ~empty
+    return from_rows(time[keep], {name: values[keep] for name, values in columns.items()})
+
+
+def daily(path: Path | None, columns: Mapping[str, str], time: str = "time") -> DailyTable | None:
+    """Return a table by day: our names -> the file's; None without a file."""
+    if path is None:
+        return None
+    frame = excel_tables.read(path)
+    serial = excel_tables.column(frame, time)
+    if serial is None:
+        raise IgrowError(f"{path}: no column {time}")
+    known = np.isfinite(serial)
+    found = {ours: excel_tables.column(frame, theirs) for ours, theirs in columns.items()}
+    return DailyTable(
+        excel_tables.excel_days(serial[known]),
+        {ours: values[known] for ours, values in found.items() if values is not None},
+    )

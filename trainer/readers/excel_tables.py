@@ -1,0 +1,75 @@
+"""Tables of the Autonomous Greenhouse Challenges: Excel days, untidy headers, CSV (gzip or not) or Parquet."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from igrow_core.errors import IgrowError
+
+Floats = NDArray[np.float64]
+
+_ENDINGS = (".csv.gz", ".csv", ".parquet")
+_EPOCH = np.datetime64("1899-12-30T00:00:00", "s")
+
+
+def find(folder: Path, *stems: str) -> Path | None:
+    """Return the first file of a folder whose name is one of `stems` with a known ending, or None."""
+    if not folder.is_dir():
+        return None
+    present = {path.name.lower(): path for path in sorted(folder.iterdir())}
+    for stem in stems:
+        for ending in _ENDINGS:
+            found = present.get(f"{stem}{ending}".lower())
+            if found is not None:
+                return found
+    return None
+
+
+def read(path: Path) -> Any:
+    """Return a file as a data frame of numbers; names lose `%` and spaces, what is no number becomes NaN.
+
+    Raises:
+        IgrowError: the file cannot be read as a table.
+    """
+    try:
+        if path.suffix == ".parquet":
+            frame = pd.read_parquet(path)
+        else:
+            frame = pd.read_csv(path, skipinitialspace=True, index_col=False)
+    except (OSError, ValueError, EOFError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise IgrowError(f"{path}: cannot be read as a table: {reason}") from None
+    frame.columns = [str(name).strip().lstrip("%").strip() for name in frame.columns]
+    return frame.apply(pd.to_numeric, errors="coerce")
+
+
+def column(frame: Any, *names: str) -> Floats | None:
+    """Return the first of these columns that is there and not empty, as float64, else None."""
+    by_name = {str(name).lower(): name for name in frame.columns}
+    for name in names:
+        if name.lower() in by_name:
+            values: Floats = frame[by_name[name.lower()]].to_numpy(dtype=np.float64)
+            if np.isfinite(values).any():
+                return values
+    return None
+
+
+def excel_times(serial: Floats, path: Path) -> NDArray[np.datetime64]:
+    """Return Excel days as wall time, datetime64[s], rounded to 5 minutes."""
+    if not np.isfinite(serial).all():
+        line = int(np.flatnonzero(~np.isfinite(serial))[0]) + 2
+        raise IgrowError(f"{path}:{line}: the time is not a number of days since 1899-12-30")
+    return _EPOCH + (np.round(serial * 288.0) * 300.0).astype("timedelta64[s]")
+
+
+def excel_days(serial: Floats) -> NDArray[np.datetime64]:
+    """Return Excel days as calendar days, datetime64[D]."""
+    days: NDArray[np.datetime64] = (_EPOCH + (np.floor(serial + 1e-6) * 86_400.0).astype("timedelta64[s]")).astype(
+        "datetime64[D]"
+    )
+    return days

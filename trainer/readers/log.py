@@ -1,0 +1,51 @@
+"""What a reader returns: the telemetry of one greenhouse, and what was booked beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow_core.site import Site
+from igrow_core.telemetry import Telemetry
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class DailyTable:
+    """A small table of local calendar days."""
+
+    day: NDArray[np.datetime64]
+    """datetime64[D], strictly increasing, (n,)."""
+    columns: Mapping[str, Floats]
+    """By name, (n,), NaN where missing."""
+
+    def __getitem__(self, name: str) -> Floats:
+        """Return one column; raises KeyError where the table lacks it."""
+        return self.columns[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.columns
+
+    def __len__(self) -> int:
+        return len(self.day)
+
+
+@dataclass(frozen=True)
+class Log:
+    """The log of one greenhouse compartment."""
+
+    name: str
+    telemetry: Telemetry
+    harvests: DailyTable | None = None
+    """``class_a`` and ``class_b``: kg m-2 fresh weight of that day's harvest, not cumulative."""
+    resources: DailyTable | None = None
+    """Any of ``heat`` (MJ m-2), ``electricity_peak``, ``electricity_off_peak``, ``electricity`` (kWh m-2),
+    ``co2`` (kg m-2), ``irrigation``, ``drain`` (L m-2), all per day."""
+    site: Site | None = None
+    """What is known of the greenhouse, where the kind of log tells it."""
+    notes: tuple[str, ...] = field(default=())
+    """What the reader set aside or inferred, in words."""

@@ -1,0 +1,79 @@
+"""Reader of telemetry: single files, folders of day segments, the exchange, and growers' own exports."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from igrow_core import telemetry as core
+from igrow_core.errors import IgrowError
+from igrow_core.quantities import QUANTITIES
+from igrow_core.telemetry import Telemetry
+from trainer.readers import mapping
+from trainer.readers.log import Log
+
+_ENDINGS = (".csv", ".csv.gz", ".parquet")
+MAPPING_FILE = "mapping.yaml"
+
+
+def read(paths: Sequence[Path]) -> Log:
+    """Return the log of files and folders, joined in time; where rows overlap the later-named file counts.
+
+    Raises:
+        IgrowError: a file breaks the format, or a folder holds no telemetry.
+    """
+    tables: list[Telemetry] = []
+    for path in paths:
+        translation = path / MAPPING_FILE
+        if path.is_dir() and translation.is_file():
+            exported = mapping.load(translation)
+            tables += [mapping.read(part, exported) for part in _files(path)]
+        else:
+            tables += [read_file(part) for part in _files(path)]
+    if not tables:
+        raise IgrowError("no telemetry files were given")
+    return Log(paths[0].name, tables[0] if len(tables) == 1 else core.concatenate(tables))
+
+
+def read_file(path: Path) -> Telemetry:
+    """Return one telemetry file, CSV (gzip or not) or Parquet."""
+    return read_parquet(path) if path.suffix == ".parquet" else core.read_csv(path)
+
+
+def read_parquet(path: Path) -> Telemetry:
+    """Return a Parquet file with a `time` column (UTC, or with a time zone) and columns of the registry.
+
+    Raises:
+        IgrowError: it cannot be read, has no time, or has a column that is no quantity.
+    """
+    try:
+        frame = pd.read_parquet(path)
+    except (OSError, ValueError) as error:
+        raise IgrowError(f"{path}: cannot be read as Parquet: {str(error).splitlines()[0]}") from None
+    if "time" not in frame.columns:
+        raise IgrowError(f"{path}: no column time; one with UTC times is needed")
+    unknown = [name for name in frame.columns if name != "time" and name not in QUANTITIES]
+    if unknown:
+        raise IgrowError(f"{path}: column {unknown[0]} is no known quantity; a {MAPPING_FILE} can name what it is")
+    times = pd.to_datetime(frame["time"], utc=True, errors="coerce")
+    if times.isna().any():
+        raise IgrowError(f"{path}: row {int(np.flatnonzero(times.isna())[0]) + 1} has no readable time")
+    seconds = times.dt.tz_localize(None).to_numpy(dtype="datetime64[s]")
+    columns = {
+        name: pd.to_numeric(frame[name], errors="coerce").to_numpy(dtype=np.float64)
+        for name in frame.columns
+        if name != "time"
+    }
+    return core.from_rows(seconds, columns)
+
+
+def _files(path: Path) -> list[Path]:
+    if path.is_file():
+        return [path]
+    found = [part for part in sorted(path.rglob("*")) if part.is_file() and part.name.lower().endswith(_ENDINGS)]
+    if not found:
+        raise IgrowError(f"{path}: no telemetry in it: CSV, CSV.gz or Parquet files are needed")
+    return found
