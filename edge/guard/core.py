@@ -144,9 +144,8 @@ def guard(
 def never_sent(state: GuardState, before: GuardState, point: str) -> GuardState:
     """Return `state` as if the write to `point` had not been decided, since it certainly never left."""
     earlier = before.points.get(point, PointState())
-    ramp = state.points[point].ramp
-    restored = replace(state.points[point], ramp=ramp, written=earlier.written, written_at=earlier.written_at)
-    return replace(state, points={**state.points, point: replace(restored, budget=earlier.budget)})
+    restored = replace(earlier, ramp=None)
+    return replace(state, points={**state.points, point: restored})
 
 
 def begin_again(state: GuardState, points: Collection[str]) -> GuardState:

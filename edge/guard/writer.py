@@ -12,6 +12,7 @@ from typing import Protocol
 
 from edge.bus.errors import BusError
 from edge.guard.core import Write
+from igrow_core.errors import IgrowError
 
 HEARTBEAT = "heartbeat"
 HEARTBEAT_MODULUS = 65_536
@@ -22,7 +23,7 @@ class WritablePlc(Protocol):
     """What the writer needs of a PLC."""
 
     async def write(self, name: str, value: float) -> None:
-        """Write one point; raises BusError."""
+        """Write one point; raises BusError, or IgrowError for a value that its register cannot hold."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,12 +31,12 @@ class WriteOutcome:
     """How one write ended, as far as the bus knows; only a later read tells whether it holds."""
 
     write: Write
-    error: BusError | None
+    error: IgrowError | None
 
     @property
     def may_have_arrived(self) -> bool:
         """Tell whether the PLC may have taken the value."""
-        return self.error is None or self.error.sent
+        return self.error is None or (isinstance(self.error, BusError) and self.error.sent)
 
 
 class GuardedWriter:
@@ -52,7 +53,7 @@ class GuardedWriter:
         for write in writes:
             try:
                 await self._plc.write(write.point, write.value)
-            except BusError as error:
+            except IgrowError as error:  # a BusError, or a value that the register cannot hold
                 outcomes.append(WriteOutcome(write, error))
             else:
                 outcomes.append(WriteOutcome(write, None))

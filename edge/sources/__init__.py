@@ -1,0 +1,26 @@
+"""Where setpoints come from, in order: override, valid plan, last valid plan, recipe, hands off."""
+
+from edge.sources.decision import Choice, Decision, Offer, Source, decide
+from edge.sources.hands_off import HandsOff
+from edge.sources.override import GrowerOverride, Lease
+from edge.sources.plans import FreshPlan, LastValidPlan, PlanKeeper
+from edge.sources.recipe import Period, Recipe, RecipeSource, recipe_at, recipe_course
+
+__all__ = [
+    "Choice",
+    "Decision",
+    "FreshPlan",
+    "GrowerOverride",
+    "HandsOff",
+    "LastValidPlan",
+    "Lease",
+    "Offer",
+    "Period",
+    "PlanKeeper",
+    "Recipe",
+    "RecipeSource",
+    "Source",
+    "decide",
+    "recipe_at",
+    "recipe_course",
+]

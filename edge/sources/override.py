@@ -1,0 +1,106 @@
+"""The grower's override: a setpoint by hand, for a lease that ends by itself.
+
+`igrow-edge override` leaves a small file; the daemon looks at it in each cycle. A lease counts from when the daemon
+first sees it, on the monotonic clock; the daemon then notes its end in the file, so that a restart does not
+begin it again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from edge.image import Image
+from edge.sources.decision import Offer
+from edge.state_file import read_state, write_state
+
+
+@dataclass(frozen=True, slots=True)
+class Lease:
+    """One overridden setpoint."""
+
+    value: float
+    seconds: float
+    """Length of the lease when it was asked for."""
+    until: float | None = None
+    """Seconds since 1970 UTC at which it ends, once the daemon has seen it with a trusted clock."""
+
+
+def read_leases(path: Path) -> dict[str, Lease]:
+    """Return the leases in the file by setpoint; entries that make no sense are left out."""
+    leases: dict[str, Lease] = {}
+    for name, entry in read_state(path).items():
+        if not isinstance(entry, Mapping):
+            continue
+        value, seconds, until = entry.get("value"), entry.get("seconds"), entry.get("until")
+        if not isinstance(value, int | float) or not isinstance(seconds, int | float) or not math.isfinite(value):
+            continue
+        leases[name] = Lease(float(value), float(seconds), float(until) if isinstance(until, int | float) else None)
+    return leases
+
+
+def write_leases(path: Path, leases: Mapping[str, Lease]) -> str:
+    """Replace the file; return an empty text or one line that says why it could not be written."""
+    return write_state(
+        path, {name: {"value": x.value, "seconds": x.seconds, "until": x.until} for name, x in leases.items()}
+    )
+
+
+class GrowerOverride:
+    """Offers what the grower has overridden and not yet been given back."""
+
+    name = "override"
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._stamp: tuple[int, int] | None = None
+        self._leases: dict[str, Lease] = {}
+        self._ends: dict[str, float] = {}
+
+    def offer(self, image: Image) -> Offer:
+        """Return the setpoints whose lease runs."""
+        self._look(image)
+        running = {name: lease for name, lease in self._leases.items() if self._ends[name] > image.monotonic}
+        if not running:
+            return Offer("")
+        left = min(self._ends[name] for name in running) - image.monotonic
+        why = f"overridden by the grower for {left / 60:.0f} min more"
+        return Offer(why, {name: lease.value for name, lease in running.items()})
+
+    def _look(self, image: Image) -> None:
+        stamp = self._file_stamp()
+        if stamp != self._stamp:
+            self._take(read_leases(self._path) if stamp else {}, image)
+            self._stamp = self._file_stamp()
+
+    def _take(self, leases: dict[str, Lease], image: Image) -> None:
+        now, true_time = image.monotonic, image.true_time
+        dated: dict[str, Lease] = {}
+        for name, lease in leases.items():
+            known = self._leases.get(name)
+            if known is not None and (known.value, known.seconds, known.until) == (
+                lease.value,
+                lease.seconds,
+                lease.until,
+            ):
+                dated[name] = lease
+                continue
+            if lease.until is not None and true_time is not None:
+                left = min(lease.until - true_time, lease.seconds)
+            else:
+                left = lease.seconds
+            self._ends[name] = now + left
+            end = None if true_time is None else true_time + left
+            dated[name] = Lease(lease.value, lease.seconds, lease.until if lease.until is not None else end)
+        self._leases = dated
+        if dated != leases:
+            write_leases(self._path, dated)
+
+    def _file_stamp(self) -> tuple[int, int] | None:
+        try:
+            status = self._path.stat()
+        except OSError:
+            return None
+        return status.st_mtime_ns, status.st_ino
