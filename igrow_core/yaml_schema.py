@@ -145,11 +145,10 @@ class _Reader:
                 if known is not None and key not in known:
                     raise self.error(key_node, f"{_join(where, key)} is not known: {nearest(key, known)}")
             bases = base if isinstance(base, Mapping) else {}
-            values = {
+            return {
                 key: self.read(value, arguments[1], _join(where, key), limits, bases.get(key))
                 for key, (_, value) in pairs.items()
             }
-            return values
         if not isinstance(node, yaml.ScalarNode):
             found = "a list" if isinstance(node, yaml.SequenceNode) else "a mapping"
             raise self.error(node, f"{where or 'the file'} is {found}: {_wanted(kind, limits)} is needed")
