@@ -1,0 +1,63 @@
+"""A grower's own export, read through one mapping file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from igrow_core.export_mapping import ExportMapping, load_mapping, read_export
+from igrow_core.telemetry import Telemetry, TelemetryError
+from igrow_core.yaml_schema import SchemaError, parse
+
+DUTCH = """
+delimiter: ";"
+decimal: ","
+missing: ["-"]
+time: {column: Datum, format: "%d-%m-%Y %H:%M", zone: Europe/Amsterdam}
+columns:
+  air_temperature: {column: Tkas}
+  lamp_power: {column: HPS, scale: 81, add: [LED]}
+"""
+
+
+def export(tmp_path: Path, text: str, mapping: str) -> Telemetry:
+    (tmp_path / "export.csv").write_text(text)
+    return read_export(tmp_path / "export.csv", parse(mapping, ExportMapping))
+
+
+def test_a_dutch_export_is_read_with_its_own_names_signs_and_zone(tmp_path: Path) -> None:
+    text = "Datum;Tkas;HPS;LED;Rest\n15-01-2020 12:00;21,5;1;0,5;x\n15-07-2020 12:00;-;0;0;y\n"
+    telemetry = export(tmp_path, text, DUTCH)
+    np.testing.assert_array_equal(telemetry.time, np.array(["2020-01-15T11:00", "2020-07-15T10:00"], "datetime64[s]"))
+    np.testing.assert_array_equal(telemetry["air_temperature"], [21.5, np.nan])
+    np.testing.assert_array_equal(telemetry["lamp_power"], [121.5, 0.0])
+
+
+def test_serial_days_are_rounded_and_values_out_of_range_are_missing(tmp_path: Path) -> None:
+    mapping = "time: {column: t, format: excel, round_to: 5 min}\ncolumns: {air_co2: {column: CO2}}\n"
+    telemetry = export(tmp_path, "t,CO2\n43815.99999,-499\n43816.00347,600\n", mapping)
+    np.testing.assert_array_equal(telemetry.time, np.array(["2019-12-17T00:00", "2019-12-17T00:05"], "datetime64[s]"))
+    np.testing.assert_array_equal(telemetry["air_co2"], [np.nan, 600.0])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("Datum;Tkass;HPS;LED\n", "has no column 'Tkas': did you mean Tkass"),
+        ("Datum;Tkas;HPS;LED\n2020-01-15;1;1;1\n", ":2: time is '2020-01-15': the mapping says %d-%m-%Y"),
+        ("Datum;Tkas;HPS;LED\n15-01-2020 12:00;warm;1;1\n", ":2: Tkas is 'warm'"),
+    ],
+)
+def test_an_export_that_does_not_fit_its_mapping_is_refused(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(TelemetryError) as caught:
+        export(tmp_path, text, DUTCH)
+    assert message in str(caught.value)
+
+
+def test_a_mapping_to_an_unknown_quantity_is_refused_with_its_place(tmp_path: Path) -> None:
+    path = tmp_path / "mapping.yaml"
+    path.write_text("time: {column: t}\ncolumns:\n  air_temprature: {column: T}\n")
+    with pytest.raises(SchemaError, match=r"mapping.yaml:3:3: .*did you mean air_temperature"):
+        load_mapping(path)
