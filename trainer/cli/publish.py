@@ -1,0 +1,1 @@
+"""`igrow-trainer publish`: sign a bundle and put it into the exchange."""
