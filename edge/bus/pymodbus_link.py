@@ -42,6 +42,22 @@ QUIET = 0.05
 into pieces some 10 to 20 ms apart."""
 
 
+async def open_serial_port(
+    protocol: Callable[[], asyncio.Protocol], port: str, baudrate: int, parity: Parity, stop_bits: int
+) -> None:
+    """Connect a protocol to a serial port, 8 data bits. Raises OSError where the port is absent or taken."""
+    await create_serial_connection(
+        asyncio.get_running_loop(),
+        protocol,
+        port,
+        baudrate=baudrate,
+        bytesize=8,
+        parity={Parity.NONE: "N", Parity.EVEN: "E", Parity.ODD: "O"}[parity],
+        stopbits=stop_bits,
+        timeout=0,
+    )
+
+
 class PymodbusLink(asyncio.Protocol):
     """One connection: opened, used for one exchange at a time, closed, opened again."""
 
@@ -73,7 +89,10 @@ class PymodbusLink(asyncio.Protocol):
         try:
             async with asyncio.timeout(settings.timeout):
                 if settings.transport is Transport.RTU:
-                    await self._open_serial()
+                    self._opened.clear()
+                    port = settings.serial_port
+                    await open_serial_port(lambda: self, port, settings.baudrate, settings.parity, settings.stop_bits)
+                    await self._opened.wait()  # pyserial's transport reports in a later turn of the event loop
                 else:
                     tls = _tls_context(settings) if settings.transport is Transport.TLS else None
                     name = (settings.server_name or settings.host) if tls else None
@@ -83,22 +102,6 @@ class PymodbusLink(asyncio.Protocol):
         except (OSError, TimeoutError, ValueError) as error:
             reason = str(error) or f"no connection within {settings.timeout:g} s"
             raise NotConnectedError(f"bus {settings.name}: {reason}") from error
-
-    async def _open_serial(self) -> None:
-        settings = self._settings
-        self._opened.clear()
-        parity = {Parity.NONE: "N", Parity.EVEN: "E", Parity.ODD: "O"}[settings.parity]
-        await create_serial_connection(
-            self._loop,
-            lambda: self,
-            settings.serial_port,
-            baudrate=settings.baudrate,
-            bytesize=8,
-            parity=parity,
-            stopbits=settings.stop_bits,
-            timeout=0,
-        )
-        await self._opened.wait()  # pyserial's transport reports in a later turn of the event loop
 
     def close(self) -> None:
         """Drop the line; an exchange in progress fails with ConnectionLostError."""

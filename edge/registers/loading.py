@@ -83,9 +83,9 @@ class TlsBus:
 
     transport: Literal["tls"] = setting(help="how the bus carries its frames")
     host: str = setting(help="address or name")
+    certificate_authority: str = setting(help="file of the authority that signed the server's certificate")
     port: int = setting(help="TCP port", low=1, high=65535, default=802)
     server_name: str = setting(help="name in the server's certificate, if it is not the host", default="")
-    certificate_authority: str = setting(help="file of the authority that signed the server's certificate")
     certificate: str | None = setting(help="file of our own certificate", default=None)
     private_key: str | None = setting(help="file of the key to our certificate", default=None)
     timeout: timedelta = setting(help=_TIMEOUT, low=_ZERO, high=_LONGEST_TIMEOUT, default=_SECOND)
