@@ -1,0 +1,52 @@
+"""What no model knows: coloured, heavy-tailed fluxes of heat, vapour and CO2 into the air."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from igrow_core.greenhouse.namespace import Array
+
+INTERVAL = 300.0
+"""Seconds between two innovations."""
+
+
+@dataclass(frozen=True)
+class Disturbances:
+    """An autoregressive process of first order for each balance; sizes are standard deviations."""
+
+    heat: float = 4.0
+    """W m-2."""
+    vapour: float = 4.0
+    """g m-2 h-1."""
+    co2: float = 0.25
+    """g m-2 h-1."""
+    correlation_hours: float = 2.0
+    """Time in which the autocorrelation falls to 1/e, h."""
+    degrees_of_freedom: float | None = None
+    """Of Student's t for the innovations (at least 2.5; scaled to the same deviation); None is the normal."""
+
+    def innovate(self, rng: np.random.Generator, count: int | None) -> list[Array]:
+        """Draw one set of innovations: heat W m-2, vapour and CO2 kg m-2 s-1, scaled for `INTERVAL`."""
+        shape = (3,) if count is None else (3, count)
+        if self.degrees_of_freedom is None:
+            drawn = rng.standard_normal(shape)
+        else:
+            freedom = max(self.degrees_of_freedom, 2.5)
+            drawn = rng.standard_t(freedom, shape) / math.sqrt(freedom / (freedom - 2.0))
+        scale = math.sqrt(1.0 - self.persistence**2)
+        sizes = (self.heat, self.vapour / 3.6e6, self.co2 / 3.6e6)
+        return [
+            size * scale * value for size, value in zip(sizes, drawn.tolist() if count is None else drawn, strict=True)
+        ]
+
+    @property
+    def persistence(self) -> float:
+        """What is left of a disturbance after one `INTERVAL`, 0 to 1."""
+        return math.exp(-INTERVAL / (3600.0 * self.correlation_hours))
+
+
+QUIET = Disturbances(heat=0.0, vapour=0.0, co2=0.0)
+"""No disturbances at all."""

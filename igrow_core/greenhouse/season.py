@@ -1,0 +1,206 @@
+"""A stretch of time through the plant: the log of one greenhouse or of a batch, and what it used."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow_core.errors import IgrowError
+from igrow_core.greenhouse.climate_computer import ClimateComputer
+from igrow_core.greenhouse.disturbances import Disturbances
+from igrow_core.greenhouse.hidden import HiddenEffect
+from igrow_core.greenhouse.parameters import GreenhouseParameters, stack
+from igrow_core.greenhouse.plant import TICK, Plant
+from igrow_core.greenhouse.sensors import Sensors
+from igrow_core.greenhouse.weather_table import WeatherTable
+from igrow_core.quantities import QUANTITIES, SETPOINTS
+from igrow_core.sun import unix_seconds
+from igrow_core.telemetry import Telemetry
+
+Schedule = Callable[[np.datetime64], Mapping[str, Any]]
+"""Setpoints at a time (UTC); values are floats or, for a batch, arrays (N,)."""
+
+RESOURCES = ("heat", "electricity", "co2", "irrigation", "drain")
+
+
+@dataclass(frozen=True)
+class Season:
+    """What one greenhouse did.
+
+    Rows of `measured` and `true` are `step` apart: states and weather at the row's time, actuators and setpoints as
+    means over the step before it. They hold all quantities of the registry.
+    """
+
+    measured: Telemetry
+    """As the sensors show it, with noise, resolution and sensor faults."""
+    true: Telemetry
+    resources: Mapping[str, NDArray[np.float64]] = field(repr=False)
+    """Cumulative at each row: heat MJ m-2, electricity kWh m-2, co2 kg m-2, irrigation and drain L m-2."""
+
+    def total(self, name: str) -> float:
+        """Return the season's use of one resource."""
+        return float(self.resources[name][-1])
+
+
+def simulate(
+    parameters: GreenhouseParameters,
+    weather: Telemetry,
+    setpoints: Telemetry | Schedule,
+    start: np.datetime64,
+    end: np.datetime64,
+    *,
+    seed: int,
+    effects: Sequence[HiddenEffect] = (),
+    disturbances: Disturbances | None = None,
+    sensors: Sensors | None = None,
+    computer: ClimateComputer | None = None,
+    step: int = 300,
+    tick: float = TICK,
+    crop: str = "mature",
+) -> Season:
+    """Run one greenhouse from `start` to `end` (UTC) and return its log.
+
+    Args:
+        parameters: of the greenhouse.
+        weather: any telemetry with outdoor_temperature, outdoor_humidity, global_radiation and wind_speed.
+        setpoints: a table (each row holds until the next) or a function of time.
+        start: first row.
+        end: last row at the latest.
+        seed: of disturbances and sensor noise.
+        effects: what happens in the plant without the model knowing.
+        disturbances: unmodelled fluxes; `disturbances.QUIET` for none.
+        sensors: noise; `sensors.EXACT` for none.
+        computer: settings of the PLC.
+        step: seconds between rows.
+        tick: longest step of the climate, s.
+        crop: "mature" or "young".
+
+    Raises:
+        IgrowError: where weather or setpoints do not cover the time.
+    """
+    plant = Plant(
+        parameters, WeatherTable(weather), float(unix_seconds(start)), effects=effects, disturbances=disturbances,
+        sensors=sensors, computer=computer, crop=crop, seed=seed, tick=tick,
+    )  # fmt: skip
+    return _run(plant, _schedule(setpoints), end, step)[0]
+
+
+def simulate_many(
+    parameters: GreenhouseParameters | Sequence[GreenhouseParameters],
+    weather: Telemetry | Sequence[Telemetry],
+    setpoints: Telemetry | Sequence[Telemetry] | Schedule,
+    start: np.datetime64,
+    end: np.datetime64,
+    *,
+    count: int,
+    seed: int,
+    effects: Sequence[HiddenEffect] | Sequence[Sequence[HiddenEffect]] = (),
+    disturbances: Disturbances | None = None,
+    sensors: Sensors | None = None,
+    computer: ClimateComputer | None = None,
+    step: int = 300,
+    tick: float = TICK,
+    crop: str = "mature",
+) -> list[Season]:
+    """Run a batch of `count` greenhouses at once; arguments as in `simulate`.
+
+    Parameters, weather, setpoint tables and lists of effects may be one for all or a sequence of `count`.
+    """
+    if not isinstance(parameters, GreenhouseParameters):
+        if len(parameters) != count:
+            raise IgrowError(f"a batch of {count} greenhouses needs {count} sets of parameters, not {len(parameters)}")
+        parameters = stack(parameters)
+    plant = Plant(
+        parameters, WeatherTable(weather), float(unix_seconds(start)), count=count, effects=effects,
+        disturbances=disturbances, sensors=sensors, computer=computer, crop=crop, seed=seed, tick=tick,
+    )  # fmt: skip
+    return _run(plant, _schedule(setpoints), end, step)
+
+
+def _schedule(setpoints: Telemetry | Sequence[Telemetry] | Schedule) -> Schedule:
+    if isinstance(setpoints, Telemetry):
+        return _held(setpoints)
+    if callable(setpoints):
+        return setpoints
+    tables = [_held(table) for table in setpoints]
+
+    def together(time: np.datetime64) -> dict[str, Any]:
+        rows = [table(time) for table in tables]
+        return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+
+    return together
+
+
+def _held(table: Telemetry) -> Schedule:
+    """Return a schedule that holds each row of a table until the next."""
+    names = [name for name in SETPOINTS if name in table]
+    if not names:
+        raise IgrowError(f"setpoints: the table has none of {', '.join(SETPOINTS)}")
+    filled = {name: _filled(table[name]) for name in names}
+
+    def at(time: np.datetime64) -> dict[str, float]:
+        index = max(int(np.searchsorted(table.time, time, side="right")) - 1, 0)
+        return {name: float(filled[name][index]) for name in names}
+
+    return at
+
+
+def _filled(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return values with each gap filled by the last value before it (the first one at the beginning)."""
+    present = ~np.isnan(values)
+    if not present.any():
+        raise IgrowError("setpoints: a column without any value; leave it out instead")
+    last = np.maximum.accumulate(np.where(present, np.arange(len(values)), -1))
+    return values[np.where(last < 0, int(np.argmax(present)), last)]
+
+
+def _run(plant: Plant, schedule: Schedule, end: np.datetime64, step: int) -> list[Season]:
+    seconds = int(plant.state.seconds)
+    rows = (int(unix_seconds(end)) - seconds) // step + 1
+    times = np.datetime64(seconds, "s") + np.arange(rows) * np.timedelta64(step, "s")
+    count = plant.count or 1
+    logs: dict[str, dict[str, NDArray[np.float64]]] = {"true": {}, "measured": {}, "resources": {}}
+    command: Mapping[str, Any] = schedule(times[0])
+    for row in range(rows):
+        if row:
+            command = schedule(times[row - 1])
+            plant.advance(step, command)
+        truth = plant.truth(command)
+        for kind, values in (
+            ("true", truth),
+            ("measured", plant.measured(truth)),
+            ("resources", _resources(plant)),
+        ):
+            log = logs[kind]
+            for name, value in values.items():
+                if name not in log:
+                    log[name] = np.full((rows, count), np.nan)
+                log[name][row] = value
+        plant.reset_means()
+    return [
+        Season(
+            measured=_table(times, logs["measured"], column),
+            true=_table(times, logs["true"], column),
+            resources={name: values[:, column].copy() for name, values in logs["resources"].items()},
+        )
+        for column in range(count)
+    ]
+
+
+def _table(times: NDArray[Any], log: Mapping[str, NDArray[np.float64]], column: int) -> Telemetry:
+    return Telemetry(times, {name: log[name][:, column] for name in QUANTITIES if name in log})
+
+
+def _resources(plant: Plant) -> dict[str, Any]:
+    totals = plant.state.totals
+    return {
+        "heat": totals.get("boiler_in", 0.0) / 1e6,
+        "electricity": totals.get("electricity", 0.0) / 3.6e6,
+        "co2": totals.get("co2_dosed", 0.0),
+        "irrigation": totals.get("irrigation", 0.0),
+        "drain": totals.get("drain", 0.0),
+    }
