@@ -155,7 +155,8 @@ def observe(record: Record, parameters: Values, effects: ActiveEffects) -> dict[
     """Return the states that the log implies, by name, (n,): the measured ones without sensor faults, the rest run.
 
     The temperature of the floor and the memories of effects follow the measured air; over a gap in the
-    measurements the last value stands. Parameters are floats or arrays of shape (n,).
+    measurements the last value stands. Parameters are floats or arrays of shape (n,); or of shape (m, 1) for m
+    variants at once, and then the floor's temperature has shape (m, n).
     """
     clean = {name: _bridge(values, len(record), smooth=True)[0] for name, values in record.measured.items()}
     for name, stand_in in (("air_humidity", 75.0), ("air_co2", 500.0)):
@@ -170,7 +171,8 @@ def observe(record: Record, parameters: Values, effects: ActiveEffects) -> dict[
     drivers = climate.derive(np, state, record.inputs, parameters, record.lamp_efficacy)
     state["mass_temperature"] = _run_mass(record, state, drivers, parameters)
     _run_memories(record, state, drivers, effects)
-    return {name: np.broadcast_to(values, (len(record),)) for name, values in state.items()}
+    shape = (len(record),)
+    return {name: np.broadcast_to(v, np.broadcast_shapes(np.shape(v), shape)) for name, v in state.items()}
 
 
 def free_run(
@@ -186,7 +188,7 @@ def free_run(
 
     Args:
         record: with n rows.
-        states: from `observe`, (n,) each.
+        states: from `observe`, (n,) each, or (m, n).
         starts: rows to start from, (s,); start + steps must be less than n.
         steps: rows to run.
         parameters: floats, or arrays of shape (m, 1) for m variants at once.
@@ -201,7 +203,7 @@ def free_run(
     names = list(record.inputs)
     table = np.stack([record.inputs[name] for name in names])
     extra = {channel: np.asarray(flux) for channel, flux in (added or {}).items()}
-    state: dict[str, Array] = {name: values[begin] for name, values in states.items()}
+    state: dict[str, Array] = {name: values[..., begin] for name, values in states.items()}
     shown: dict[str, list[Floats]] = {name: [] for name in measurement.PREDICTED}
     for k in range(steps):
         row = begin + k
@@ -289,16 +291,25 @@ def _run_mass(record: Record, state: Values, drivers: Values, parameters: Values
     """Run the floor's balance under the measured air."""
     added: dict[str, Array] = {}
     flux, conductance, capacity = climate.balances(np, state, drivers, parameters, added)["mass_temperature"]
-    shape = (len(record),)
-    target = np.broadcast_to(state["mass_temperature"] + flux / conductance, shape)
-    share = np.broadcast_to(1.0 - np.exp(-record.step * conductance / capacity), shape)
-    mass = np.empty(len(record))
+    target = state["mass_temperature"] + flux / conductance
+    share = 1.0 - np.exp(-record.step * conductance / capacity)
+    shape = np.broadcast_shapes(np.shape(target), np.shape(share), (len(record),))
+    targets, shares = np.broadcast_to(target, shape).T, np.broadcast_to(share, shape).T
     # Start where a floor would be that has long been under this air.
-    value = float(np.mean(target[: max(1, round(86_400.0 / record.step))]))
-    for k in range(len(record)):
-        mass[k] = value
-        value += (target[k] - value) * share[k]
-    return mass
+    first = targets[: max(1, round(86_400.0 / record.step))].mean(axis=0)
+    mass = np.empty(shape).T
+    if len(shape) > 1:
+        value = first
+        for k in range(len(record)):
+            mass[k] = value
+            value = value + (targets[k] - value) * shares[k]
+        return mass.T
+    # Floats are several times as fast as arrays of one element.
+    course, number = [], float(first)
+    for aim, part in zip(targets.tolist(), shares.tolist(), strict=True):
+        course.append(number)
+        number += (aim - number) * part
+    return np.array(course)
 
 
 def _run_memories(record: Record, state: dict[str, Array], drivers: Values, effects: ActiveEffects) -> None:

@@ -1,0 +1,90 @@
+"""From a site to the simulator: parameters before any log was seen, and the record of its log."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow_core.simulator.hybrid.parameters import PARAMETERS
+from igrow_core.simulator.hybrid.record import Record, make_record
+from igrow_core.site import Site
+from igrow_core.telemetry import Telemetry
+
+Floats = NDArray[np.float64]
+
+_REFERENCE = Site(name="reference", latitude=0.0, longitude=0.0).greenhouse
+"""The greenhouse that the values of `PARAMETERS` were written down for."""
+
+_CANOPIES = {"tomato": (3.0, 35.0, 9.0), "cucumber": (3.2, 20.0, 6.0)}
+"""Leaf area of a full canopy (m2 m-2), days from planting to half of it, and the width of the rise in days.
+
+Usual figures of Dutch practice; the transpiration and assimilation parameters of a site absorb their error.
+"""
+
+
+def nominal(site: Site) -> dict[str, float]:
+    """Return the physical parameters of a site by name, from its description alone, within their bounds.
+
+    What the description leaves at its default keeps the value of `PARAMETERS`; what it changes scales it.
+    """
+    values = {name: parameter.value for name, parameter in PARAMETERS.items()}
+    house = site.greenhouse
+
+    def scale(name: str, given: float, reference: float) -> None:
+        values[name] *= given / reference if reference > 0.0 else 1.0
+
+    loss = house.cover_heat_transfer * house.cover_area_ratio
+    scale("cover_heat_transfer", loss, _REFERENCE.cover_heat_transfer * _REFERENCE.cover_area_ratio)
+    scale("transmissivity", house.cover_transmissivity, _REFERENCE.cover_transmissivity)
+    scale("leakage_wind", house.leakage / house.mean_height, _REFERENCE.leakage / _REFERENCE.mean_height)
+    for name in ("vent_wind", "vent_stack"):
+        scale(name, house.vent_area_ratio, _REFERENCE.vent_area_ratio)
+    scale("rail_pipe_heat_transfer", house.rail_pipe_heat_transfer, _REFERENCE.rail_pipe_heat_transfer)
+    scale("grow_pipe_heat_transfer", house.grow_pipe_heat_transfer, _REFERENCE.grow_pipe_heat_transfer)
+    for name, screen, reference in (
+        ("energy_screen_saving", house.energy_screen, _REFERENCE.energy_screen),
+        ("blackout_screen_saving", house.blackout_screen, _REFERENCE.blackout_screen),
+    ):
+        if screen is not None and reference is not None:
+            scale(name, screen.saving, reference.saving)
+    return {
+        name: float(np.clip(value, PARAMETERS[name].low, PARAMETERS[name].high)) for name, value in values.items()
+    }
+
+
+def leaf_area_curve(site: Site, time: NDArray[np.datetime64]) -> Floats:
+    """Return an estimate of the leaf area index over time, (n,), from the species and the planting date.
+
+    A logistic rise; a planting date that the log does not follow within a year counts as a full canopy.
+    """
+    full, half, width = _CANOPIES.get(site.crop.species.lower(), _CANOPIES["tomato"])
+    days = (time - np.datetime64(site.crop.planting_date, "s")).astype(np.float64) / 86_400.0
+    if len(days) == 0 or days[0] < -30.0 or days[0] > 365.0:
+        return np.full(len(time), full)
+    curve: Floats = full / (1.0 + np.exp(-(days - half) / width))
+    return curve
+
+
+def site_record(telemetry: Telemetry, site: Site, step: float) -> Record:
+    """Return the record of a site's log on a grid of `step` seconds.
+
+    Without a measured leaf area the crop's usual course stands in, and ``leaf_area_index`` is among the unknown.
+
+    Raises:
+        TelemetryError: the log has no outdoor_temperature or no air_temperature.
+    """
+    estimated = "leaf_area_index" not in telemetry or not np.isfinite(telemetry["leaf_area_index"]).any()
+    if estimated:
+        telemetry = telemetry.with_columns({"leaf_area_index": leaf_area_curve(site, telemetry.time)})
+    record = make_record(
+        telemetry,
+        step=step,
+        latitude=site.latitude,
+        longitude=site.longitude,
+        mean_height=site.greenhouse.mean_height,
+        lamp_efficacy=site.greenhouse.lamps.efficacy if site.greenhouse.lamps is not None else 0.0,
+        leaf_area_index=_CANOPIES.get(site.crop.species.lower(), _CANOPIES["tomato"])[0],
+    )
+    return replace(record, unknown=(*record.unknown, "leaf_area_index")) if estimated else record

@@ -1,0 +1,130 @@
+"""How well the hybrid simulator predicts a log: errors over horizons, with intervals over days."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow_core.errors import IgrowError
+from igrow_core.simulator.hybrid import record as records
+from igrow_core.simulator.hybrid.climate import ActiveEffects
+from igrow_core.simulator.hybrid.record import Record
+from trainer.calibration.posterior import Posterior
+
+Floats = NDArray[np.float64]
+
+HORIZONS = ("1_step", "1_h", "24_h", "7_d")
+"""``1_step`` and ``1_h``: the error at that distance. ``24_h`` and ``7_d``: the mean over a free run that long."""
+_RUNS = {"24_h": 86_400.0, "7_d": 604_800.0}
+
+
+@dataclass(frozen=True)
+class ErrorSummary:
+    """Errors of one quantity over one horizon, in its unit."""
+
+    mae: float
+    mae_low: float
+    """Lower end of the 90 % interval over days (bootstrap)."""
+    mae_high: float
+    rmse: float
+    bias: float
+    persistence: float
+    """MAE on the same runs of: as at the start (``1_step``, ``1_h``), as one horizon earlier (runs)."""
+    runs: int
+
+
+Evaluation = Mapping[str, Mapping[str, ErrorSummary]]
+"""Quantity -> horizon -> errors; a horizon without a complete run is left out."""
+
+
+def evaluate(
+    record: Record,
+    parameters: Posterior | Mapping[str, float],
+    effects: ActiveEffects,
+    horizons: Sequence[str] = HORIZONS,
+    rows: NDArray[np.bool_] | None = None,
+    *,
+    added: Mapping[str, Floats] | None = None,
+    every: float = 11_100.0,
+    seed: int = 0,
+) -> Evaluation:
+    """Return the errors of free runs that start from the measured state.
+
+    Args:
+        record: the log.
+        parameters: by name.
+        effects: the active effects.
+        horizons: of `HORIZONS`.
+        rows: a run counts only if all its rows are among these, (n,); None: all.
+        added: further fluxes by channel, (n,) (a learned remainder).
+        every: seconds between starts; the default makes them fall on all times of the day.
+        seed: of the bootstrap over days.
+
+    Raises:
+        IgrowError: a horizon is not known.
+    """
+    values = parameters.values if isinstance(parameters, Posterior) else parameters
+    states = records.observe(record, values, effects)
+    allowed = np.ones(len(record), dtype=bool) if rows is None else rows
+    result: dict[str, dict[str, ErrorSummary]] = {}
+    for horizon in horizons:
+        if horizon not in HORIZONS:
+            raise IgrowError(f"horizon {horizon!r} is not known: {', '.join(HORIZONS)}")
+        steps = horizon_steps(record, horizon)
+        starts = starts_within(record, allowed, steps, max(1, round(every / record.step)))
+        if len(starts) == 0:
+            continue
+        shown = records.free_run(record, states, starts, steps, values, effects, added)
+        following = starts + 1 + np.arange(steps)[:, None]
+        for quantity, predicted in shown.items():
+            measured = record.measured[quantity]
+            error = predicted - measured[following]
+            if horizon in _RUNS:
+                earlier = following - steps
+                naive = np.where(earlier >= 0, measured[np.maximum(earlier, 0)], np.nan) - measured[following]
+            else:
+                error, naive = error[-1:], measured[starts] - measured[following[-1:]]
+            if np.isfinite(error).any():
+                day = record.time[starts].astype("datetime64[D]")
+                result.setdefault(quantity, {})[horizon] = _summary(error, naive, day, seed)
+    return result
+
+
+def horizon_steps(record: Record, horizon: str) -> int:
+    """Return the rows that a horizon spans."""
+    return {"1_step": 1, "1_h": max(1, round(3600.0 / record.step))}.get(horizon) or round(
+        _RUNS[horizon] / record.step
+    )
+
+
+def starts_within(record: Record, allowed: NDArray[np.bool_], steps: int, every: int) -> NDArray[np.int64]:
+    """Return start rows, `every` apart, from which a complete run of `steps` stays among the `allowed` rows."""
+    starts = records.complete_starts(record, steps, every)
+    outside = np.concatenate([[0], np.cumsum(~allowed)])
+    chosen: NDArray[np.int64] = starts[outside[starts + steps + 1] - outside[starts] == 0]
+    return chosen
+
+
+def _summary(error: Floats, naive: Floats, day: NDArray[np.datetime64], seed: int) -> ErrorSummary:
+    """Summarise errors (steps, s) of runs that start on `day` (s,)."""
+    known = np.isfinite(error)
+    size = np.where(known, np.abs(error), 0.0).sum(axis=0)
+    number = known.sum(axis=0)
+    _, index = np.unique(day, return_inverse=True)
+    day_size = np.bincount(index, weights=size)
+    day_number = np.bincount(index, weights=number)
+    draws = np.random.default_rng(seed).integers(0, len(day_size), size=(400, len(day_size)))
+    means = day_size[draws].sum(axis=1) / np.maximum(day_number[draws].sum(axis=1), 1.0)
+    low, high = np.quantile(means, [0.05, 0.95])
+    return ErrorSummary(
+        mae=float(size.sum() / number.sum()),
+        mae_low=float(low),
+        mae_high=float(high),
+        rmse=float(np.sqrt(np.nanmean(error**2))),
+        bias=float(np.nanmean(error)),
+        persistence=float(np.nanmean(np.abs(naive))) if np.isfinite(naive).any() else float("nan"),
+        runs=int(error.shape[1]),
+    )
