@@ -1,0 +1,28 @@
+"""Bundles from the trainer to the greenhouse, each step mistrusting the one before.
+
+1. `SignedSource` asks the exchange for the site's newest bundle; The Update Framework refuses what is
+   tampered with, older than what was seen, expired or signed by somebody else.
+2. `Shelf` unpacks it, reads its manifest strictly, checks that it is meant for this site and this version,
+   and runs its self-test on this machine.
+3. `shadow` lets it predict beside the bundle in force, on measurements that neither has seen.
+4. `BundleUpdates` adopts it only if it is not worse, watches it afterwards against its predecessor, and goes
+   back by itself; a bundle that failed is marked and never tried again. Each verdict is an event and a report
+   in the exchange.
+"""
+
+from edge.updates.service import BundleUpdates, UpdateRules
+from edge.updates.shadow import Comparison, Predictor, compare, hindcast_errors
+from edge.updates.shelf import Shelf
+from edge.updates.signed_source import SignedSource, UpdateError
+
+__all__ = [
+    "BundleUpdates",
+    "Comparison",
+    "Predictor",
+    "Shelf",
+    "SignedSource",
+    "UpdateError",
+    "UpdateRules",
+    "compare",
+    "hindcast_errors",
+]

@@ -1,0 +1,99 @@
+"""A plant log, a predictor that runs the tiny bundle, and an exchange with a signed repository."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from edge.exchange import FolderExchange
+from edge.image import Quality, Value
+from edge.store import SqliteStore, StoreLimits
+from edge.updates import BundleUpdates, SignedSource, UpdateRules
+from igrow_core.bundle import Bundle, open_session, run_graph
+from trainer.publishing import create_keys, initialise
+
+START = 1_780_012_800.0
+HOUR = 3600.0
+
+
+class TinyPredictor:
+    """Predicts air temperature as the tiny bundle does: outdoor temperature plus the bundle's offset."""
+
+    def predict(self, bundle: Bundle, log, origins, steps: int) -> Mapping[str, np.ndarray]:
+        rows = np.asarray(origins)[:, None] + 1 + np.arange(steps)
+        weather = log["outdoor_temperature"][rows].astype(np.float32)
+        padded = np.resize(weather, (-(-weather.size // 24), 24))
+        outputs = run_graph(open_session(bundle.graph("simulator")), {"weather": padded})
+        predicted = outputs["air_temperature"].ravel()[: weather.size].reshape(weather.shape)
+        return {"air_temperature": predicted.astype(np.float64)}
+
+
+@dataclass
+class Gateway:
+    """A store, an exchange and the bundle updates around them, on a plant whose offset can change."""
+
+    folder: Path
+    rules: UpdateRules
+    offset: float = 5.0
+    now: float = START
+
+    def __post_init__(self) -> None:
+        self.exchange_root = self.folder / "exchange"
+        self.keys = self.folder / "keys"
+        self.repository = self.exchange_root / "bundles"
+        if not self.repository.exists():
+            create_keys(self.keys)
+            self.trusted_root = initialise(self.repository, self.keys)
+        self.trusted_root = self.repository / "metadata" / "1.root.json"
+        self.start()
+
+    def start(self, first_bundle: Path | None = None) -> None:
+        """Start the services, as after a restart of the daemon."""
+        self.store = SqliteStore(self.folder / "store", StoreLimits(survive_power_cut=False))
+        self.exchange = FolderExchange(self.exchange_root, "demo", self.store)
+        self.updates = BundleUpdates(
+            self.folder / "updates",
+            site="demo",
+            igrow_version="0.1.0",
+            store=self.store,
+            predictor=TinyPredictor(),
+            source=SignedSource(self.repository, self.folder / "updates" / "tuf", self.trusted_root),
+            reports=self.exchange,
+            rules=self.rules,
+            first_bundle=first_bundle,
+        )
+
+    def stop(self) -> None:
+        self.updates.close()
+        self.store.close()
+
+    def run(self, hours: float, *, measured: bool = True) -> None:
+        """Let the plant run; the services are ticked every 10 minutes."""
+        for _ in range(round(hours * 6)):
+            outdoor = 10.0 + 5.0 * np.sin(self.now / 86400 * 2 * np.pi)
+            air = outdoor + self.offset + 0.2 * np.sin(self.now / 5000)
+            if measured:
+                self.store.append(
+                    self.now,
+                    {
+                        "outdoor_temperature": Value(float(outdoor), Quality.GOOD, 0.0),
+                        "air_temperature": Value(float(air), Quality.GOOD, 0.0),
+                    },
+                )
+            self.updates.tick(self.now)
+            wait_for(self.updates)
+            self.now += 600.0
+
+    def kinds(self) -> list[str]:
+        """Return the kinds of all events, oldest first."""
+        return [str(record.body["kind"]) for record in self.store.records("event", 10**6)][::-1]
+
+
+def wait_for(updates: BundleUpdates) -> None:
+    """Wait for the thread; a lock-step plant does the same."""
+    while updates.busy:
+        time.sleep(0.0005)
