@@ -98,10 +98,19 @@ class Crop:
     dry_matter_fraction: float = setting(
         unit="1", low=0.02, high=0.3, default=0.09, help="dry weight of a fruit per fresh weight"
     )
+    fruit_share: float = setting(
+        unit="1", low=0.1, high=1, default=0.7, help="part of the net growth, in dry matter, that goes to fruit"
+    )
     brix: float = setting(unit="degree Brix", low=2, high=15, default=8.5, help="expected quality of the fruit")
     days_to_harvest: float = setting(
         unit="days", low=1, high=120, default=47, help="from a fruit's setting to its harvest"
     )
+    temperature_low: float = setting(unit="degC", low=0, high=30, default=13.0, help="colder air harms the crop")
+    temperature_high: float = setting(unit="degC", low=15, high=50, default=32.0, help="hotter air harms the crop")
+    mean_temperature_low: float = setting(
+        unit="degC", low=0, high=30, default=18.0, help="a colder day's mean delays truss and fruit"
+    )
+    humidity_high: float = setting(unit="%", low=50, high=100, default=93.0, help="damper air invites disease")
 
 
 @dataclass(frozen=True)
@@ -270,12 +279,21 @@ class Planning:
         default=datetime.timedelta(days=2),
         help="how far a plan looks ahead, in whole days",
     )
+    optimise: tuple[str, ...] = setting(
+        default=("heating_setpoint", "co2_setpoint", "lamp_on"),
+        help="setpoints that plans choose; the others follow the recipe",
+    )
     caution: float = setting(
         low=0, high=5, default=1.0, help="standard deviations of the simulator's doubt taken off a plan's profit"
     )
     discount: float = setting(
         unit="1", low=0, high=1, default=0.2, help="taken off the value of fruit that is not yet ripe"
     )
+
+    def __post_init__(self) -> None:
+        for position, name in enumerate(self.optimise):
+            if name not in SETPOINTS:
+                raise SettingError(f"optimise has {name}: {yaml_schema.nearest(name, SETPOINTS)}", "optimise", position)
 
 
 @dataclass(frozen=True)

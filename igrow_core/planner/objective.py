@@ -1,0 +1,164 @@
+"""What a candidate is worth, from what the simulator says it does, per m2.
+
+A plan of two days harvests fruit that grew long before, so the harvest within the horizon says nothing about the
+plan. What a plan makes is growth. Growth is worth the fruit that it becomes:
+
+    value = growth * fruit_share / dry_matter_fraction * price_of_growth(t)
+
+where `price_of_growth` is the product's price averaged over the days on which the fruit now on the plant ripens.
+Fruit of every age takes up growth, so those days are spread evenly from now to `days_to_harvest`; the part that
+falls behind the crop's end date is worth nothing (unripe fruit is not sold), and a discount is taken off for the risk
+of the wait. This leaves out that warm air ripens fruit sooner and that a plant without fruit cannot use growth;
+`mean_temperature_low` of the crop stands in for the first.
+
+Costs are those of `igrow_core.economics`, with CO2 in tiers from what the crop has had before.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow_core.economics import Balance, local_days, product_price, running_costs
+from igrow_core.site import Site
+
+Values = NDArray[np.float64]
+
+HARM_PER_DEGREE_HOUR = 0.002
+"""EUR m-2 for each kelvin and hour outside the crop's bounds, and each % of humidity and hour above its bound."""
+DELAY_PER_DEGREE_DAY = 0.02
+"""EUR m-2 for each kelvin that the mean of 24 h lies below the crop's bound: some 5 % of a summer day's income
+per kelvin, as much as fruit development slows down."""
+OUTSIDE_PENALTY = 0.05
+"""EUR m-2 for a day spent one range-width outside the data that the simulator knows."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What B candidates do over H hours, by each of M members of an ensemble; all arrays (M, B, H).
+
+    A simulator without an ensemble has M = 1. Amounts belong to the hour, they are not cumulative.
+    """
+
+    air_temperature: Values
+    """degC, mean of the hour or its end."""
+    air_humidity: Values
+    """%."""
+    air_co2: Values
+    """ppm."""
+    heat: Values
+    """MJ m-2."""
+    electricity: Values
+    """kWh m-2."""
+    co2: Values
+    """kg m-2 dosed."""
+    net_growth: Values
+    """kg m-2 of dry matter."""
+    fruit_fresh_weight: Values
+    """kg m-2 harvested."""
+    outside: Values
+    """How far the hour lies outside the training data, in widths of its range; 0 inside."""
+
+
+class Simulator(Protocol):
+    """Anything that says what setpoints do: a bundle's graph, a model in numpy, the mechanistic greenhouse."""
+
+    def simulate(self, initial: dict[str, float], weather: Values, setpoints: Values, start: np.datetime64) -> Outcome:
+        """Return what candidates do.
+
+        Args:
+            initial: present value of quantities (climate, growth, yield, actuators), in the registry's units.
+            weather: (H, 6), the hours' means of `quantities.WEATHER`'s first six, in its order.
+            setpoints: (B, H, 4), in the order of `quantities.SETPOINTS`.
+            start: UTC time at which the first hour begins.
+        """
+
+
+@dataclass(frozen=True)
+class Valuation:
+    """What B candidates are worth over the horizon, EUR m-2, by each of M members: arrays (M, B)."""
+
+    balance: Balance
+    """Income is the value of growth."""
+    harm: Values
+    """Penalty for climate that harms the crop."""
+    outside: Values
+    """Penalty for leaving the range of the training data."""
+
+    @property
+    def profit(self) -> Values:
+        """Value of growth less costs, (M, B); penalties are not money and stay out of it."""
+        return self.balance.net_profit
+
+    @property
+    def score(self) -> Values:
+        """Profit less penalties, (M, B)."""
+        return self.profit - self.harm - self.outside
+
+
+@dataclass(frozen=True)
+class Objective:
+    """The value of outcomes at one site over one stretch of hours."""
+
+    site: Site
+    time: NDArray[np.datetime64]
+    """UTC starts of the hours, (H,)."""
+    co2_before: float = 0.0
+    """kg m-2 of CO2 that the crop has had before."""
+
+    def value(self, outcome: Outcome) -> Valuation:
+        """Return what the candidates are worth."""
+        site, crop = self.site, self.site.crop
+        costs = running_costs(
+            site.prices,
+            site.time_zone,
+            self.time,
+            outcome.heat,
+            outcome.electricity,
+            outcome.co2,
+            crop.stem_density,
+            self.co2_before,
+        )
+        fresh = outcome.net_growth * (crop.fruit_share / crop.dry_matter_fraction)
+        income = np.sum(fresh * self.growth_price(), axis=-1)
+        return Valuation(
+            balance=Balance(income, costs.plants, costs.upkeep, costs.electricity, costs.heat, costs.co2),
+            harm=self._harm(outcome),
+            outside=OUTSIDE_PENALTY * np.sum(outcome.outside, axis=-1) / 24.0,
+        )
+
+    def growth_price(self) -> Values:
+        """Return what fresh fruit growing in each hour will earn on average, EUR kg-1, (H,)."""
+        site, crop = self.site, self.site.crop
+        day = local_days(self.time, site.time_zone)
+        ahead = np.arange(max(1, round(crop.days_to_harvest)))
+        ripe = day[:, None] + ahead[None, :].astype("timedelta64[D]")
+        price = product_price(site.prices, ripe, crop.brix)
+        if crop.end_date is not None:
+            price = np.where(ripe <= np.datetime64(crop.end_date), price, 0.0)
+        return np.asarray(price.mean(axis=1) * (1.0 - site.planning.discount))
+
+    def _harm(self, outcome: Outcome) -> Values:
+        crop, air = self.site.crop, outcome.air_temperature
+        hot = np.maximum(air - crop.temperature_high, 0.0)
+        cold = np.maximum(crop.temperature_low - air, 0.0)
+        damp = np.maximum(outcome.air_humidity - crop.humidity_high, 0.0)
+        harm = HARM_PER_DEGREE_HOUR * np.sum(hot + cold + damp, axis=-1)
+        for first in range(0, air.shape[-1] - 23, 24):
+            mean = air[..., first : first + 24].mean(axis=-1)
+            harm = harm + DELAY_PER_DEGREE_DAY * np.maximum(crop.mean_temperature_low - mean, 0.0)
+        return np.asarray(harm)
+
+
+def cautious(valuation: Valuation, reference: Valuation, caution: float) -> tuple[Values, Values]:
+    """Return what the candidates gain over the reference, taking doubt off, and the doubt itself; both (B,).
+
+    The members of an ensemble err together on much that plan and reference share, so the doubt is the standard
+    deviation of the gain over the members, not of the profit: mean gain - caution * sd(gain), EUR m-2.
+    """
+    gain = valuation.score - reference.score
+    doubt = gain.std(axis=0)
+    return gain.mean(axis=0) - caution * doubt, doubt

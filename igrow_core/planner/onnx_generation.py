@@ -1,0 +1,63 @@
+"""The generation of the genetic algorithm from a bundle's optimizer.onnx."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+
+import numpy as np
+import onnxruntime
+from numpy.typing import NDArray
+
+from igrow_core.errors import IgrowError
+from igrow_core.planner.evolution import EvolutionSettings, Fitness, Genes, fixed_inputs
+
+OUTPUTS = ("survivors", "survivor_fitness", "next_offspring")
+"""Results of the graph, in the order of `evolution.generation`'s."""
+
+
+class OnnxGeneration:
+    """Runs optimizer.onnx; its sizes are read from the graph, its rates from `rates`."""
+
+    def __init__(self, path: str | os.PathLike[str], rates: EvolutionSettings | None = None) -> None:
+        """Open the graph; raises IgrowError where it is no optimizer."""
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = options.inter_op_num_threads = 1
+        try:
+            self._session = onnxruntime.InferenceSession(
+                os.fspath(path), sess_options=options, providers=["CPUExecutionProvider"]
+            )
+        except Exception as error:
+            raise IgrowError(f"{path}: cannot be opened as an ONNX graph: {str(error).splitlines()[0]}") from None
+        shapes = {item.name: item.shape for item in self._session.get_inputs()}
+        missing = {"parents", "offspring", "tournament"} - shapes.keys()
+        if missing:
+            raise IgrowError(f"{path}: is no optimizer: it lacks the inputs {', '.join(sorted(missing))}")
+        rates = rates or EvolutionSettings()
+        self.settings = EvolutionSettings(
+            parents=shapes["parents"][0],
+            offspring=shapes["offspring"][0],
+            contestants=shapes["tournament"][2],
+            mutations=rates.mutations,
+            step=rates.step,
+        )
+
+    def __call__(
+        self,
+        parents: Genes,
+        parent_fitness: Fitness,
+        offspring: Genes,
+        offspring_fitness: Fitness,
+        random: Mapping[str, NDArray[np.float32]],
+    ) -> tuple[Genes, Fitness, Genes]:
+        """Return survivors, their fitness and the next offspring."""
+        inputs = {
+            "parents": parents,
+            "parent_fitness": parent_fitness,
+            "offspring": offspring,
+            "offspring_fitness": offspring_fitness,
+            **random,
+            **fixed_inputs(self.settings, parents.shape[1]),
+        }
+        survivors, fitness, children = self._session.run(list(OUTPUTS), inputs)
+        return survivors, fitness, children

@@ -1,0 +1,180 @@
+"""The search: decode candidates, simulate them, value them, breed the next; the recipe is what they must beat."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow_core.errors import IgrowError
+from igrow_core.planner.evolution import WORST, Generation, NumpyGeneration, draw
+from igrow_core.planner.objective import Objective, Outcome, Simulator, Valuation, cautious
+from igrow_core.planner.template import Setpoints, Template, for_site
+from igrow_core.quantities import SETPOINTS
+from igrow_core.site import Site
+
+Values = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Budget:
+    """When a search ends: the first of these."""
+
+    generations: int = 80
+    """Most generations."""
+    patience: int = 25
+    """Generations without a better candidate."""
+    seconds: float = float("inf")
+    """Time by the monotonic clock that is passed in."""
+
+
+@dataclass(frozen=True)
+class PlanningState:
+    """Where the greenhouse stands when the plan begins."""
+
+    time: np.datetime64
+    """UTC start of the first hour."""
+    initial: Mapping[str, float]
+    """Present value of quantities, in the registry's units."""
+    applied: Mapping[str, float] = field(default_factory=dict)
+    """Setpoints in force, from which slew limits count."""
+    co2_before: float = 0.0
+    """kg m-2 of CO2 that the crop has had before."""
+
+
+@dataclass(frozen=True)
+class PlanResult:
+    """The plan, and what is expected of it."""
+
+    setpoints: Setpoints
+    """(H, 4), one row an hour, in the order of `quantities.SETPOINTS`."""
+    time: NDArray[np.datetime64]
+    """UTC starts of the hours, (H,)."""
+    expected_profit: float
+    """EUR m-2 over the horizon, mean over the ensemble, without penalties and doubt."""
+    recipe_profit: float
+    """The same if the recipe were followed."""
+    doubt: float
+    """Standard deviation of the gain over the recipe, over the ensemble, EUR m-2."""
+    leaves_range: bool
+    """The plan visits what the simulator was not trained on."""
+    follows_recipe: bool
+    """No candidate beat the recipe, so the plan is the recipe."""
+    history: tuple[float, ...]
+    """Best cautious gain over the recipe after each generation, EUR m-2."""
+    outcome: Outcome
+    """What the simulator expects of the plan, arrays (M, 1, H)."""
+    valuation: Valuation
+    """The plan's balance and penalties, arrays (M, 1)."""
+    recipe_valuation: Valuation
+    """The recipe's."""
+    evaluations: int
+    """Candidates simulated."""
+
+
+def optimise(
+    simulator: Simulator,
+    site: Site,
+    state: PlanningState,
+    forecast: Values,
+    recipe: Setpoints,
+    rng: np.random.Generator,
+    budget: Budget | None = None,
+    *,
+    generation: Generation | None = None,
+    template: Template | None = None,
+    seeds: Sequence[Setpoints] = (),
+    monotonic: Callable[[], float] = clock.monotonic,
+) -> PlanResult:
+    """Search for setpoints that earn more than the recipe.
+
+    Args:
+        simulator: says what setpoints do.
+        site: limits, prices, planning.
+        state: where the greenhouse stands.
+        forecast: weather of the horizon, (H, 6), the hours' means in the registry's order.
+        recipe: the grower's setpoints over the horizon, (H, 4).
+        rng: random numbers; the same generator state gives the same plan unless `budget.seconds` ends the search.
+        budget: when to end.
+        generation: the genetic algorithm, in numpy or from optimizer.onnx.
+        template: genes to setpoints; by default blocks of the local day, each day its own.
+        seeds: further starting points (H, 4), such as what is left of the last plan.
+        monotonic: clock in seconds.
+
+    Raises:
+        IgrowError: where the forecast or the recipe has the wrong shape or a value is missing.
+    """
+    hours = len(forecast)
+    for name, array, shape in (("forecast", forecast, (hours, 6)), ("recipe", recipe, (hours, len(SETPOINTS)))):
+        if array.shape != shape or not np.isfinite(array).all():
+            raise IgrowError(f"the {name} must have shape {shape} without missing values, not {array.shape}")
+    budget = budget or Budget()
+    run = generation or NumpyGeneration()
+    time = state.time.astype("datetime64[s]") + np.arange(hours) * np.timedelta64(3600, "s")
+    template = template or for_site(site, state.time, hours)
+    objective = Objective(site, time, state.co2_before)
+    applied = np.array([state.applied.get(name, np.nan) for name in SETPOINTS])
+    recipe = template.limit(recipe[None], applied)[0]
+
+    def simulate(setpoints: Setpoints) -> tuple[Outcome, Valuation]:
+        outcome = simulator.simulate(dict(state.initial), forecast, setpoints, state.time)
+        return outcome, objective.value(outcome)
+
+    _, recipe_valuation = simulate(recipe[None])
+
+    def fitness(genes: NDArray[np.float32]) -> NDArray[np.float32]:
+        _, valuation = simulate(template.decode(genes, recipe, applied))
+        gain, _ = cautious(valuation, recipe_valuation, site.planning.caution)
+        return np.where(np.isfinite(gain), gain, WORST).astype(np.float32)
+
+    began = monotonic()
+    settings = run.settings
+    offspring = _first_candidates(template, [recipe, *seeds], settings.offspring, rng)
+    parents = offspring[: settings.parents]
+    parent_fitness = np.full(settings.parents, WORST, dtype=np.float32)
+    history: list[float] = []
+    evaluations = 1
+    best_at = 0
+    for number in range(budget.generations):
+        offspring_fitness = fitness(offspring)
+        evaluations += len(offspring)
+        random = draw(rng, settings, template.genes)
+        parents, parent_fitness, offspring = run(parents, parent_fitness, offspring, offspring_fitness, random)
+        if not history or parent_fitness[0] > history[best_at] + 1e-6:
+            best_at = number
+        history.append(float(parent_fitness[0]))
+        if number - best_at >= budget.patience or monotonic() - began >= budget.seconds:
+            break
+
+    follows_recipe = parent_fitness[0] <= 0.0
+    plan = recipe if follows_recipe else template.decode(parents[:1], recipe, applied)[0]
+    outcome, valuation = simulate(plan[None])
+    _, doubt = cautious(valuation, recipe_valuation, site.planning.caution)
+    return PlanResult(
+        setpoints=plan,
+        time=time,
+        expected_profit=float(valuation.profit.mean()),
+        recipe_profit=float(recipe_valuation.profit.mean()),
+        doubt=float(doubt[0]),
+        leaves_range=bool((outcome.outside > 0).any()),
+        follows_recipe=bool(follows_recipe),
+        history=tuple(history),
+        outcome=outcome,
+        valuation=valuation,
+        recipe_valuation=recipe_valuation,
+        evaluations=evaluations + 1,
+    )
+
+
+def _first_candidates(
+    template: Template, starts: Sequence[Setpoints], count: int, rng: np.random.Generator
+) -> NDArray[np.float32]:
+    """Return the first generation (count, G): the starting points, variations on them, and random candidates."""
+    known = np.stack([template.encode(start) for start in starts])[:count]
+    near = known[rng.integers(len(known), size=max(0, count // 2 - len(known)))]
+    near = np.clip(near + 0.2 * rng.standard_normal(near.shape), 0.0, 1.0)
+    free = rng.random((count - len(known) - len(near), template.genes))
+    return np.concatenate([known, near, free]).astype(np.float32)

@@ -1,0 +1,112 @@
+"""Candidates: genes from 0 to 1 that stand for setpoints per hour, in blocks of local hours, within the limits.
+
+Cao et al. (2022) search four actions for each of 3984 hours, 15,936 numbers. Growers think in periods of the day,
+and so does the sun; a plan of two days in eight blocks has 16 genes a setpoint and is searched in seconds. The
+blocks begin and end where the electricity tariff changes too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow_core.local_time import to_local
+from igrow_core.quantities import SETPOINTS
+from igrow_core.site import Site
+
+Setpoints = NDArray[np.float64]
+"""(..., H, 4) in the units of the registry, in its order."""
+
+BLOCK_STARTS = (0, 4, 7, 10, 13, 16, 19, 23)
+"""Local hours at which a block begins."""
+STEPS = {"heating_setpoint": 0.5, "co2_setpoint": 25.0, "lamp_on": 1.0, "irrigation_on": 0.05}
+"""Setpoints are whole multiples of these: finer ones would not show in the greenhouse."""
+
+
+@dataclass(frozen=True)
+class Template:
+    """How genes become setpoints over a horizon; make it with `for_site`."""
+
+    free: tuple[str, ...]
+    """Setpoints that the genes choose; the others follow the recipe."""
+    block: NDArray[np.int64]
+    """Block of each hour of the horizon, 0 and up, shape (H,)."""
+    low: NDArray[np.float64]
+    """Smallest allowed value of each setpoint, shape (4,)."""
+    high: NDArray[np.float64]
+    """Largest allowed value of each setpoint, shape (4,)."""
+    slew: NDArray[np.float64]
+    """Most change per hour of each setpoint, infinite without a limit, shape (4,)."""
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks."""
+        return int(self.block.max()) + 1
+
+    @property
+    def genes(self) -> int:
+        """Number of genes: blocks for each free setpoint, one setpoint after the other."""
+        return len(self.free) * self.blocks
+
+    def decode(self, genes: NDArray[np.float32], recipe: Setpoints, applied: NDArray[np.float64]) -> Setpoints:
+        """Return the setpoints (B, H, 4) of candidates (B, G).
+
+        `recipe` (H, 4) gives the setpoints that are not free; `applied` (4,) is what holds before the first hour
+        (NaN where unknown), from which the slew limit counts.
+        """
+        setpoints = np.repeat(recipe[None], len(genes), axis=0)
+        for position, name in enumerate(self.free):
+            column = SETPOINTS.index(name)
+            part = genes[:, position * self.blocks : (position + 1) * self.blocks].astype(np.float64)
+            values = self.low[column] + part * (self.high[column] - self.low[column])
+            setpoints[:, :, column] = (np.round(values / STEPS[name]) * STEPS[name])[:, self.block]
+        return self.limit(setpoints, applied)
+
+    def encode(self, setpoints: Setpoints) -> NDArray[np.float32]:
+        """Return the genes (G,) nearest to setpoints (H, 4): the mean over each block."""
+        counts = np.bincount(self.block, minlength=self.blocks)
+        parts = []
+        for name in self.free:
+            column = SETPOINTS.index(name)
+            mean = np.bincount(self.block, setpoints[:, column], minlength=self.blocks) / counts
+            span = max(self.high[column] - self.low[column], 1e-9)
+            parts.append(np.clip((mean - self.low[column]) / span, 0.0, 1.0))
+        return np.concatenate(parts).astype(np.float32)
+
+    def limit(self, setpoints: Setpoints, applied: NDArray[np.float64]) -> Setpoints:
+        """Return setpoints (..., H, 4) within limits and slew, as the guard would let them pass."""
+        limited = np.clip(setpoints, self.low, self.high)
+        before = np.where(np.isnan(applied), limited[..., 0, :], applied)
+        for hour in range(limited.shape[-2]):
+            before = np.clip(limited[..., hour, :], before - self.slew, before + self.slew)
+            limited[..., hour, :] = before
+        return limited
+
+
+def for_site(
+    site: Site, start: np.datetime64, hours: int, *, days_per_pattern: int = 1, starts: Sequence[int] = BLOCK_STARTS
+) -> Template:
+    """Return the template of a horizon of `hours` from `start` (UTC), in blocks of the site's local day.
+
+    Consecutive local days share one pattern of blocks for `days_per_pattern` days: 1 lets each day differ, a large
+    number repeats one day over a whole season.
+    """
+    time = start.astype("datetime64[s]") + np.arange(hours) * np.timedelta64(3600, "s")
+    local = to_local(time, site.time_zone)
+    day = local.astype("datetime64[D]").astype(np.int64)
+    pattern = (day - day[0]) // days_per_pattern
+    hour = local.astype("datetime64[h]").astype(np.int64) % 24
+    # Hours before the first block's start belong to the last block, which then runs over midnight.
+    period = (np.searchsorted(np.array(starts), hour, side="right") - 1) % len(starts)
+    _, block = np.unique(pattern * len(starts) + period, return_inverse=True)
+    limits = [site.limits[name] for name in SETPOINTS]
+    return Template(
+        free=tuple(name for name in SETPOINTS if name in site.setpoints and name in site.planning.optimise),
+        block=block.astype(np.int64),
+        low=np.array([limit.low for limit in limits]),
+        high=np.array([limit.high for limit in limits]),
+        slew=np.array([np.inf if limit.slew is None else limit.slew for limit in limits]),
+    )
