@@ -64,8 +64,6 @@ class ClimateComputer:
     """Wind at which the wind vents begin to close, m s-1; 5 more shut them and halve the lee vents."""
     vent_travel: float = 360.0
     """Seconds for the full travel of a vent."""
-    vent_dead_band: float = 0.015
-    """Opening below which a vent drive does not move, 0 to 1."""
     screen_travel: float = 240.0
     """Seconds for the full travel of a screen."""
     screen_radiation: float = 40.0
@@ -80,7 +78,7 @@ class ClimateComputer:
     """Gap of the closed blackout screen, 0 to 1; wider when it grows too warm below."""
     lamp_radiation_limit: float = 400.0
     """Global radiation above which lamps are put off, W m-2 (50 hysteresis)."""
-    co2_band: float = 100.0
+    co2_band: float = 60.0
     """Proportional band of CO2 dosing, ppm."""
     co2_vent_stop: float = 0.5
     """Mean vent opening at which dosing has stopped, 0 to 1; it begins to fall at a fifth of it."""
@@ -207,8 +205,8 @@ def control(
     lee = xp.minimum(clip(xp, demand, 0.0, 1.0), largest_lee)
     wind = xp.minimum(clip(xp, demand - s.wind_vent_delay, 0.0, 1.0), frost * storm)
     travel = seconds / s.vent_travel
-    vent_lee = _move(xp, before.vent_lee, lee, travel, s.vent_dead_band)
-    vent_wind = _move(xp, before.vent_wind, wind, travel, s.vent_dead_band)
+    vent_lee = _move(xp, before.vent_lee, lee, travel)
+    vent_wind = _move(xp, before.vent_wind, wind, travel)
 
     # Lamps and screens
     limit = s.lamp_radiation_limit + 50.0 * (before.lamp_allowed - 0.5)
@@ -223,8 +221,8 @@ def control(
     energy = screen_wanted * (1.0 - xp.maximum(moisture, 0.5 * warmth))
     blackout = (radiation < s.blackout_radiation) * (lamp > 0.0) * (1.0 - xp.maximum(s.blackout_gap, 0.4 * warmth))
     travel = seconds / s.screen_travel
-    energy_screen = _move(xp, before.energy_screen, energy, travel, 0.005)
-    blackout_screen = _move(xp, before.blackout_screen, blackout, travel, 0.005)
+    energy_screen = _move(xp, before.energy_screen, energy, travel)
+    blackout_screen = _move(xp, before.blackout_screen, blackout, travel)
 
     # Carbon dioxide
     missing = setpoints.get("co2_setpoint", SAFE_SETPOINTS["co2_setpoint"]) - seen.air_co2
@@ -233,7 +231,7 @@ def control(
     lit = xp.maximum(light, (lamp > 0.0) * 1.0)
     dosing = (
         p.co2_capacity
-        * clip(xp, missing / s.co2_band + 0.3 * (missing > 0.0), 0.0, 1.0)
+        * clip(xp, missing / s.co2_band, 0.0, 1.0)
         * ramp(xp, opening, s.co2_vent_stop, 0.2 * s.co2_vent_stop)
         * lit
     )
@@ -267,10 +265,6 @@ def control(
     )
 
 
-def _move(xp: Any, position: Array, target: Array, travel: float, dead_band: float) -> Array:
-    """Return the position after a drive has moved towards the target by at most `travel`; none in the dead band."""
-    difference = target - position
-    step = clip(xp, difference, -travel, travel)
-    # The ends are always reached, else a vent would stay ajar.
-    shut = (target <= 0.0) | (target >= 1.0)
-    return position + xp.where((xp.abs(difference) > dead_band) | shut, step, 0.0 * step)
+def _move(xp: Any, position: Array, target: Array, travel: float) -> Array:
+    """Return the position after a drive has moved towards the target by at most `travel`."""
+    return position + clip(xp, target - position, -travel, travel)

@@ -53,7 +53,7 @@ class HiddenEffect:
     size: float | None = None
     """Amplitude in the unit of the effect's first parameter; None is its typical value."""
     start: np.datetime64 | None = None
-    """When it begins, UTC; None is from the first moment."""
+    """When it begins, UTC; None is with the plant's first moment."""
     exponent: float = 1.0
     """The contribution goes with this power of its driver; it is right at `REFERENCE_DRIVERS`."""
     threshold: float | None = None
@@ -79,7 +79,13 @@ class HiddenEffect:
 class EffectBank:
     """All hidden effects of a plant, those of one name evaluated together for the whole batch."""
 
-    def __init__(self, xp: Any, effects: Sequence[HiddenEffect] | Sequence[Sequence[HiddenEffect]], count: int | None):
+    def __init__(
+        self,
+        xp: Any,
+        effects: Sequence[HiddenEffect] | Sequence[Sequence[HiddenEffect]],
+        count: int | None,
+        begin: float,
+    ) -> None:
         self.xp = xp
         rows: list[list[HiddenEffect]]
         rows = [list(entry) if isinstance(entry, Sequence) else [entry] for entry in effects]
@@ -89,7 +95,7 @@ class EffectBank:
             raise IgrowError(f"hidden effects: {len(rows)} lists for {count} greenhouses; one list each is needed")
         if count is None and len(rows) != 1:
             raise IgrowError("hidden effects: one greenhouse takes one flat list of effects")
-        self._entries = [_Entry(xp, slots, count) for slots in _by_name(rows)]
+        self._entries = [_Entry(xp, slots, count, begin) for slots in _by_name(rows)]
         self.drivers = frozenset(name for entry in self._entries for name in entry.effect.drivers)
 
     def __bool__(self) -> bool:
@@ -119,7 +125,7 @@ def _by_name(rows: list[list[HiddenEffect]]) -> list[list[HiddenEffect | None]]:
 
 
 class _Entry:
-    def __init__(self, xp: Any, slots: list[HiddenEffect | None], count: int | None):
+    def __init__(self, xp: Any, slots: list[HiddenEffect | None], count: int | None, begin: float) -> None:
         self.xp = xp
         example = next(slot for slot in slots if slot is not None)
         self.effect = example.definition
@@ -136,7 +142,7 @@ class _Entry:
             for shape in self.effect.shapes
         }
         self.start = column(
-            lambda slot: -np.inf if slot is None or slot.start is None else float(unix_seconds(slot.start))
+            lambda slot: begin if slot is None or slot.start is None else float(unix_seconds(slot.start))
         )
         self.exponent = column(lambda slot: 1.0 if slot is None else slot.exponent)
         self.threshold = column(lambda slot: 0.0 if slot is None or slot.threshold is None else slot.threshold)

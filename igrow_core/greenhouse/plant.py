@@ -33,6 +33,8 @@ from igrow_core.greenhouse.tomato import Crop
 from igrow_core.greenhouse.weather_table import WeatherRow, WeatherTable
 from igrow_core.sun import position
 
+SCAN = 60.0
+"""Time between two decisions of the climate computer, s; as on many PLCs, and independent of the climate's step."""
 TICK = 60.0
 """Longest time step of the climate, s."""
 SLOW = 300.0
@@ -67,6 +69,8 @@ class PlantState:
     crop_seconds: float
     crop_rates: tomato.Rates
     deleafed_day: int
+    scan: int
+    """Number of the climate computer's last decision."""
     disturbance: list[Array]
     """Heat W m-2, vapour and CO2 kg m-2 s-1 into the air."""
     noise: dict[str, Array]
@@ -108,12 +112,13 @@ class Plant:
         self.sensors = sensors or Sensors()
         self.computer = computer or ClimateComputer()
         self.tick = tick
-        self.effects = EffectBank(self.xp, effects, count) if effects else None
+        self.effects = EffectBank(self.xp, effects, count, start) if effects else None
         self._innovated = any((self.disturbances.heat, self.disturbances.vapour, self.disturbances.co2))
         like: Array = 1.0 if count is None else np.ones(count)
         now = weather.at(start)
         grown = (tomato.mature_crop if crop == "mature" else tomato.young_crop)(parameters, like)
         rest = climate.initial(self.xp, 19.0 * like, 75.0 * like, 550.0 * like, now.outdoor_temperature * like)
+        crop_rates = tomato.rates(self.xp, parameters, grown, 19.0 * like)
         self.state = PlantState(
             seconds=start,
             climate=initial or rest,
@@ -122,13 +127,14 @@ class Plant:
             slab=0.9 * parameters.slab_capacity * like,
             transpiration=0.0 * like,
             assimilation=0.0 * like,
-            respiration=0.0 * like,
+            respiration=crop_rates.respiration,
             light=None,
             assimilated=0.0 * like,
             warmth=0.0 * like,
             crop_seconds=0.0,
-            crop_rates=tomato.rates(self.xp, parameters, grown, 19.0 * like),
+            crop_rates=crop_rates,
             deleafed_day=_picking_day(start, parameters.longitude),
+            scan=-1,
             disturbance=[0.0 * like] * 3,
             noise={},
             sensor_errors={},
@@ -145,9 +151,8 @@ class Plant:
         end = self.state.seconds + seconds
         while self.state.seconds < end - 1e-6:
             boundary = (self.state.seconds // SLOW + 1.0) * SLOW
-            step = min(self.tick, end - self.state.seconds, boundary - self.state.seconds)
-            # A sliver left by rounding would only cost time.
-            self._tick(step, setpoints)
+            scan = (self.state.seconds // SCAN + 1.0) * SCAN
+            self._tick(min(self.tick, end - self.state.seconds, scan - self.state.seconds), setpoints)
             if boundary - self.state.seconds < 1e-6:
                 self._slow_step()
 
@@ -155,7 +160,10 @@ class Plant:
         xp, p, s = self.xp, self.parameters, self.state
         weather = self.weather.at(s.seconds + 0.5 * seconds)
         area = self._area
-        s.control = control(xp, self.computer, p, s.control, setpoints, self._readings(weather), seconds)
+        scan = int(s.seconds // SCAN)
+        if scan != s.scan:
+            s.scan = scan
+            s.control = control(xp, self.computer, p, s.control, setpoints, self._readings(self.weather.at(s.seconds)), SCAN)
         c = s.control
         air = s.climate.air
         ppm = co2_fraction(air, s.climate.co2)
