@@ -4,8 +4,9 @@ For each point, in this order:
 
 1. a request that is no number is refused;
 2. absolute limits cut it;
-3. interlocks force it between their bounds, the earlier interlock first;
-4. slew lets a ramp run towards it (an interlock that forces the value does not wait for the ramp);
+3. slew lets a ramp run towards it;
+4. interlocks force it between their bounds at once, the earlier interlock first, also when only the ramp, or what
+   stands in the PLC, is outside them;
 5. a change by hand at the PLC is left alone while it is respected (an interlock still comes first);
 6. dead band, minimum interval and daily budget say whether this is the moment to write.
 
@@ -162,6 +163,16 @@ def with_earlier_writes(state: GuardState, writes: Mapping[str, Sequence[float]]
 
 
 @dataclass(slots=True)
+class _Bounds:
+    """What limits and interlocks leave, and which interlock set each side."""
+
+    low: float
+    high: float
+    low_by: Force | None = None
+    high_by: Force | None = None
+
+
+@dataclass(slots=True)
 class _Point:
     """One point in one cycle."""
 
@@ -182,34 +193,30 @@ class _Point:
         clamps: list[Clamp],
     ) -> PointState:
         """Add to writes and clamps; return the point's new memory."""
-        if request is None:
-            # Nobody asks: the point stays as it is, unless an interlock forces it away from there.
-            stands = self.current if self.current is not None else self.memory.written
-            if stands is None or not math.isfinite(stands):
-                stands = self.rule.safe
-            target = self._forced(_Target(stands), forces)
-            requested, source = None, "interlock"
+        bounds = self._bounds(forces)
+        if request is None or (held is not None and not stopping):
+            # Nobody asks, or a hand asked last: the point stays as it is, unless an interlock forces it away.
+            target = self._forced(_Target(self._standing()), bounds)
+            if request is not None and not target.urgent:
+                text = f"changed by hand at the PLC, respected for {(held or 0.0) / 60:.0f} min more"
+                clamps.append(Clamp(self.name, request.value, self.current, text, "hand", request.source))
             if not target.urgent:
                 return self._rested()
         else:
-            target = self._forced(self._limited(request.value), forces)
-            requested, source = request.value, request.source
-            if held is not None and not stopping and not target.urgent:
-                text = f"changed by hand at the PLC, respected for {held / 60:.0f} min more"
-                clamps.append(Clamp(self.name, requested, self.current, text, "hand", source))
-                return self._rested()
-        if stopping:
-            target.urgent = True
-        value = target.value
-        if not target.urgent:
-            value = self._ramped(value)
-            if abs(value - target.value) > 1e-9:
-                slew = f"slew of {3600 * (self.rule.slew or 0.0):g} per hour on the way to {target.value:g}"
-                target.reason = f"{target.reason}; {slew}" if target.reason else slew
-                target.kind = target.kind or "slew"
+            target = self._limited(request.value)
+            if not stopping:
+                self._ramp(target)
+            target = self._forced(target, bounds)
+            target.urgent |= stopping
+        requested = None if request is None else request.value
+        source = "interlock" if request is None else request.source
         if target.kind:
-            clamps.append(Clamp(self.name, requested, value, target.reason, target.kind, source))
-        return self._written(value, target, requested, source, writes, clamps)
+            clamps.append(Clamp(self.name, requested, target.value, target.reason, target.kind, source))
+        return self._written(target, requested, source, writes, clamps)
+
+    def _standing(self) -> float:
+        stands = self.current if self.current is not None else self.memory.written
+        return stands if stands is not None and math.isfinite(stands) else self.rule.safe
 
     def _limited(self, value: float) -> _Target:
         if value < self.rule.low:
@@ -218,31 +225,43 @@ class _Point:
             return _Target(self.rule.high, "limit", f"above the limit of {self.rule.high:g}")
         return _Target(value)
 
-    def _forced(self, target: _Target, forces: list[Force]) -> _Target:
-        low, high = self.rule.low, self.rule.high
-        by: tuple[Force | None, Force | None] = (None, None)
+    def _bounds(self, forces: list[Force]) -> _Bounds:
+        bounds = _Bounds(self.rule.low, self.rule.high)
         for force in forces:
             bound = force.bounds.get(self.name)
             if bound is None:
                 continue
-            wants_low, wants_high = bound.limits(self.rule.safe)
+            low, high = bound.limits(self.rule.safe)
             # Later interlocks may only narrow what earlier ones left.
-            if wants_low > low:
-                low, by = min(wants_low, high), (force, by[1])
-            if wants_high < high:
-                high, by = max(wants_high, low), (by[0], force)
-        value = min(max(target.value, low), high)
-        cause = by[0] if value > target.value else by[1]
-        if value == target.value or cause is None:
-            return target
-        return _Target(value, "interlock", f"interlock {cause.name}: {cause.why}", urgent=True)
+            if low > bounds.low:
+                bounds.low, bounds.low_by = min(low, bounds.high), force
+            if high < bounds.high:
+                bounds.high, bounds.high_by = max(high, bounds.low), force
+        return bounds
 
-    def _ramped(self, target: float) -> float:
-        start = self._start()
+    def _forced(self, target: _Target, bounds: _Bounds) -> _Target:
+        """Bring the target between the bounds; it is urgent when it, or what stands in the PLC, is not there."""
+        value = min(max(target.value, bounds.low), bounds.high)
+        cause = bounds.low_by if value > target.value else bounds.high_by
+        if value != target.value and cause is not None:
+            return _Target(value, "interlock", f"interlock {cause.name}: {cause.why}", urgent=True)
+        stands = self._standing()
+        cause = bounds.low_by if stands < bounds.low else bounds.high_by if stands > bounds.high else None
+        if cause is not None and not self.rule.same(stands, value):
+            return _Target(value, "interlock", f"interlock {cause.name}: {cause.why}", urgent=True)
+        return _Target(value, target.kind, target.reason)
+
+    def _ramp(self, target: _Target) -> None:
+        """Move the target to where the slew lets the point be by now."""
         if self.rule.slew is None:
-            return target
-        step = self.rule.slew * self.passed
-        return min(max(target, start - step), start + step)
+            return
+        start, step = self._start(), self.rule.slew * self.passed
+        value = min(max(target.value, start - step), start + step)
+        if abs(value - target.value) > 1e-9:
+            slew = f"slew of {3600 * self.rule.slew:g} per hour on the way to {target.value:g}"
+            target.reason = f"{target.reason}; {slew}" if target.reason else slew
+            target.kind = target.kind or "slew"
+        target.value = value
 
     def _start(self) -> float:
         """Where the ramp stands: a value within the limits, taken from the PLC when we do not know better."""
@@ -260,7 +279,6 @@ class _Point:
 
     def _written(
         self,
-        value: float,
         target: _Target,
         requested: float | None,
         source: str,
@@ -268,7 +286,7 @@ class _Point:
         clamps: list[Clamp],
     ) -> PointState:
         """Write now, or say what stands against it."""
-        rule, memory, budget = self.rule, self.memory, self._recent()
+        rule, memory, budget, value = self.rule, self.memory, self._recent(), target.value
         waiting = PointState(value, memory.written, memory.written_at, budget)
         since = self.now - memory.written_at
         due = rule.refresh is not None and since >= rule.refresh

@@ -63,19 +63,19 @@ class ImageBuilder:
 
     def build(self, readings: Mapping[str, RawReading], monotonic: float, true_time: float | None) -> Image:
         """Return the image of this cycle. `readings` may lack points that were not due."""
-        fresh = False
+        answered = False
         values: dict[str, Value] = {}
         for name, track in self._tracks.items():
             reading = readings.get(name)
             if reading is not None:
-                fresh |= _take(track, reading, monotonic)
+                answered |= _take(track, reading, monotonic)
             values[name] = _judge(track, monotonic)
         sun = self._sun_elevation(true_time) if self._sun_elevation and true_time is not None else None
         for name, why in suspects(PAIR_CHECKS, PairContext(values, sun)):
             values[name] = _suspected(values[name], why)
         for twin in self._twins:
             twin.compare(values)
-        return Image(monotonic, true_time, values, link_ok=fresh or not readings)
+        return Image(monotonic, true_time, values, link_ok=answered or not readings)
 
 
 def _suspected(value: Value, why: str) -> Value:
@@ -83,12 +83,12 @@ def _suspected(value: Value, why: str) -> Value:
 
 
 def _take(track: _Track, reading: RawReading, now: float) -> bool:
-    """Remember a reading; tell whether it is a new successful one."""
+    """Remember a reading; tell whether the point answered."""
     if reading.error is not None or reading.value is None:
         track.error = str(reading.error) if reading.error is not None else "no value"
         return False
     if reading.at == track.reading_at:
-        return False
+        return True
     track.reading_at = reading.at
     track.error = ""
     value = float(reading.value)

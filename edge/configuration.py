@@ -1,0 +1,318 @@
+"""The daemon's configuration: one YAML file that names the site, the register map and where things are kept.
+
+`load_configuration` reads all three files and checks them against each other, so that a daemon that starts (or
+reloads) with them finds nothing wrong later. Paths are relative to the file that names them.
+"""
+
+# ruff: noqa: RUF009 - `setting` makes a dataclass field
+
+from __future__ import annotations
+
+import datetime
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from zoneinfo import ZoneInfo
+
+from edge.guard import DEFAULT_INTERLOCKS, Bound, GuardRules, Interlock
+from edge.guard.interlocks import SAFE, InterlockError
+from edge.point_rules import point_rules
+from edge.registers.loading import load_register_map
+from edge.registers.model import SYSTEM_POINTS, RegisterMap
+from edge.sensors.rules import SensorRule, default_rule
+from edge.sources.recipe import Recipe
+from igrow_core.errors import IgrowError
+from igrow_core.local_time import zone
+from igrow_core.quantities import ACTUATORS, QUANTITIES, SETPOINTS
+from igrow_core.site import SetpointLimits, Site, load_site
+from igrow_core.yaml_schema import SettingError, load, setting
+
+_SECOND = datetime.timedelta(seconds=1)
+_MINUTE = datetime.timedelta(minutes=1)
+_HOUR = datetime.timedelta(hours=1)
+_DAY = datetime.timedelta(days=1)
+
+
+class ConfigurationError(IgrowError):
+    """Site, register map and daemon file do not fit together."""
+
+
+class ClockSource(Enum):
+    """Whose clock the daemon follows."""
+
+    SYSTEM = "system"
+    PLC = "plc"
+
+
+@dataclass(frozen=True)
+class CycleSettings:
+    """The pace of control."""
+
+    interval: datetime.timedelta = setting(
+        low=_SECOND, high=10 * _MINUTE, default=10 * _SECOND, help="time between two cycles"
+    )
+    clock: ClockSource = setting(
+        default=ClockSource.SYSTEM, help="plc follows the register plc_clock: for simulated plants, faster than time"
+    )
+    confirm_within: datetime.timedelta = setting(
+        low=_SECOND, high=_HOUR, default=_MINUTE, help="time for a write to show in a later reading"
+    )
+    respect_hand: datetime.timedelta = setting(
+        low=datetime.timedelta(0), high=7 * _DAY, default=2 * _HOUR, help="how long a change at the PLC is respected"
+    )
+
+
+@dataclass(frozen=True)
+class BoundSettings:
+    """What an engaged interlock leaves to a point."""
+
+    low: str | None = setting(default=None, help="smallest value: a number, or safe")
+    high: str | None = setting(default=None, help="largest value: a number, or safe")
+
+    def __post_init__(self) -> None:
+        for key, text in (("low", self.low), ("high", self.high)):
+            if text is not None and text != SAFE:
+                try:
+                    float(text)
+                except ValueError:
+                    raise SettingError(f"{key} is {text}: a number or safe is needed", key) from None
+
+    def bound(self) -> Bound:
+        """Return the guard's bound."""
+        return Bound(*(text if text is None or text == SAFE else float(text) for text in (self.low, self.high)))
+
+
+@dataclass(frozen=True)
+class InterlockSettings:
+    """One interlock; they are listed in order of precedence."""
+
+    name: str = setting(help="short name, for the ledger")
+    quantity: str = setting(help="what it watches: a quantity or a system point of the register map")
+    above: float | None = setting(default=None, help="engages above this value")
+    below: float | None = setting(default=None, help="or engages below this value")
+    release: float = setting(help="lets go when the value is back beyond this")
+    bounds: Mapping[str, BoundSettings] = setting(
+        keys=(*SETPOINTS, *ACTUATORS), help="what it leaves to each point while engaged"
+    )
+    when_unknown: Mapping[str, BoundSettings] = setting(
+        keys=(*SETPOINTS, *ACTUATORS), default_factory=dict, help="bounds while the quantity cannot be believed"
+    )
+    why: str = setting(default="", help="one line for people")
+
+    def __post_init__(self) -> None:
+        known = (*QUANTITIES, *SYSTEM_POINTS)
+        if self.quantity not in known:
+            raise SettingError(f"quantity is {self.quantity}: a quantity or a system point is needed", "quantity")
+        try:
+            self.interlock()
+        except InterlockError as error:
+            raise SettingError(str(error), "release") from None
+
+    def interlock(self) -> Interlock:
+        """Return the guard's interlock."""
+        return Interlock(
+            self.name,
+            self.quantity,
+            {name: bound.bound() for name, bound in self.bounds.items()},
+            self.above,
+            self.below,
+            self.release,
+            {name: bound.bound() for name, bound in self.when_unknown.items()},
+            self.why,
+        )
+
+
+@dataclass(frozen=True)
+class GuardSettings:
+    """What the guard knows beside the site's limits of the setpoints."""
+
+    points: Mapping[str, SetpointLimits] = setting(
+        keys=ACTUATORS, default_factory=dict, help="limits of writable points that are no setpoints, such as vents"
+    )
+    interlocks: tuple[InterlockSettings, ...] | None = setting(
+        default=None, help="interlocks in order of precedence; null takes the built-in ones"
+    )
+    non_volatile_daily_budget: int = setting(
+        low=2, high=1000, default=48, help="writes a day to a register that wears out"
+    )
+
+
+@dataclass(frozen=True)
+class SensorSettings:
+    """How one sensor differs from the table of what sensors do; null keeps the table's value."""
+
+    rate: float | None = setting(low=0, default=None, help="fastest true change per minute, in its unit")
+    jump: float | None = setting(low=0, default=None, help="change allowed at once, in its unit")
+    frozen_after: datetime.timedelta | None = setting(low=_MINUTE, default=None, help="longest true standstill")
+    stale_after: datetime.timedelta | None = setting(low=_SECOND, default=None, help="age that makes it stale")
+    missing_after: datetime.timedelta | None = setting(low=_SECOND, default=None, help="age that makes it missing")
+
+
+@dataclass(frozen=True)
+class PlanningSettings:
+    """How plans are made on this gateway; their pace and horizon are the site's."""
+
+    enabled: bool = setting(default=True, help="false leaves control to the recipe")
+    history: datetime.timedelta = setting(
+        low=_DAY, high=30 * _DAY, default=4 * _DAY, help="how much of the log a plan starts from"
+    )
+    step: datetime.timedelta = setting(low=10 * _MINUTE, high=2 * _HOUR, default=_HOUR, help="step of a plan")
+    timeout: datetime.timedelta = setting(
+        low=_SECOND, high=6 * _HOUR, default=10 * _MINUTE, help="longest time that one plan may take"
+    )
+    forecast: str | None = setting(default=None, help="file with a weather forecast, as telemetry; null: persistence")
+    seed: int = setting(low=0, default=1, help="seed of the planner's random numbers")
+
+
+@dataclass(frozen=True)
+class StatusSettings:
+    """The page, the health endpoint and the metrics."""
+
+    port: int = setting(low=0, high=65535, default=8420, help="TCP port on localhost; 0 takes a free one")
+
+
+@dataclass(frozen=True)
+class UpdateSettings:
+    """How new bundles are taken."""
+
+    enabled: bool = setting(default=True, help="false keeps the bundle in force")
+    shadow: datetime.timedelta = setting(
+        low=_HOUR, high=30 * _DAY, default=2 * _DAY, help="how long a new bundle runs in the shadow"
+    )
+    trusted_root: str | None = setting(default=None, help="root.json of the trainer's signing keys")
+
+
+@dataclass(frozen=True)
+class DaemonFile:
+    """The whole file."""
+
+    site: str = setting(help="the site's file")
+    register_map: str = setting(help="the register map's file")
+    state: str = setting(default="/var/lib/igrow-edge", help="folder for the log, leases and bundles")
+    exchange: str | None = setting(default=None, help="folder shared with the trainer, or null")
+    bundle: str | None = setting(default=None, help="folder of the bundle to begin with, or null")
+    cycle: CycleSettings = setting(default_factory=CycleSettings, help="pace of control")
+    guard: GuardSettings = setting(default_factory=GuardSettings, help="limits and interlocks")
+    sensors: Mapping[str, SensorSettings] = setting(
+        keys=QUANTITIES, default_factory=dict, help="sensors that differ from the table"
+    )
+    recipe: Recipe = setting(default_factory=Recipe, help="what rules when no plan does")
+    planning: PlanningSettings = setting(default_factory=PlanningSettings, help="planning")
+    updates: UpdateSettings = setting(default_factory=UpdateSettings, help="new bundles")
+    status: StatusSettings = setting(default_factory=StatusSettings, help="status page")
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """Everything that the daemon runs by, checked and put together."""
+
+    path: Path
+    file: DaemonFile
+    site: Site
+    register_map: RegisterMap
+    guard_rules: GuardRules
+    sensor_rules: Mapping[str, SensorRule]
+    setpoints: tuple[str, ...]
+    """Setpoints that the PLC takes, in the registry's order."""
+
+    @property
+    def zone(self) -> ZoneInfo:
+        """The site's time zone."""
+        return zone(self.site.time_zone)
+
+    @property
+    def state_folder(self) -> Path:
+        """Where the daemon keeps its memory."""
+        return self._folder(self.file.state)
+
+    @property
+    def exchange_folder(self) -> Path | None:
+        """Where the trainer is met, or None."""
+        return None if self.file.exchange is None else self._folder(self.file.exchange)
+
+    @property
+    def bundle_folder(self) -> Path | None:
+        """The bundle to begin with, or None."""
+        return None if self.file.bundle is None else self._folder(self.file.bundle)
+
+    @property
+    def forecast_file(self) -> Path | None:
+        """The weather forecast, or None."""
+        forecast = self.file.planning.forecast
+        return None if forecast is None else self._folder(forecast)
+
+    def _folder(self, text: str) -> Path:
+        return self.path.parent / text
+
+
+def load_configuration(path: str | os.PathLike[str]) -> Configuration:
+    """Read the daemon's file and those that it names.
+
+    Raises SchemaError for an error inside a file and ConfigurationError when the files do not fit together.
+    """
+    path = Path(path)
+    file = load(path, DaemonFile)
+    site = load_site(path.parent / file.site)
+    register_map = load_register_map(path.parent / file.register_map)
+    return put_together(path, file, site, register_map)
+
+
+def put_together(path: Path, file: DaemonFile, site: Site, register_map: RegisterMap) -> Configuration:
+    """Check the parts against each other. Raises ConfigurationError."""
+    points = register_map.points
+    setpoints = tuple(name for name in SETPOINTS if name in points and points[name].writable)
+    missing = [name for name in site.setpoints if name not in setpoints]
+    if missing:
+        raise ConfigurationError(
+            f"{register_map.path or register_map.title}: the site commands {', '.join(missing)}, which this map has no "
+            "writable point for; add the point, or take it out of `setpoints` in the site's file"
+        )
+    if file.cycle.clock is ClockSource.PLC and "plc_clock" not in points:
+        raise ConfigurationError(f"{path}: `clock: plc` needs the point plc_clock in the register map")
+    setpoints = tuple(name for name in setpoints if name in site.setpoints)
+    for name in file.guard.points:
+        if name not in points or not points[name].writable:
+            raise ConfigurationError(f"{path}: guard.points has {name}, which the register map cannot write")
+    limits = {name: site.limits[name] for name in setpoints} | dict(file.guard.points)
+    rules = point_rules(limits, points, file.guard.non_volatile_daily_budget)
+    settings = file.guard.interlocks
+    interlocks = DEFAULT_INTERLOCKS if settings is None else tuple(entry.interlock() for entry in settings)
+    return Configuration(
+        path=path,
+        file=file,
+        site=site,
+        register_map=register_map,
+        guard_rules=GuardRules(rules, interlocks),
+        sensor_rules=sensor_rules(register_map, file),
+        setpoints=setpoints,
+    )
+
+
+def sensor_rules(register_map: RegisterMap, file: DaemonFile) -> dict[str, SensorRule]:
+    """Return the rule of each point that can be read: the table's, changed by the file."""
+    interval = file.cycle.interval.total_seconds()
+    rules = {}
+    for name, point in register_map.points.items():
+        rule = default_rule(name, poll_period=max(point.poll, interval), low=point.low, high=point.high)
+        own = file.sensors.get(name)
+        rules[name] = rule if own is None else _changed(rule, own)
+    return rules
+
+
+def _changed(rule: SensorRule, own: SensorSettings) -> SensorRule:
+    def seconds(given: datetime.timedelta | None, otherwise: float) -> float:
+        return otherwise if given is None else given.total_seconds()
+
+    return SensorRule(
+        low=rule.low,
+        high=rule.high,
+        rate=rule.rate if own.rate is None else own.rate / 60.0,
+        jump=rule.jump if own.jump is None else own.jump,
+        frozen_after=seconds(own.frozen_after, rule.frozen_after),
+        still_low=rule.still_low,
+        still_high=rule.still_high,
+        stale_after=seconds(own.stale_after, rule.stale_after),
+        missing_after=seconds(own.missing_after, rule.missing_after),
+    )

@@ -1,0 +1,67 @@
+"""From limits and registers to the guard's rules: what is allowed, cut to what each register can hold.
+
+A register rounds. So that no rounding leaves the limits, these are first cut to values that the register shows
+exactly; between two such values rounding stays between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from edge.guard.rules import GuardRuleError, PointRule
+from edge.registers.codec import decode, encode
+from edge.registers.model import DataType, Point
+from igrow_core.site import SetpointLimits
+
+_FLOATS = (DataType.FLOAT32, DataType.FLOAT64)
+
+
+def point_rules(
+    limits: Mapping[str, SetpointLimits], points: Mapping[str, Point], daily_budget: int
+) -> dict[str, PointRule]:
+    """Return the guard's rule of each point in `limits`; raises GuardRuleError for limits that leave nothing."""
+    return {name: _rule(limit, points[name], daily_budget) for name, limit in limits.items()}
+
+
+def _rule(limit: SetpointLimits, point: Point, daily_budget: int) -> PointRule:
+    low = _representable(point, max(limit.low, point.low), upward=True)
+    high = _representable(point, min(limit.high, point.high), upward=False)
+    if not low <= high:
+        raise GuardRuleError(
+            f"{point.name}: limits {limit.low:g} to {limit.high:g} leave nothing of the register's {point.low:g} "
+            f"to {point.high:g}; widen one of them"
+        )
+    if not low <= limit.safe <= high:
+        raise GuardRuleError(
+            f"{point.name}: the safe value {limit.safe:g} is outside what the register takes, {low:g} to {high:g}"
+        )
+    return PointRule(
+        low=low,
+        high=high,
+        safe=limit.safe,
+        slew=None if limit.slew is None else limit.slew / 3600.0,
+        dead_band=limit.dead_band,
+        minimum_interval=limit.minimum_interval.total_seconds(),
+        # Half of the register's memory, so that one lost write does not let it revert.
+        refresh=None if point.refresh is None else 0.5 * point.refresh,
+        daily_budget=daily_budget if point.non_volatile else None,
+        resolution=_resolution(point),
+    )
+
+
+def _resolution(point: Point) -> float:
+    return 1e-6 if point.type in _FLOATS else abs(point.scale)
+
+
+def _representable(point: Point, bound: float, *, upward: bool) -> float:
+    """Return the nearest value on the allowed side of `bound` that the register shows exactly."""
+    value = bound
+    for _ in range(3):
+        shown = decode(point, encode(point, value))
+        if shown is None:
+            break
+        if shown >= bound if upward else shown <= bound:
+            return shown
+        step = _resolution(point) if point.type not in _FLOATS else max(abs(bound), 1e-30) * 2.0**-22
+        value = value + step if upward else value - step
+    return value

@@ -1,0 +1,159 @@
+"""A PLC and the services of the gateway, with a few lines each, for tests of the control cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from edge.bus.errors import BusError, NoAnswerError
+from edge.bus.plc import Reading
+from edge.clock import FakeClock
+from edge.cycle import ControlCycle
+from edge.guard import GuardedWriter, GuardRules, Interlock, PointRule, Readback
+from edge.image import Image, Quality, Value
+from edge.journal import Journal
+from edge.ports import AlarmRecord, WriteRecord
+from edge.sensors import ImageBuilder, SensorRule
+from edge.sources import HandsOff, Source
+from igrow_core.telemetry import Telemetry
+
+SETPOINTS = ("heating_setpoint", "co2_setpoint")
+
+HEATING = PointRule(low=12.0, high=28.0, safe=18.0, slew=4.0 / 3600.0, dead_band=0.1, minimum_interval=300.0)
+CO2 = PointRule(low=400.0, high=1000.0, safe=400.0, slew=None, dead_band=10.0, minimum_interval=60.0)
+
+
+class FakePlc:
+    """Registers in a dictionary. `silent` plays a dead line, `ignores` points that take no write."""
+
+    def __init__(self, clock: FakeClock, values: Mapping[str, float]) -> None:
+        self.clock = clock
+        self.values = dict(values)
+        self.silent = False
+        self.ignores: set[str] = set()
+        self.write_error: BusError | None = None
+        self.writes: list[tuple[float, str, float]] = []
+
+    async def read(self, names: Collection[str] | None = None) -> Mapping[str, Reading]:
+        now = self.clock.monotonic()
+        wanted = self.values if names is None else names
+        if self.silent:
+            return {name: Reading(None, NoAnswerError("no answer"), now) for name in wanted}
+        return {name: Reading(self.values[name], None, now) for name in wanted}
+
+    async def write(self, name: str, value: float) -> None:
+        if self.write_error is not None:
+            raise self.write_error
+        if self.silent:
+            raise NoAnswerError("no answer")
+        self.writes.append((self.clock.monotonic(), name, value))
+        if name not in self.ignores:
+            self.values[name] = value
+
+    async def close(self) -> None:
+        return
+
+    def written(self, name: str) -> list[float]:
+        return [value for _, point, value in self.writes if point == name]
+
+
+@dataclass
+class MemoryStore:
+    """Keeps every record in a list."""
+
+    rows: list[tuple[float, Mapping[str, Value]]] = field(default_factory=list)
+    events: list[tuple[str, Mapping[str, object]]] = field(default_factory=list)
+    writes: list[WriteRecord] = field(default_factory=list)
+    alarms: list[AlarmRecord] = field(default_factory=list)
+    health: str = ""
+
+    def append(self, time: float, values: Mapping[str, Value]) -> None:
+        self.rows.append((time, values))
+
+    def record_event(self, time: float | None, kind: str, detail: Mapping[str, object]) -> None:
+        self.events.append((kind, dict(detail)))
+
+    def record_write(self, record: WriteRecord) -> None:
+        self.writes.append(record)
+
+    def record_alarm(self, record: AlarmRecord) -> None:
+        self.alarms.append(record)
+
+    def writes_of_last_day(self) -> Sequence[WriteRecord]:
+        return [record for record in self.writes if record.outcome == "written"]
+
+    def telemetry(self, start: float, end: float) -> Telemetry:
+        return Telemetry(np.array([], dtype="datetime64[s]"), {})
+
+    def close(self) -> None:
+        return
+
+    def kinds(self) -> list[str]:
+        return [kind for kind, _ in self.events]
+
+
+@dataclass
+class FixedSource:
+    """Offers what it is told to."""
+
+    setpoints: dict[str, float]
+    name: str = "plan"
+
+    def offer(self, image: Image):
+        from edge.sources import Offer
+
+        return Offer("as told", self.setpoints)
+
+
+@dataclass
+class Bench:
+    """A cycle on a fake PLC, with everything at hand."""
+
+    clock: FakeClock
+    plc: FakePlc
+    store: MemoryStore
+    journal: Journal
+    cycle: ControlCycle
+
+    async def run(self, cycles: int = 1, seconds: float = 10.0) -> None:
+        for _ in range(cycles):
+            self.clock.advance(seconds)
+            self.result = await self.cycle.run()
+
+
+def make_bench(
+    *,
+    values: Mapping[str, float] | None = None,
+    source: Source | None = None,
+    rules: Mapping[str, PointRule] | None = None,
+    interlocks: tuple[Interlock, ...] = (),
+    respect_hand: float = 7200.0,
+) -> Bench:
+    clock = FakeClock()
+    registers = {"air_temperature": 20.0, "heating_setpoint": 18.0, "co2_setpoint": 400.0, "heartbeat": 0.0}
+    plc = FakePlc(clock, registers | dict(values or {}))
+    store = MemoryStore()
+    journal = Journal(store)
+    points = dict(rules or {"heating_setpoint": HEATING, "co2_setpoint": CO2})
+    safe = {name: rule.safe for name, rule in points.items()}
+    sources = [source, HandsOff(safe)] if source is not None else [HandsOff(safe)]
+    cycle = ControlCycle(
+        plc,
+        clock,
+        ImageBuilder({name: SensorRule(-1e6, 1e6, stale_after=30.0) for name in plc.values}),
+        sources,
+        GuardRules(points, interlocks),
+        Readback(points, confirm_within=60.0, respect_hand=respect_hand),
+        GuardedWriter(plc, has_heartbeat=True),
+        journal,
+        setpoints=tuple(points),
+        respect_hand=respect_hand,
+    )
+    return Bench(clock, plc, store, journal, cycle)
+
+
+def image_of(monotonic: float = 0.0, true_time: float | None = 1.7e9, **values: float) -> Image:
+    """An image of good values."""
+    return Image(monotonic, true_time, {name: Value(value, Quality.GOOD, 0.0) for name, value in values.items()})
