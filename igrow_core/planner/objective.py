@@ -32,8 +32,9 @@ HARM_PER_DEGREE_HOUR = 0.002
 DELAY_PER_DEGREE_DAY = 0.02
 """EUR m-2 for each kelvin that the mean of 24 h lies below the crop's bound: some 5 % of a summer day's income
 per kelvin, as much as fruit development slows down."""
-OUTSIDE_PENALTY = 0.05
-"""EUR m-2 for a day spent one range-width outside the data that the simulator knows."""
+OUTSIDE_PENALTY = 0.2
+"""EUR m-2 for a day spent one width of the range outside the data that the simulator knows: more than a plan of a
+day can hope to gain."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,131 @@
+"""The search: it beats the recipe by the simulator's own word, never does worse, and heeds doubt and range."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from toy_greenhouse import HOURS, START, ToySimulator, with_planning
+
+from igrow_core.errors import IgrowError
+from igrow_core.planner import Budget, NumpyGeneration, Objective, PlanningState, optimise
+from igrow_core.planner.objective import Simulator
+from igrow_core.planner.onnx_generation import OnnxGeneration
+from igrow_core.site import Site
+
+QUICK = Budget(generations=40, patience=15)
+
+
+def plan(
+    simulator: Simulator, site: Site, state: PlanningState, weather: np.ndarray, recipe: np.ndarray, seed: int = 0
+):
+    return optimise(simulator, site, state, weather, recipe, np.random.default_rng(seed), QUICK)
+
+
+def test_a_plan_earns_more_than_the_recipe(site, state, weather, recipe) -> None:
+    result = plan(ToySimulator(), site, state, weather, recipe)
+    assert result.expected_profit > result.recipe_profit + 0.005
+    assert not result.follows_recipe
+    assert (np.diff(result.history) >= 0).all()
+    assert result.setpoints.shape == (HOURS, 4)
+    assert result.expected_profit == pytest.approx(float(result.valuation.profit[0, 0]))
+
+
+def test_the_search_comes_near_the_best_that_a_full_search_of_one_setpoint_finds(site, state, weather, recipe) -> None:
+    only = with_planning(site, optimise=("lamp_on",))
+    result = plan(ToySimulator(), only, state, weather, recipe)
+    objective = Objective(only, result.time)
+    hours = np.arange(HOURS)
+    best = result.recipe_valuation.score[0, 0]
+    chosen = recipe.copy()
+    # The toy's lamp hours do not act on one another, so each hour can be tried alone.
+    for hour in hours:
+        trials = np.repeat(chosen[None], 2, axis=0)
+        trials[:, hour, 2] = [0.0, 1.0]
+        score = objective.value(ToySimulator().simulate({}, weather, trials, START)).score[0]
+        chosen = trials[int(np.argmax(score))]
+        best = score.max()
+    gain = best - result.recipe_valuation.score[0, 0]
+    assert gain > 0
+    assert result.history[-1] >= 0.8 * gain
+
+
+def test_the_same_seed_gives_the_same_plan_in_numpy_and_from_the_graph(site, state, weather, recipe, tmp_path) -> None:
+    from trainer.export.optimizer import export_optimizer
+
+    path: Path = tmp_path / "optimizer.onnx"
+    path.write_bytes(export_optimizer(NumpyGeneration().settings).SerializeToString())
+    plans = [
+        optimise(ToySimulator(), site, state, weather, recipe, np.random.default_rng(5), QUICK, generation=generation)
+        for generation in (NumpyGeneration(), OnnxGeneration(path), NumpyGeneration())
+    ]
+    for other in plans[1:]:
+        np.testing.assert_array_equal(other.setpoints, plans[0].setpoints)
+        assert other.history == plans[0].history
+
+
+def test_a_recipe_that_nothing_beats_is_the_plan(site, state, weather, recipe) -> None:
+    first = plan(ToySimulator(), site, state, weather, recipe)
+    for _ in range(6):
+        second = plan(ToySimulator(), site, state, weather, first.setpoints, seed=9)
+        if second.follows_recipe:
+            break
+        first = second
+    assert second.follows_recipe
+    np.testing.assert_array_equal(second.setpoints, first.setpoints)
+    assert second.expected_profit == second.recipe_profit
+
+
+def test_doubt_about_the_lamps_keeps_a_cautious_planner_from_them(site, state, weather, recipe) -> None:
+    dark = recipe * np.array([1.0, 1.0, 0.0, 1.0])
+    doubtful = ToySimulator(members=(0.2, 0.6, 1.4, 1.8))
+    hours = [
+        plan(doubtful, with_planning(site, caution=caution), state, weather, dark).setpoints[:, 2].sum()
+        for caution in (0.0, 5.0)
+    ]
+    assert hours[0] > 2 * hours[1]
+
+
+def test_leaving_the_range_of_the_data_costs_and_is_flagged(site, state, weather, recipe) -> None:
+    dark = recipe * np.array([1.0, 1.0, 0.0, 1.0])
+    free = plan(ToySimulator(), site, state, weather, dark)
+    bound = plan(ToySimulator(known_lamp_hours=6.0), site, state, weather, dark)
+    assert not free.leaves_range
+    assert bound.setpoints[:, 2].sum() < free.setpoints[:, 2].sum()
+    assert not plan(ToySimulator(known_lamp_hours=48.0), site, state, weather, dark).leaves_range
+    far = optimise(ToySimulator(known_lamp_hours=-1.0), site, state, weather, recipe, np.random.default_rng(0), QUICK)
+    assert far.leaves_range
+
+
+def test_a_search_ends_with_its_time(site, state, weather, recipe) -> None:
+    ticks = iter(range(1000))
+    result = optimise(
+        ToySimulator(),
+        site,
+        state,
+        weather,
+        recipe,
+        np.random.default_rng(0),
+        Budget(generations=1000, patience=1000, seconds=5.0),
+        monotonic=lambda: float(next(ticks)),
+    )
+    assert len(result.history) == 5
+
+
+def test_a_simulator_that_says_nothing_leaves_the_recipe(site, state, weather, recipe) -> None:
+    class Broken(ToySimulator):
+        def simulate(self, *arguments):
+            from dataclasses import replace
+
+            outcome = super().simulate(*arguments)
+            broken = outcome.net_growth * np.nan if len(arguments[2]) > 1 else outcome.net_growth
+            return replace(outcome, net_growth=broken)
+
+    assert plan(Broken(), site, state, weather, recipe).follows_recipe
+
+
+def test_a_forecast_with_a_gap_is_refused(site, state, weather, recipe) -> None:
+    weather[3, 0] = np.nan
+    with pytest.raises(IgrowError, match="the forecast must have shape"):
+        plan(ToySimulator(), site, state, weather, recipe)
