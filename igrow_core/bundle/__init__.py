@@ -1,7 +1,8 @@
 """The bundle: what the trainer ships to a gateway, one folder that proves itself.
 
 A bundle holds `simulator.onnx` (candidate strategies over a day), `optimizer.onnx` (one generation of the
-genetic algorithm), where there is one `policy.onnx`, further files that the manifest lists, `golden.npz`
+genetic algorithm), where there are such `hindcast.onnx` (the climate given what the actuators did, for shadow
+runs) and `policy.onnx`, further files that the manifest lists, `golden.npz`
 (inputs and the outputs they must give) and `manifest.json`. The story of a bundle:
 
 1. The trainer fills a `Manifest` and calls `write_bundle`: files are checksummed, written into a folder next

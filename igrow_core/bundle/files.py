@@ -19,8 +19,8 @@ from igrow_core.bundle.manifest import BundleError, Manifest, manifest_from_json
 
 MANIFEST_FILE = "manifest.json"
 GOLDEN_FILE = "golden.npz"
-GRAPHS = ("simulator", "optimizer", "policy")
-"""The graphs that a bundle can hold, each in a file of its name with the suffix .onnx."""
+GRAPHS = ("simulator", "optimizer", "hindcast", "policy")
+"""The graphs that a bundle can hold, each in a file of its name with the suffix .onnx; the first two it must."""
 REQUIRED_FILES = ("simulator.onnx", "optimizer.onnx", GOLDEN_FILE)
 
 LARGEST_FILE = 256 * 2**20
@@ -57,9 +57,7 @@ class Bundle:
         return f"{self.manifest.site}-{self.manifest.created:%Y%m%d}-{self.identity[:8]}"
 
 
-def write_bundle(
-    folder: Path, manifest: Manifest, files: Mapping[str, bytes], golden: Mapping[str, Golden]
-) -> Bundle:
+def write_bundle(folder: Path, manifest: Manifest, files: Mapping[str, bytes], golden: Mapping[str, Golden]) -> Bundle:
     """Write a bundle to `folder`, which must not exist yet, and read it back.
 
     `files` are file name -> content (`simulator.onnx`, `optimizer.onnx`, ...), `golden` is graph name ->

@@ -154,8 +154,7 @@ def manifest_from_json(text: str, *, where: str = "manifest.json") -> Manifest:
     version = document.get("format_version") if isinstance(document, dict) else None
     if isinstance(version, int) and version > FORMAT_VERSION:
         raise BundleError(
-            f"{where}: format version {version} is newer than this igrow reads ({FORMAT_VERSION}); "
-            "update igrow"
+            f"{where}: format version {version} is newer than this igrow reads ({FORMAT_VERSION}); update igrow"
         )
     try:
         manifest = cast(Manifest, _decode(Manifest, document, ""))

@@ -1,0 +1,88 @@
+"""Weather over the horizon: a forecast where there is one, else the persistence of the last days."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow_core.errors import IgrowError
+from igrow_core.quantities import QUANTITIES, WEATHER
+from igrow_core.telemetry import Telemetry, to_grid
+
+NEEDED = WEATHER[:6]
+"""The weather that plans are made from, in the registry's order."""
+HOUR = 3600
+DAYS = 3
+"""Days whose same hours are averaged."""
+ANOMALY_HOURS = 12.0
+"""Time in which what differs from those days now is expected to fade to a third."""
+
+Values = NDArray[np.float64]
+
+
+def persistence(log: Telemetry, start: int, hours: int) -> Values:
+    """Return the weather expected from `start` (seconds since 1970 UTC), hourly means, (hours, 6).
+
+    The mean of the same hour of the last `DAYS` days, plus the difference of the last hours from it, which fades
+    with a time constant of `ANOMALY_HOURS`; radiation keeps the course of those days. A site without a sensor for
+    outdoor CO2 or the sky gets 420 ppm and a clear-sky estimate (Swinbank 1963, Q. J. R. Meteorol. Soc. 89,
+    339-348: 0.0552 T^1.5, T in K).
+    Raises IgrowError where the log of the last day lacks a quantity that cannot be estimated.
+    """
+    table = hourly(log, start - DAYS * 24 * HOUR, DAYS * 24)
+    days = table.reshape(DAYS, 24, len(NEEDED))
+    known = np.isfinite(days)
+    count = known.sum(axis=0)
+    typical = np.where(count > 0, np.where(known, days, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)
+    for column, name in enumerate(NEEDED):
+        if np.isnan(typical[:, column]).any():
+            typical[:, column] = _fill(name, typical, column)
+    recent = days[-1, -3:]
+    anomaly = np.zeros(len(NEEDED))
+    for column, name in enumerate(NEEDED):
+        both = np.isfinite(recent[:, column])
+        if both.any() and name != "global_radiation":
+            anomaly[column] = float((recent[both, column] - typical[-3:, column][both]).mean())
+    ahead = np.arange(hours)
+    fading = np.exp(-(ahead + 1.0) / ANOMALY_HOURS)
+    expected = typical[ahead % 24] + fading[:, None] * anomaly
+    low = np.array([QUANTITIES[name].low for name in NEEDED])
+    high = np.array([QUANTITIES[name].high for name in NEEDED])
+    return np.asarray(np.clip(expected, low, high))
+
+
+def from_forecast(forecast: Telemetry, log: Telemetry, start: int, hours: int) -> Values:
+    """Return the weather of a forecast as hourly means, (hours, 6), with persistence where it has gaps."""
+    table = hourly(forecast, start, hours)
+    if np.isfinite(table).all():
+        return table
+    return np.where(np.isfinite(table), table, persistence(log, start, hours))
+
+
+def hourly(telemetry: Telemetry, start: int, hours: int) -> Values:
+    """Return hourly means from `start` on, (hours, 6), NaN where nothing is known."""
+    begin = np.datetime64(start, "s")
+    selected = telemetry.select(begin, begin + np.timedelta64(hours * HOUR, "s"))
+    result = np.full((hours, len(NEEDED)), np.nan)
+    # The grid lies on whole hours; the plan may not, so it is moved there and back.
+    shift = np.timedelta64(start % HOUR, "s")
+    grid = to_grid(Telemetry(selected.time - shift, selected.columns), HOUR)
+    rows = (grid.time - (begin - shift)).astype(np.int64) // HOUR
+    for column, name in enumerate(NEEDED):
+        if name in grid:
+            result[rows, column] = grid[name]
+    return result
+
+
+def _fill(name: str, typical: Values, column: int) -> Values:
+    """Return a course of the day without gaps, (24,); raises IgrowError where nothing is known."""
+    values = typical[:, column]
+    present = np.flatnonzero(np.isfinite(values))
+    if len(present):
+        return np.interp(np.arange(24), present, values[present], period=24)
+    if name == "outdoor_co2":
+        return np.full(24, 420.0)
+    if name == "sky_temperature":
+        outdoor = typical[:, NEEDED.index("outdoor_temperature")]
+        return np.asarray(0.0552 * (outdoor + 273.15) ** 1.5 - 273.15)
+    raise IgrowError(f"the log of the last {DAYS} days holds no {name}, so no weather can be expected")

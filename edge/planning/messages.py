@@ -1,0 +1,51 @@
+"""Messages between the daemon and its planning process: a length and a pickle, over pipes that only they hold."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import select
+import struct
+import time
+from typing import Any
+
+LARGEST = 256 * 2**20
+_LENGTH = struct.Struct("<Q")
+
+
+class MessageError(Exception):
+    """The other side is gone, too slow, or sends what is no message."""
+
+
+def send(descriptor: int, message: object) -> None:
+    """Write one message; raises MessageError when the other side is gone."""
+    body = pickle.dumps(message, protocol=5)
+    view = memoryview(_LENGTH.pack(len(body)) + body)
+    try:
+        while view:
+            view = view[os.write(descriptor, view) :]
+    except OSError as error:
+        raise MessageError(f"the process is gone ({error.strerror})") from None
+
+
+def receive(descriptor: int, timeout: float) -> Any:
+    """Read one message; raises MessageError after `timeout` seconds, or when the other side is gone."""
+    until = time.monotonic() + timeout
+    (length,) = _LENGTH.unpack(_read(descriptor, _LENGTH.size, until))
+    if length > LARGEST:
+        raise MessageError("it sent something that is no message")
+    return pickle.loads(_read(descriptor, length, until))
+
+
+def _read(descriptor: int, count: int, until: float) -> bytes:
+    chunks = []
+    while count:
+        ready, _, _ = select.select([descriptor], [], [], max(0.0, until - time.monotonic()))
+        if not ready:
+            raise MessageError("it took too long")
+        chunk = os.read(descriptor, min(count, 1 << 20))
+        if not chunk:
+            raise MessageError("it ended")
+        chunks.append(chunk)
+        count -= len(chunk)
+    return b"".join(chunks)
