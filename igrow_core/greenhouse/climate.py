@@ -120,36 +120,6 @@ def capacities(p: GreenhouseParameters, leaf_area_index: Array) -> tuple[Array, 
     )
 
 
-def stored_energy(p: GreenhouseParameters, state: Climate, leaf_area_index: Array) -> Array:
-    """Return sensible and latent heat in the greenhouse above 0 degC, J m-2."""
-    air, top, canopy, cover, screen, floor = capacities(p, leaf_area_index)
-    soil = p.soil_heat_capacity * (
-        SOIL_LAYERS[0] * state.soil_1 + SOIL_LAYERS[1] * state.soil_2 + SOIL_LAYERS[2] * state.soil_3
-    )
-    sensible = (
-        air * state.air
-        + top * state.top
-        + canopy * state.canopy
-        + cover * state.cover
-        + screen * state.screen
-        + floor * state.floor
-        + soil
-        + p.rail_capacity * state.rail
-        + p.grow_capacity * state.grow
-    )
-    return sensible + LATENT_HEAT * stored_vapour(p, state)
-
-
-def stored_vapour(p: GreenhouseParameters, state: Climate) -> Array:
-    """Return the water vapour in both airs, kg m-2."""
-    return p.air_height * state.vapour + p.top_height * state.top_vapour
-
-
-def stored_co2(p: GreenhouseParameters, state: Climate) -> Array:
-    """Return the CO2 in both airs, kg m-2."""
-    return p.air_height * state.co2 + p.top_height * state.top_co2
-
-
 def _long_wave(factor: Array, one: Array, other: Array) -> Array:
     """Return the conductance W m-2 K-1 of the exchange factor * sigma * (T1^4 - T2^4); temperatures in kelvin."""
     return (STEFAN_BOLTZMANN * factor) * (one + other) * (one * one + other * other)

@@ -8,30 +8,22 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from igrow_core.air import (
-    LATENT_HEAT,
-    co2_fraction,
-    relative_humidity,
-    saturation_pressure,
-    vapour_pressure_deficit,
-)
-from igrow_core.greenhouse import canopy, climate, tomato, ventilation
-from igrow_core.greenhouse.climate import Climate, Conditions, Ledger
-from igrow_core.greenhouse.climate_computer import ClimateComputer, Control, Readings, at_rest, control
+from igrow_core.air import co2_fraction, saturation_pressure
+from igrow_core.greenhouse import books, canopy, climate, observation, tomato, ventilation
+from igrow_core.greenhouse.climate import Climate, Conditions
+from igrow_core.greenhouse.climate_computer import ClimateComputer, at_rest, control
 from igrow_core.greenhouse.disturbances import Disturbances
 from igrow_core.greenhouse.hidden import EffectBank, HiddenEffect
-from igrow_core.greenhouse.light import Light, distribute
+from igrow_core.greenhouse.light import distribute
 from igrow_core.greenhouse.namespace import Array, clip, namespace
 from igrow_core.greenhouse.parameters import GreenhouseParameters
 from igrow_core.greenhouse.sensors import Sensors
-from igrow_core.greenhouse.tomato import Crop
-from igrow_core.greenhouse.weather_table import WeatherRow, WeatherTable
-from igrow_core.sun import position
+from igrow_core.greenhouse.state import PlantState, add
+from igrow_core.greenhouse.weather_table import WeatherTable
 
 SCAN = 60.0
 """Time between two decisions of the climate computer, s; as on many PLCs, and independent of the climate's step."""
@@ -39,50 +31,6 @@ TICK = 60.0
 """Longest time step of the climate, s."""
 SLOW = 300.0
 """Time between two steps of the crop, the sensors' noise and the disturbances, s."""
-
-ACCUMULATED = ("vent_lee", "vent_wind", "energy_screen", "blackout_screen", "lamp_power", "co2_dosing", "irrigation")
-"""Actuators that a log shows as the mean since the row before."""
-
-
-@dataclass
-class PlantState:
-    """All that changes while the plant runs; floats or arrays (N,). It can be copied and pickled."""
-
-    seconds: float
-    """Time, since 1970 UTC."""
-    climate: Climate
-    crop: Crop
-    control: Control
-    slab: Array
-    """Water in the substrate, L m-2."""
-    transpiration: Array
-    """Of the last tick, kg m-2 s-1, as is the next."""
-    assimilation: Array
-    """Gross uptake of CO2."""
-    respiration: Array
-    """Of the crop, kg CH2O m-2 s-1, as of the last slow step."""
-    light: Light | None
-    assimilated: Array
-    """Carbohydrate fixed since the last slow step, kg m-2."""
-    warmth: Array
-    """Canopy temperature times seconds since the last slow step."""
-    crop_seconds: float
-    crop_rates: tomato.Rates
-    deleafed_day: int
-    scan: int
-    """Number of the climate computer's last decision."""
-    disturbance: list[Array]
-    """Heat W m-2, vapour and CO2 kg m-2 s-1 into the air."""
-    noise: dict[str, Array]
-    sensor_errors: dict[str, Array]
-    memory: list[Any]
-    """Of the hidden effects."""
-    generator: np.random.Generator
-    totals: dict[str, Array] = field(default_factory=dict)
-    """Everything that crossed the boundary since the start: J m-2 and kg m-2."""
-    log: dict[str, Array] = field(default_factory=dict)
-    """Actuators times seconds since `mean_actuators` was last reset."""
-    log_seconds: float = 0.0
 
 
 class Plant:
@@ -163,7 +111,15 @@ class Plant:
         scan = int(s.seconds // SCAN)
         if scan != s.scan:
             s.scan = scan
-            s.control = control(xp, self.computer, p, s.control, setpoints, self._readings(self.weather.at(s.seconds)), SCAN)
+            s.control = control(
+                xp,
+                self.computer,
+                p,
+                s.control,
+                setpoints,
+                observation.readings(xp, s, self.weather.at(s.seconds)),
+                SCAN,
+            )
         c = s.control
         air = s.climate.air
         ppm = co2_fraction(air, s.climate.co2)
@@ -175,9 +131,9 @@ class Plant:
 
         added: dict[str, Array] = {}
         if self.effects:
-            drivers = self._drivers(weather, vent, ppm, setpoints)
+            drivers = observation.drivers(xp, p, s, weather, setpoints, vent, self.effects.drivers)
             added = self.effects.evaluate(drivers, s.seconds, seconds, s.memory)
-            s.sensor_errors = {name: value for name, value in added.items() if name in _SENSOR_CHANNELS}
+            s.sensor_errors = {name: value for name, value in added.items() if name in observation.SENSOR_CHANNELS}
         zero = 0.0
         light_loss = clip(xp, added["light_loss"], 0.0, 0.95) if "light_loss" in added else zero
         light = distribute(
@@ -239,7 +195,8 @@ class Plant:
         drain = xp.maximum(water - p.slab_capacity, 0.0)
         s.slab = water - drain
         s.seconds += seconds
-        self._account(seconds, ledger, light, lamp_power, heat, vapour, co2, dosing, respired, uptake, drain)
+        inflow = books.Inflow(lamp_power, heat, vapour, co2, dosing, respired, uptake, drain)
+        books.account(p, s, seconds, ledger, light, inflow)
 
     def _slow_step(self) -> None:
         xp, p, s = self.xp, self.parameters, self.state
@@ -255,7 +212,7 @@ class Plant:
         s.assimilated, s.warmth, s.crop_seconds = 0.0 * s.assimilated, 0.0 * s.warmth, 0.0
         area = tomato.leaf_area_index(p, s.crop)
         # New leaves bring the heat they hold, picked ones take it away.
-        _add(s.totals, "leaf_heat_in", p.canopy_capacity * (area - self._area) * s.climate.canopy)
+        add(s.totals, "leaf_heat_in", p.canopy_capacity * (area - self._area) * s.climate.canopy)
         self._area = area
         self._renew_noise()
 
@@ -269,56 +226,10 @@ class Plant:
 
     # -- what others see ----------------------------------------------------------------------------------------
 
-    def _readings(self, weather: WeatherRow) -> Readings:
-        """Return what the PLC's sensors show: the true values with noise and sensor faults."""
-        s = self.state
-        noise, errors, air = s.noise, s.sensor_errors, s.climate.air
-
-        def shown(name: str, value: Array) -> Array:
-            return value + noise.get(name, 0.0) + errors.get(name, 0.0)
-
-        return Readings(
-            air_temperature=shown("air_temperature", air),
-            air_humidity=shown("air_humidity", relative_humidity(self.xp, air, s.climate.vapour)),
-            air_co2=shown("air_co2", co2_fraction(air, s.climate.co2)),
-            rail_temperature=shown("rail_pipe_temperature", s.climate.rail),
-            grow_temperature=shown("grow_pipe_temperature", s.climate.grow),
-            outdoor_temperature=weather.outdoor_temperature,
-            global_radiation=weather.global_radiation,
-            wind_speed=weather.wind_speed,
-        )
-
     def truth(self, setpoints: Mapping[str, Array]) -> dict[str, Array]:
         """Return every quantity of the registry as it is: states now, actuators as means since the last reset."""
-        s, xp = self.state, self.xp
-        weather = self.weather.at(min(s.seconds, self.weather.end))
-        air = s.climate.air
-        # atan2 by numpy: a row a step is no cost that matters.
-        direction = np.degrees(np.arctan2(weather.wind_east, weather.wind_north)) % 360.0
-        values: dict[str, Array] = {
-            "outdoor_temperature": weather.outdoor_temperature,
-            "outdoor_humidity": weather.outdoor_humidity,
-            "outdoor_co2": weather.outdoor_co2,
-            "global_radiation": weather.global_radiation,
-            "wind_speed": weather.wind_speed,
-            "sky_temperature": weather.sky_temperature,
-            "wind_direction": float(direction) if self.count is None else direction,
-            "rain": weather.rain,
-            "air_temperature": air,
-            "air_humidity": relative_humidity(xp, air, s.climate.vapour),
-            "air_co2": co2_fraction(air, s.climate.co2),
-            "par": s.light.par if s.light is not None else 0.0 * air,
-            "leaf_area_index": self._area,
-            "plant_load": tomato.total(s.crop.fruits),
-            "net_growth": s.crop.net_growth,
-            "fruit_fresh_weight": s.crop.harvested / self.parameters.fruit_dry_matter,
-            **{name: setpoints[name] for name in _SETPOINT_NAMES if name in setpoints},
-            "rail_pipe_temperature": s.climate.rail,
-            "grow_pipe_temperature": s.climate.grow,
-        }
-        for name, value in zip(ACCUMULATED, self._actuators(), strict=True):
-            values[name] = s.log[name] / s.log_seconds if s.log_seconds > 0.0 else value
-        return values
+        weather = self.weather.at(min(self.state.seconds, self.weather.end))
+        return observation.truth(self.xp, self.parameters, self.state, weather, setpoints)
 
     def measured(self, truth: Mapping[str, Array]) -> dict[str, Array]:
         """Return what the sensors show of `truth`: with faults, noise and resolution."""
@@ -332,149 +243,13 @@ class Plant:
         """Begin a new mean of the actuators."""
         self.state.log, self.state.log_seconds = {}, 0.0
 
-    def _actuators(self) -> tuple[Array, ...]:
-        c = self.state.control
-        return (
-            100.0 * c.vent_lee,
-            100.0 * c.vent_wind,
-            100.0 * c.energy_screen,
-            100.0 * c.blackout_screen,
-            self.parameters.lamp_capacity * c.lamp,
-            c.co2_dosing,
-            c.irrigation,
-        )
-
-    def _drivers(
-        self, weather: WeatherRow, vent: Array, ppm: Array, setpoints: Mapping[str, Array]
-    ) -> dict[str, Array]:
-        """Return the true drivers of the hidden effects; scalars are spread over the batch."""
-        s, xp, p = self.state, self.xp, self.parameters
-        like = 0.0 * s.climate.air
-        drivers: dict[str, Array] = {name: like + value for name, value in setpoints.items()}
-        drivers.update(zip(ACCUMULATED, self._actuators(), strict=True))
-        air, seen = s.climate.air, self.effects.drivers if self.effects else frozenset()
-        inside = s.light.inside if s.light is not None else like
-        drivers.update(
-            outdoor_temperature=like + weather.outdoor_temperature,
-            outdoor_humidity=like + weather.outdoor_humidity,
-            outdoor_co2=like + weather.outdoor_co2,
-            global_radiation=like + weather.global_radiation,
-            wind_speed=like + weather.wind_speed,
-            sky_temperature=like + weather.sky_temperature,
-            rain=like + weather.rain,
-            air_temperature=air,
-            air_humidity=relative_humidity(xp, air, s.climate.vapour),
-            air_co2=ppm,
-            par=s.light.par if s.light is not None else like,
-            leaf_area_index=self._area,
-            rail_pipe_temperature=s.climate.rail,
-            grow_pipe_temperature=s.climate.grow,
-            mean_height=like + p.air_height + p.top_height,
-            radiation_inside=inside + like,
-            vapour_concentration=s.climate.vapour,
-            outdoor_vapour_concentration=like + weather.vapour,
-            vapour_deficit=vapour_pressure_deficit(xp, air, s.climate.vapour),
-            ventilation=vent,
-            transpiration=s.transpiration,
-            assimilation=s.assimilation,
-            rail_pipe_excess=xp.maximum(s.climate.rail - air, 0.0),
-            grow_pipe_excess=xp.maximum(s.climate.grow - air, 0.0),
-        )
-        if "wind_direction" in seen:
-            direction = np.degrees(np.arctan2(weather.wind_east, weather.wind_north)) % 360.0
-            drivers["wind_direction"] = float(direction) if self.count is None else like + direction
-        if seen & _SUN_DRIVERS:
-            elevation, azimuth, hour = position(xp, s.seconds, p.latitude, p.longitude)
-            weekday = float((int(s.seconds + 240.0 * p.longitude) // 86_400 + 3) % 7)
-            drivers.update(
-                sun_elevation=like + float(elevation),
-                sun_azimuth=like + float(azimuth),
-                hour=like + float(hour),
-                weekday=like + weekday,
-            )
-        return drivers
-
-    # -- bookkeeping --------------------------------------------------------------------------------------------
-
-    def _account(
-        self, seconds: float, ledger: Ledger, light: Light, lamp_power: Array, heat: Array, vapour: Array, co2: Array,
-        dosing: Array, respired: Array, uptake: Array, drain: Array,
-    ) -> None:  # fmt: skip
-        s, totals = self.state, self.state.totals
-        c = s.control
-        boiler = c.rail_heat + c.grow_heat
-        for name, amount in (
-            ("sun_in", light.sun_absorbed * seconds),
-            ("lamp_in", (lamp_power - light.lamp_out) * seconds),
-            ("boiler_in", boiler * seconds),
-            ("unmodelled_heat_in", heat * seconds),
-            ("unmodelled_vapour_in", vapour * seconds),
-            ("unmodelled_co2_in", co2 * seconds),
-            ("to_sky", ledger.to_sky),
-            ("to_outside", ledger.to_outside),
-            ("air_heat_out", ledger.air_heat_out),
-            ("to_deep_soil", ledger.to_deep_soil),
-            ("vapour_out", ledger.vapour_out),
-            ("condensation", ledger.condensation),
-            ("transpiration", ledger.transpiration),
-            ("floor_evaporation", ledger.floor_evaporation),
-            ("co2_out", ledger.co2_out),
-            ("co2_dosed", dosing * seconds),
-            ("co2_respired", respired * seconds),
-            ("co2_taken_up", uptake * seconds),
-            ("electricity", lamp_power * seconds),
-            ("irrigation", c.irrigation * (seconds / 3600.0)),
-            ("drain", drain),
-            ("pipe_heat", ledger.rail_loss + ledger.grow_loss),
-        ):
-            _add(totals, name, amount)
-        for name, value in zip(ACCUMULATED, self._actuators(), strict=True):
-            _add(s.log, name, value * seconds)
-        s.log_seconds += seconds
-
     def stored(self) -> dict[str, Array]:
-        """Return what the plant holds: energy J m-2; water, CO2 and carbohydrate kg m-2 (crop with its harvest)."""
-        s, p = self.state, self.parameters
-        return {
-            "energy": climate.stored_energy(p, s.climate, self._area),
-            "vapour": climate.stored_vapour(p, s.climate),
-            "slab": s.slab,
-            "co2": climate.stored_co2(p, s.climate),
-            "carbohydrate": tomato.stored_carbohydrate(s.crop) + s.assimilated,
-        }
+        """Return what the plant holds (see `books.stored`)."""
+        return books.stored(self.parameters, self.state)
 
     def residuals(self, before: Mapping[str, Array]) -> dict[str, Array]:
-        """Return what the balances of energy, vapour, slab water, CO2 and carbohydrate miss since the start.
-
-        `before` is `stored()` at the start; the books begin with the plant. Energy counts the latent heat of the
-        vapour that effects and disturbances bring.
-        """
-        t, now = self.state.totals, self.stored()
-        energy_in = (
-            t["sun_in"] + t["lamp_in"] + t["boiler_in"] + t["unmodelled_heat_in"] + t.get("leaf_heat_in", 0.0)
-            + LATENT_HEAT * t["unmodelled_vapour_in"]
-        )  # fmt: skip
-        energy_out = (
-            t["to_sky"] + t["to_outside"] + t["air_heat_out"] + t["to_deep_soil"] + LATENT_HEAT * t["vapour_out"]
-        )
-        vapour = (
-            t["transpiration"]
-            + t["floor_evaporation"]
-            + t["unmodelled_vapour_in"]
-            - t["condensation"]
-            - t["vapour_out"]
-        )
-        co2 = t["co2_dosed"] + t["co2_respired"] + t["unmodelled_co2_in"] - t["co2_taken_up"] - t["co2_out"]
-        carbohydrate = (t["co2_taken_up"] - t["co2_respired"]) / tomato.CO2_PER_CARBOHYDRATE
-        pending = self.state.respiration * self.state.crop_seconds
-        return {
-            "energy": now["energy"] - before["energy"] - energy_in + energy_out,
-            # Condensate carries no heat in this account: its latent heat stays with the cover it warmed.
-            "vapour": now["vapour"] - before["vapour"] - vapour,
-            "slab": now["slab"] - before["slab"] - t["irrigation"] + t["drain"] + t["transpiration"],
-            "co2": now["co2"] - before["co2"] - co2,
-            "carbohydrate": now["carbohydrate"] - pending - before["carbohydrate"] - carbohydrate,
-        }
+        """Return what the balances miss since the start, where `stored()` was `before` (see `books.residuals`)."""
+        return books.residuals(self.parameters, self.state, before)
 
     # -- saving -------------------------------------------------------------------------------------------------
 
@@ -486,17 +261,6 @@ class Plant:
         """Take up a saved state; the plant goes on exactly as it would have."""
         self.state = copy.deepcopy(state)
         self._area = tomato.leaf_area_index(self.parameters, self.state.crop)
-
-
-_SETPOINT_NAMES = ("heating_setpoint", "co2_setpoint", "lamp_on", "irrigation_on")
-_SUN_DRIVERS = frozenset({"sun_elevation", "sun_azimuth", "hour", "weekday"})
-_SENSOR_CHANNELS = frozenset(
-    {"air_temperature", "air_humidity", "air_co2", "rail_pipe_temperature", "grow_pipe_temperature", "par"}
-)
-
-
-def _add(totals: dict[str, Array], name: str, amount: Array) -> None:
-    totals[name] = totals[name] + amount if name in totals else amount
 
 
 def _picking_day(seconds: float, longitude: float) -> int:

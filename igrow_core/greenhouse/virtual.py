@@ -10,8 +10,9 @@ from igrow_core.greenhouse.climate_computer import SAFE_SETPOINTS, ClimateComput
 from igrow_core.greenhouse.disturbances import Disturbances
 from igrow_core.greenhouse.hidden import HiddenEffect
 from igrow_core.greenhouse.parameters import GreenhouseParameters
-from igrow_core.greenhouse.plant import Plant, PlantState
+from igrow_core.greenhouse.plant import Plant
 from igrow_core.greenhouse.sensors import Sensors
+from igrow_core.greenhouse.state import PlantState
 from igrow_core.greenhouse.weather_table import WeatherTable
 from igrow_core.sun import unix_seconds
 from igrow_core.telemetry import Telemetry
