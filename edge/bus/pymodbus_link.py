@@ -74,6 +74,7 @@ class PymodbusLink(asyncio.Protocol):
         self._request = b""
         self._waiter: asyncio.Future[bytes] | None = None
         self._transaction = 0
+        self._owed = 0
         self._last_byte = 0.0
         self._opened = asyncio.Event()
         self._loop = asyncio.get_running_loop()
@@ -158,6 +159,7 @@ class PymodbusLink(asyncio.Protocol):
         if self._rtu:
             self._received = b""
         else:
+            self._owed += 1
             self._transaction = self._transaction % 0xFFFF + 1
             pdu.transaction_id = self._transaction
         self._request = self._framer.buildFrame(pdu)
@@ -192,6 +194,7 @@ class PymodbusLink(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Take the line into use."""
         self._transport = cast(asyncio.Transport, transport)
+        self._owed = 0
         self._opened.set()
         self._received = b""
 
@@ -227,8 +230,15 @@ class PymodbusLink(asyncio.Protocol):
             waiter.set_result(answer)
 
     def _take_from_stream(self) -> None:
+        frames: list[bytes] = []
         while size := first_tcp_frame(self._received):
-            frame, self._received = self._received[:size], self._received[size:]
+            frames.append(self._received[:size])
+            self._received = self._received[size:]
+        if self._received and self._owed > 1:
+            # The end of a cut answer and the beginning of a late one would join to a frame that looks sound.
+            raise TornStreamError("half a frame while older answers are still to come")
+        for frame in frames:
+            self._owed = max(0, self._owed - 1)
             waiter = self._waiter
             if waiter is None or waiter.done() or frame[:2] != self._request[:2]:
                 continue  # the late answer to a request that was given up

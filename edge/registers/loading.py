@@ -144,7 +144,7 @@ class PointSettings:
         if self.scale == 0:
             raise SettingError("scale is 0: every value would read the same; 1 changes nothing", "scale")
         if self.writable and not self.function.can_be_written:
-            raise SettingError(f"a {self.function.value} cannot be written: use coil or holding", "writable")
+            raise SettingError(f"{self.function.value} cannot be written: only coil and holding can", "writable")
         if self.writable and self.type is DataType.BIT:
             raise SettingError(
                 "one bit of a register cannot be written alone: use a coil or a whole register", "writable"
@@ -160,7 +160,7 @@ class PointSettings:
     def _check_type(self) -> None:
         if self.function.holds_bits != (self.type is DataType.BOOL):
             right = "bool" if self.function.holds_bits else "bit, int16, uint16 or a longer type"
-            raise SettingError(f"a {self.function.value} cannot hold {self.type.value}: {right} is right", "type")
+            raise SettingError(f"{self.function.value} cannot hold {self.type.value}: {right} is right", "type")
         if (self.bit is not None) != (self.type is DataType.BIT):
             what = "type bit needs `bit:` 0 to 15" if self.bit is None else "`bit` is for type bit only"
             raise SettingError(what, "bit")

@@ -1,0 +1,108 @@
+"""Shows what a Modbus device answers, raw and decoded in every way, to help to find a register map."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator, Sequence
+
+from edge.bus.errors import BusError, RefusedError
+from edge.bus.modbus_bus import ModbusBus
+from edge.bus.protocol import Bus, Priority, ReadRequest
+from edge.registers.codec import decode_raw
+from edge.registers.model import BusSettings, ByteOrder, DataType, Function
+
+_BY_WIDTH = {
+    1: (DataType.INT16, DataType.UINT16),
+    2: (DataType.INT32, DataType.UINT32, DataType.FLOAT32),
+    4: (DataType.INT64, DataType.UINT64, DataType.FLOAT64),
+}
+_TURNED = (ByteOrder.ABCD, ByteOrder.BADC)
+
+
+async def probe(
+    settings: BusSettings,
+    device_ids: Sequence[int] = (1,),
+    function: Function = Function.HOLDING,
+    first: int = 0,
+    count: int = 16,
+) -> list[str]:
+    """Return lines that tell which units answer, what their registers hold, and what that may mean.
+
+    Each unit is asked for `count` addresses from `first` on, in one request, then one by one where it refuses.
+    Reads only. Never raises BusError: what goes wrong stands in the lines.
+    """
+    bus = ModbusBus(settings, rest_step=0.0)
+    bus.start()
+    try:
+        lines: list[str] = []
+        for device_id in device_ids:
+            lines += await probe_unit(bus, device_id, function, first, count)
+        return lines
+    finally:
+        await bus.close()
+
+
+async def probe_unit(bus: Bus, device_id: int, function: Function, first: int, count: int) -> list[str]:
+    """Return the lines for one unit on a bus that was started."""
+    what = f"unit {device_id}, {function.value} {first} to {first + count - 1}"
+    try:
+        content: dict[int, int] = dict(
+            enumerate(await bus.read(ReadRequest(device_id, function, first, count), Priority.LOG), first)
+        )
+        lines = [f"{what}: answers"]
+    except RefusedError as error:
+        lines = [f"{error}; asking for each address alone"]
+        content = {}
+        for address in range(first, first + count):
+            try:
+                (content[address],) = await bus.read(ReadRequest(device_id, function, address, 1), Priority.LOG)
+            except RefusedError:
+                continue
+            except BusError as failure:
+                return [*lines, *decoded(content, function), str(failure)]
+        if not content:
+            return [*lines, "  the unit is there, but holds nothing at these addresses"]
+    except BusError as error:
+        return [str(error)]
+    return [*lines, *decoded(content, function)]
+
+
+def decoded(content: dict[int, int], function: Function) -> Iterator[str]:
+    """Yield lines with each address' raw content and every value that could begin there.
+
+    `content` maps addresses to registers or bits. Values of 32 and 64 bits are shown in the four byte orders,
+    those of 16 bits in the two that differ.
+    """
+    for address, raw in sorted(content.items()):
+        if function.holds_bits:
+            yield f"  {address:>5}  {raw}"
+            continue
+        yield f"  {address:>5}  0x{raw:04x}  bits {raw:016b}"
+        for width, types in _BY_WIDTH.items():
+            registers = [content.get(address + offset) for offset in range(width)]
+            words = [word for word in registers if word is not None]
+            if len(words) < width:
+                continue
+            orders = _TURNED if width == 1 else tuple(ByteOrder)
+            for data_type in types:
+                values = [f"{order.value} {decode_raw(words, data_type, order):.7g}" for order in orders]
+                yield f"         {data_type.value:<8} {'  '.join(values)}"
+
+
+async def scan(settings: BusSettings, device_ids: Sequence[int] = range(1, 248)) -> list[str]:
+    """Return one line for every unit that answers at all, be it with a refusal. One timeout for each that does not."""
+    bus = ModbusBus(settings, rest_step=0.0)
+    bus.start()
+    lines = []
+    try:
+        for device_id in device_ids:
+            try:
+                await bus.read(ReadRequest(device_id, Function.HOLDING, 0, 1), Priority.LOG)
+                lines.append(f"unit {device_id}: answers")
+            except RefusedError as error:
+                lines.append(f"unit {device_id}: is there ({error})")
+            except BusError:
+                await asyncio.sleep(0)
+        return lines or ["no unit answers"]
+    finally:
+        await bus.close()

@@ -1,0 +1,294 @@
+"""The bus against a server: what it does when lines, units and answers fail. In simulated time."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Coroutine
+from typing import Any
+
+import pytest
+
+from bus.coded_unit import CodedUnit, code
+from bus.fault_proxy import Fault, FaultProxy
+from bus.simulated_loop import run
+from edge.bus.errors import (
+    AddressRefusedError,
+    BadAnswerError,
+    BusError,
+    ConnectionLostError,
+    GatewayRefusedError,
+    NoAnswerError,
+    NotConnectedError,
+    RefusedError,
+    UnitBusyError,
+    UnitRestingError,
+)
+from edge.bus.modbus_bus import ModbusBus
+from edge.bus.protocol import Priority, ReadRequest, WriteRequest
+from edge.registers.model import BusSettings, Function, Transport
+from edge.virtual_plc.modbus_server import ModbusServer
+
+PORT = 5020
+TRANSPORTS = pytest.mark.parametrize("transport", [Transport.TCP, Transport.RTU_OVER_TCP], ids=lambda t: t.value)
+
+
+def make_bus(transport: Transport = Transport.TCP, port: int = PORT, **more: Any) -> ModbusBus:
+    settings = BusSettings("line", transport, host="127.0.0.1", port=port, timeout=1.0)
+    bus = ModbusBus(settings, monotonic=asyncio.get_running_loop().time, **more)
+    bus.start()
+    return bus
+
+
+async def serve(*units: CodedUnit, transport: Transport = Transport.TCP) -> ModbusServer:
+    server = ModbusServer({unit.device_id: unit for unit in units})
+    await server.listen("127.0.0.1", PORT, rtu=transport.is_rtu)
+    return server
+
+
+async def behind_proxy(
+    *faults: Fault, transport: Transport, units: tuple[CodedUnit, ...] = ()
+) -> tuple[ModbusBus, CodedUnit]:
+    """Return a bus that meets these faults in this order, and then none, and the unit behind."""
+    units = units or (CodedUnit(1),)
+    await serve(*units, transport=transport)
+    proxy = FaultProxy(PORT, rtu=transport.is_rtu, seed=1, rate=0.0, timeout=1.0)
+    script = list(faults)
+    proxy.next_fault = lambda: script.pop(0) if script else Fault.NONE  # type: ignore[method-assign]
+    return make_bus(transport, await proxy.listen()), units[0]
+
+
+def read(bus: ModbusBus, address: int = 5, count: int = 2, unit: int = 1) -> Coroutine[Any, Any, tuple[int, ...]]:
+    return bus.read(ReadRequest(unit, Function.HOLDING, address, count), Priority.CONTROL)
+
+
+def coded(address: int = 5, count: int = 2, unit: int = 1) -> tuple[int, ...]:
+    return tuple(code(unit, Function.HOLDING, a) for a in range(address, address + count))
+
+
+def now() -> float:
+    return asyncio.get_running_loop().time()
+
+
+@TRANSPORTS
+def test_registers_and_bits_of_all_four_tables_are_read(transport: Transport) -> None:
+    async def main() -> None:
+        await serve(CodedUnit(1), transport=transport)
+        bus = make_bus(transport)
+        for function in Function:
+            for address, count in ((0, 1), (3, 9), (100, 120)):
+                content = await bus.read(ReadRequest(1, function, address, count), Priority.CONTROL)
+                assert content == tuple(code(1, function, a) for a in range(address, address + count))
+
+    run(main())
+
+
+@TRANSPORTS
+def test_coils_and_registers_are_written(transport: Transport) -> None:
+    async def main() -> None:
+        unit = CodedUnit(1)
+        await serve(unit, transport=transport)
+        bus = make_bus(transport)
+        wanted = [(Function.COIL, 300, (1,)), (Function.HOLDING, 301, (77,)), (Function.HOLDING, 302, (1, 2, 3, 4))]
+        for function, address, values in wanted:
+            await bus.write(WriteRequest(1, function, address, values), Priority.WRITE)
+        assert unit.writes == wanted
+
+    run(main())
+
+
+def test_a_server_that_is_down_at_boot_is_found_when_it_comes() -> None:
+    async def main() -> None:
+        bus = make_bus()
+        with pytest.raises(NotConnectedError):
+            await read(bus)
+        await asyncio.sleep(60)
+        await serve(CodedUnit(1))
+        await asyncio.sleep(10.1)
+        assert await read(bus) == coded()
+
+    run(main())
+
+
+def test_a_request_waits_for_a_connection_that_is_being_made() -> None:
+    async def main() -> None:
+        await serve(CodedUnit(1))
+        assert await read(make_bus()) == coded()
+
+    run(main())
+
+
+def test_a_line_that_is_lost_is_connected_again_at_once() -> None:
+    async def main() -> None:
+        server = await serve(CodedUnit(1))
+        bus = make_bus()
+        await read(bus)
+        await asyncio.sleep(30)
+        server.drop_connections()
+        await asyncio.sleep(0.1)
+        assert await read(bus) == coded()
+        assert bus.connects == 2
+
+    run(main())
+
+
+def test_a_server_that_hangs_up_on_everybody_is_not_stormed() -> None:
+    async def main() -> int:
+        await serve(CodedUnit(1))
+        proxy = FaultProxy(PORT, rtu=False, seed=1, rate=0.0, timeout=1.0)
+        proxy.storm = 10**6
+        bus = make_bus(port=await proxy.listen())
+        await asyncio.sleep(600)
+        return bus.connects
+
+    assert run(main()) <= 66
+
+
+def test_a_request_fails_in_the_instant_in_which_the_line_breaks() -> None:
+    async def main() -> float:
+        bus, _ = await behind_proxy(Fault.HANG_UP, transport=Transport.TCP)
+        await asyncio.sleep(0.1)
+        begin = now()
+        with pytest.raises(ConnectionLostError):
+            await read(bus)
+        return now() - begin
+
+    assert run(main()) < 0.01
+
+
+def test_a_dead_unit_costs_the_others_nothing_but_one_timeout_now_and_then() -> None:
+    """Unit 9 is silent. In ten minutes of polling each second it may take the bus for few seconds in all."""
+
+    async def main() -> tuple[float, int]:
+        await serve(CodedUnit(1))
+        bus = make_bus()
+        waited = 0.0
+        tries = 0
+        for _ in range(600):
+            begin = now()
+            try:
+                await read(bus, unit=9)
+            except UnitRestingError:
+                pass
+            except NoAnswerError:
+                tries += 1
+            assert await read(bus) == coded()
+            waited += now() - begin
+            await asyncio.sleep(1.0)
+        return waited, tries
+
+    waited, tries = run(main())
+    assert 5 < tries < 30
+    assert waited < 1.1 * tries + 1.0
+
+
+@pytest.mark.parametrize(
+    ("exception", "kind"),
+    [
+        (1, RefusedError),
+        (2, AddressRefusedError),
+        (3, AddressRefusedError),
+        (4, RefusedError),
+        (5, UnitBusyError),
+        (6, UnitBusyError),
+        (10, GatewayRefusedError),
+        (11, GatewayRefusedError),
+    ],
+)
+def test_each_exception_answer_becomes_its_error(exception: int, kind: type[BusError]) -> None:
+    async def main() -> None:
+        unit = CodedUnit(1)
+        unit.failing_with = exception
+        await serve(unit)
+        bus = make_bus()
+        with pytest.raises(kind, match=f"exception {exception}") as caught:
+            await read(bus)
+        assert type(caught.value) is kind
+        assert bus.health.unit(1).failures == 0
+
+    run(main())
+
+
+@TRANSPORTS
+@pytest.mark.parametrize("fault", [Fault.WRONG_UNIT, Fault.WRONG_FUNCTION, Fault.WRONG_COUNT, Fault.GARBLED])
+def test_an_answer_that_does_not_fit_is_thrown_away_and_the_next_is_right(transport: Transport, fault: Fault) -> None:
+    async def main() -> None:
+        bus, _ = await behind_proxy(fault, transport=transport)
+        with pytest.raises((BadAnswerError, NoAnswerError)):
+            await read(bus)
+        await asyncio.sleep(1.0)
+        assert await read(bus, 50) == coded(50)
+
+    run(main())
+
+
+@TRANSPORTS
+def test_a_late_answer_is_not_taken_for_the_next_one(transport: Transport) -> None:
+    async def main() -> None:
+        bus, unit = await behind_proxy(Fault.LATE, Fault.SLOW, Fault.SLOW, transport=transport)
+        with pytest.raises(NoAnswerError):
+            await read(bus, 5)
+        assert await read(bus, 50) == coded(50)
+        assert unit.reads == [(Function.HOLDING, 5, 2), (Function.HOLDING, 50, 2)]
+
+    run(main())
+
+
+@TRANSPORTS
+@pytest.mark.parametrize("fault", [Fault.NO_ANSWER, Fault.LATE, Fault.WRONG_ECHO, Fault.HANG_UP, Fault.TRUNCATED])
+def test_a_write_that_failed_is_never_repeated_by_the_bus(transport: Transport, fault: Fault) -> None:
+    async def main() -> None:
+        bus, unit = await behind_proxy(fault, transport=transport)
+        with pytest.raises(BusError) as caught:
+            await bus.write(WriteRequest(1, Function.HOLDING, 300, (7, 8)), Priority.WRITE)
+        assert caught.value.sent
+        await asyncio.sleep(30)
+        assert unit.writes == [(Function.HOLDING, 300, (7, 8))]
+
+    run(main())
+
+
+def test_a_unit_that_ignores_loop_backs_is_still_read() -> None:
+    """Function 8 is optional, and some devices do not even refuse what they do not know."""
+
+    async def main() -> None:
+        await serve(CodedUnit(1), transport=Transport.RTU_OVER_TCP)
+        script = [Fault.NO_ANSWER, Fault.NO_ANSWER]  # the read, then the loop back
+        proxy = FaultProxy(PORT, rtu=True, seed=1, rate=0.0, timeout=1.0)
+        proxy.next_fault = lambda: script.pop(0) if script else Fault.NONE  # type: ignore[method-assign]
+        bus = make_bus(Transport.RTU_OVER_TCP, await proxy.listen())
+        for _ in range(2):
+            with pytest.raises(NoAnswerError):
+                await read(bus)
+        await asyncio.sleep(2.1)
+        assert await read(bus) == coded()
+        script.append(Fault.NO_ANSWER)
+        with pytest.raises(NoAnswerError):
+            await read(bus)
+        with pytest.raises(UnitRestingError):  # a silence as long as the timeout, at the cost of nobody else
+            await read(bus)
+        await asyncio.sleep(1.1)
+        assert await read(bus) == coded()
+
+    run(main())
+
+
+def test_only_one_request_is_on_the_line_at_a_time() -> None:
+    async def main() -> None:
+        bus, unit = await behind_proxy(*[Fault.SLOW] * 20, transport=Transport.RTU_OVER_TCP)
+        results = await asyncio.gather(*(read(bus, address) for address in range(20)))
+        assert results == [coded(address) for address in range(20)]
+        assert [address for _, address, _ in unit.reads] == list(range(20))
+
+    run(main())
+
+
+def test_requests_that_wait_fail_when_the_bus_is_closed() -> None:
+    async def main() -> None:
+        bus, _ = await behind_proxy(Fault.NO_ANSWER, transport=Transport.TCP)
+        jobs = [asyncio.ensure_future(read(bus)) for _ in range(3)]
+        await asyncio.sleep(0.1)
+        await bus.close()
+        results = await asyncio.gather(*jobs, return_exceptions=True)
+        assert all(isinstance(result, (ConnectionLostError, NotConnectedError)) for result in results)
+
+    run(main())
