@@ -1,0 +1,145 @@
+"""A small HTTP server for four read-only pages; implements `edge.ports.StatusService`."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import dataclasses
+import json
+import logging
+import math
+import time
+from collections.abc import Callable
+from enum import Enum
+from zoneinfo import ZoneInfo
+
+from edge.ports import Snapshot
+from edge.status.history import History
+from edge.status.metrics import render_metrics
+from edge.status.page import render_page
+
+_log = logging.getLogger("igrow.edge.status")
+CONNECTIONS = 16
+"""At once; more are turned away, as a page must never cost the cycle its time."""
+REQUEST_BYTES = 8192
+REQUEST_SECONDS = 5.0
+
+
+class StatusServer:
+    """Serves the newest snapshot on localhost."""
+
+    def __init__(
+        self, port: int, zone: ZoneInfo, *, late_after: float = 60.0, wall: Callable[[], float] = time.monotonic
+    ) -> None:
+        """`late_after`: seconds (on `wall`) without a completed cycle after which health is lost."""
+        self.port = port
+        """The port that is listened to; 0 becomes the one that the system chose."""
+        self.problem = ""
+        """Empty while listening, else one line."""
+        self._zone = zone
+        self._late_after = late_after
+        self._wall = wall
+        self._published_at = -math.inf
+        self._snapshot: Snapshot | None = None
+        self._history = History()
+        self._server: asyncio.Server | None = None
+        self._open = 0
+
+    async def start(self) -> None:
+        """Begin to listen; a port that is taken is a problem to report, not a reason to stop."""
+        try:
+            self._server = await asyncio.start_server(self._serve, "127.0.0.1", self.port, limit=REQUEST_BYTES)
+        except OSError as error:
+            self.problem = f"status page: port {self.port} on localhost: {error.strerror or error}"
+            _log.warning("%s", self.problem)
+            return
+        self.port = self._server.sockets[0].getsockname()[1]
+
+    def publish(self, snapshot: Snapshot) -> None:
+        """Take the newest snapshot. Never blocks; rendering happens when somebody asks."""
+        self._snapshot = snapshot
+        self._published_at = self._wall()
+        self._history.add(snapshot)
+
+    async def close(self) -> None:
+        """Stop listening."""
+        if self._server is not None:
+            self._server.close()
+            await self._server.wait_closed()
+
+    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._open += 1
+        try:
+            async with asyncio.timeout(REQUEST_SECONDS):
+                status, kind, body = await self._answer(reader)
+                head = (
+                    f"HTTP/1.1 {status}\r\nContent-Type: {kind}; charset=utf-8\r\nContent-Length: {len(body)}\r\n"
+                    "Cache-Control: no-store\r\nConnection: close\r\nX-Content-Type-Options: nosniff\r\n"
+                    "Content-Security-Policy: default-src 'none'; style-src 'unsafe-inline'; img-src data:\r\n\r\n"
+                )
+                writer.write(head.encode() + body)
+                await writer.drain()
+        except (OSError, TimeoutError, asyncio.IncompleteReadError, asyncio.LimitOverrunError):
+            pass  # the visitor is gone, slow, or no browser; none of it is the daemon's concern
+        finally:
+            self._open -= 1
+            writer.close()
+            with contextlib.suppress(OSError):
+                await writer.wait_closed()
+
+    async def _answer(self, reader: asyncio.StreamReader) -> tuple[str, str, bytes]:
+        request = (await reader.readuntil(b"\r\n\r\n")).decode("latin-1")
+        parts = request.split("\r\n", 1)[0].split(" ")
+        if self._open > CONNECTIONS:
+            return "503 Service Unavailable", "text/plain", b"too many visitors\n"
+        if len(parts) != 3 or parts[0] not in {"GET", "HEAD"}:
+            return "405 Method Not Allowed", "text/plain", b"read-only: GET it is\n"
+        status, kind, text = self._page(parts[1].split("?", 1)[0])
+        return status, kind, b"" if parts[0] == "HEAD" else text.encode()
+
+    def _page(self, path: str) -> tuple[str, str, str]:
+        snapshot = self._snapshot
+        late = self._wall() - self._published_at > self._late_after
+        if path == "/health":
+            healthy = snapshot is not None and not late and snapshot.link_ok
+            body = json.dumps(self._health(healthy, late), indent=1) + "\n"
+            return ("200 OK" if healthy else "503 Service Unavailable"), "application/json", body
+        if path not in {"/", "/metrics", "/state.json"}:
+            return "404 Not Found", "text/plain", "there are /, /health, /metrics and /state.json\n"
+        if snapshot is None:
+            return "503 Service Unavailable", "text/plain", "no cycle has been completed yet\n"
+        if path == "/metrics":
+            return "200 OK", "text/plain; version=0.0.4", render_metrics(snapshot)
+        if path == "/state.json":
+            return "200 OK", "application/json", json.dumps(plain(snapshot)) + "\n"
+        return "200 OK", "text/html", render_page(snapshot, self._history, self._zone, late=late)
+
+    def _health(self, healthy: bool, late: bool) -> dict[str, object]:
+        snapshot = self._snapshot
+        if snapshot is None:
+            return {"ok": False, "why": "no cycle has been completed yet"}
+        why = "no cycle was completed lately" if late else "" if snapshot.link_ok else "the PLC does not answer"
+        return {
+            "ok": healthy,
+            "why": why,
+            "cycle": snapshot.cycle,
+            "source": snapshot.source,
+            "clock_ok": snapshot.clock_ok,
+            "alarms": [alarm.text for alarm in snapshot.alarms],
+            "problems": list(snapshot.problems),
+        }
+
+
+def plain(value: object) -> object:
+    """Return a snapshot as what JSON knows; numbers that are not finite become None."""
+    if isinstance(value, Enum):
+        return value.value
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+    if isinstance(value, dict) or hasattr(value, "items"):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if isinstance(value, str | int | bool | None) else str(value)
