@@ -35,8 +35,9 @@ class VirtualPlc:
     """Serves one device of a register map over Modbus, with a plant behind it.
 
     The setpoints in force are those in the writable registers while the heartbeat register changes at least every
-    `fallback_after` plant seconds. Otherwise, and before the first heartbeat, the PLC puts its own safe
-    setpoints into the registers and sets `plc_fallback`; a new heartbeat ends that.
+    `fallback_after` plant seconds. Otherwise, and before the first heartbeat, the PLC uses its own safe
+    setpoints, shows them in the registers, and sets `plc_fallback`; what is written meanwhile is in force from the
+    next heartbeat on.
     """
 
     def __init__(
@@ -50,7 +51,7 @@ class VirtualPlc:
         fallback_after: float = 900.0,
         sleep: Callable[[float], Awaitable[None]] = asyncio.sleep,
     ) -> None:
-        """`device` names the map's device to play, its first by default."""
+        """`device` names the map's device to play, its first by default. Made inside an event loop or not."""
         name = device or next(iter(register_map.devices))
         self.plant = plant
         self.memory = DeviceMemory(register_map, name)
@@ -60,7 +61,7 @@ class VirtualPlc:
         self._sleep = sleep
         self._server = ModbusServer({register_map.devices[name].device_id: self})
         self._setpoints = tuple(name for name in SETPOINTS if name in self.memory.points)
-        self._heartbeat: float | None = None
+        self._heartbeat = self.memory.value("heartbeat") if "heartbeat" in self.memory.points else None
         self._heard: np.datetime64 | None = None
         self._task: asyncio.Task[None] | None = None
         self.fallback = False
@@ -116,6 +117,8 @@ class VirtualPlc:
 
     def _setpoints_in_force(self) -> dict[str, float]:
         setpoints = dict(self._safe)
+        if self.fallback:
+            return setpoints
         for name in self._setpoints:
             value = self.memory.value(name)
             if value is not None:

@@ -44,7 +44,7 @@ title: everything that a map can say
 source: none
 buses:
   network: {transport: tls, host: 192.0.2.1, certificate_authority: ca.pem, server_name: plc}
-  line: {transport: rtu, serial_port: /dev/ttyS0, baudrate: 38400, parity: none, stop_bits: 2, timeout: 0.5 s, gap: 0.1 s}
+  line: {transport: rtu, serial_port: ttyS0, baudrate: 38400, parity: none, stop_bits: 2, timeout: 0.5 s, gap: 0.1 s}
 devices:
   plc: {bus: network, device_id: 3, gap: 0.02 s, longest_block: 60, bridge: 2}
   sensor: {bus: line, device_id: 240, unreadable: [{function: input, first: 8, last: 9}]}
