@@ -6,8 +6,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import datetime, timedelta
-from zoneinfo import ZoneInfo
+from datetime import datetime, timedelta, tzinfo
 
 from edge.status.history import Series
 
@@ -28,7 +27,7 @@ def sparkline(series: Series, *, width: int = 150, height: int = 36) -> str:
     """Return a small line without axes; empty for fewer than two points."""
     if len(series) < 2:
         return ""
-    x, y = _scales([series], 1, width - 1, height - 3, 3)
+    x, y = _scales([series], 3, width - 4, height - 4, 4)
     points = " ".join(f"{x(time):.1f},{y(value):.1f}" for time, value in series)
     last_time, last_value = series[-1]
     return (
@@ -37,7 +36,7 @@ def sparkline(series: Series, *, width: int = 150, height: int = 36) -> str:
     )
 
 
-def day_chart(lines: Sequence[Line], now: float, unit: str, zone: ZoneInfo) -> str:
+def day_chart(lines: Sequence[Line], now: float, unit: str, zone: tzinfo) -> str:
     """Return the chart of the last day and of the plan ahead; empty where there is nothing to draw."""
     lines = [line for line in lines if len(line.series) >= 2]
     if not lines:
@@ -102,7 +101,7 @@ def _ticks(low: float, high: float) -> list[float]:
     return [round(index * step, 10) for index in range(math.ceil(low / step), math.floor(high / step) + 1)]
 
 
-def _hours(start: float, end: float, zone: ZoneInfo) -> list[tuple[float, str]]:
+def _hours(start: float, end: float, zone: tzinfo) -> list[tuple[float, str]]:
     """Return the full six hours of local time in the range, with their names."""
     hour = datetime.fromtimestamp(start, zone).replace(minute=0, second=0, microsecond=0)
     found = []

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from datetime import datetime
+from datetime import datetime, tzinfo
 from html import escape
-from zoneinfo import ZoneInfo
 
 from edge.image import Quality
 from edge.ports import Plan, Snapshot
@@ -27,7 +26,7 @@ CLIMATE = ("air_temperature", "air_humidity", "air_co2", "global_radiation")
 DIGITS = {"degC": 1, "%": 0, "ppm": 0, "W m-2": 0, "m s-1": 1, "1": 2, "kg m-2 h-1": 4}
 
 
-def render_page(snapshot: Snapshot, history: History, zone: ZoneInfo, *, late: bool) -> str:
+def render_page(snapshot: Snapshot, history: History, zone: tzinfo, *, late: bool) -> str:
     """Return the whole page; it loads nothing from anywhere and renews itself."""
     parts = [
         _headline(snapshot, zone, late),
@@ -51,7 +50,7 @@ def render_page(snapshot: Snapshot, history: History, zone: ZoneInfo, *, late: b
     )
 
 
-def _headline(snapshot: Snapshot, zone: ZoneInfo, late: bool) -> str:
+def _headline(snapshot: Snapshot, zone: tzinfo, late: bool) -> str:
     if late:
         pill, text = "bad", "no cycle lately"
     elif not snapshot.link_ok:
@@ -116,7 +115,7 @@ def _setpoints(snapshot: Snapshot) -> str:
     return f"<section><h2>Setpoints</h2>{table}</section>" if rows else ""
 
 
-def _plan(snapshot: Snapshot, history: History, zone: ZoneInfo) -> str:
+def _plan(snapshot: Snapshot, history: History, zone: tzinfo) -> str:
     plan = snapshot.plan
     now = snapshot.time if snapshot.time is not None else 0.0
     chart = day_chart(
@@ -156,7 +155,7 @@ def _plan(snapshot: Snapshot, history: History, zone: ZoneInfo) -> str:
     return f"<section><h2>Plan against recipe</h2>{text}{chart}</section>"
 
 
-def _model(bundle: Mapping[str, object], zone: ZoneInfo) -> str:
+def _model(bundle: Mapping[str, object], zone: tzinfo) -> str:
     if not bundle.get("name"):
         refusal = f' <span class="tag warn">{escape(str(bundle["refusal"]))}</span>' if bundle.get("refusal") else ""
         return (
@@ -198,7 +197,7 @@ def _model(bundle: Mapping[str, object], zone: ZoneInfo) -> str:
     return f"<section><h2>Simulator</h2>{''.join(parts)}</section>"
 
 
-def _clamps(snapshot: Snapshot, zone: ZoneInfo) -> str:
+def _clamps(snapshot: Snapshot, zone: tzinfo) -> str:
     rows = [
         [
             "" if record.time is None else _local(record.time, zone, "%a %H:%M"),
@@ -297,5 +296,5 @@ def _euro(value: float, *, sign: bool = False) -> str:
     return f"{value:{'+' if sign else ''}.3f} €"
 
 
-def _local(time: float, zone: ZoneInfo, form: str) -> str:
+def _local(time: float, zone: tzinfo, form: str) -> str:
     return f"{datetime.fromtimestamp(time, zone):{form}}"

@@ -10,8 +10,9 @@ import logging
 import math
 import time
 from collections.abc import Callable
+from datetime import UTC, tzinfo
 from enum import Enum
-from zoneinfo import ZoneInfo
+from pathlib import Path
 
 from edge.ports import Snapshot
 from edge.status.history import History
@@ -23,20 +24,37 @@ CONNECTIONS = 16
 """At once; more are turned away, as a page must never cost the cycle its time."""
 REQUEST_BYTES = 8192
 REQUEST_SECONDS = 5.0
+STATE_FILE_SECONDS = 10.0
 
 
 class StatusServer:
     """Serves the newest snapshot on localhost."""
 
     def __init__(
-        self, port: int, zone: ZoneInfo, *, late_after: float = 60.0, wall: Callable[[], float] = time.monotonic
+        self,
+        port: int,
+        state_file: Path | None = None,
+        *,
+        zone: tzinfo = UTC,
+        late_after: float = 60.0,
+        wall: Callable[[], float] = time.monotonic,
     ) -> None:
-        """`late_after`: seconds (on `wall`) without a completed cycle after which health is lost."""
+        """Prepare to serve.
+
+        Args:
+            port: TCP port on localhost; 0 takes a free one.
+            state_file: where the state is left too, for when nobody can ask the port; None leaves it nowhere.
+            zone: time zone of the times on the page.
+            late_after: seconds (on `wall`) without a completed cycle after which health is lost.
+            wall: monotonic clock in seconds.
+        """
         self.port = port
         """The port that is listened to; 0 becomes the one that the system chose."""
         self.problem = ""
         """Empty while listening, else one line."""
         self._zone = zone
+        self._state_file = state_file
+        self._written_at = -math.inf
         self._late_after = late_after
         self._wall = wall
         self._published_at = -math.inf
@@ -60,12 +78,27 @@ class StatusServer:
         self._snapshot = snapshot
         self._published_at = self._wall()
         self._history.add(snapshot)
+        if self._state_file is not None and self._published_at - self._written_at >= STATE_FILE_SECONDS:
+            self._written_at = self._published_at
+            self._write_state()
 
     async def close(self) -> None:
-        """Stop listening."""
+        """Stop listening, and leave the last state."""
+        self._write_state()
         if self._server is not None:
             self._server.close()
             await self._server.wait_closed()
+
+    def _write_state(self) -> None:
+        if self._state_file is None or self._snapshot is None:
+            return
+        partial = self._state_file.with_name(self._state_file.name + ".part")
+        try:
+            # Not synchronised: it is made anew all the time, and a power cut may take it.
+            partial.write_text(json.dumps({"port": self.port, "state": plain(self._snapshot)}))
+            partial.replace(self._state_file)
+        except OSError as error:
+            self.problem = f"status file: {self._state_file}: {error.strerror or error}"
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._open += 1

@@ -40,6 +40,7 @@ th, td { padding:.35rem .9rem .35rem 0; border-bottom:1px solid var(--rule); ver
 tr:last-child td { border-bottom:0; }
 .number { text-align:right; white-space:nowrap; }
 td small, th small { color:var(--quiet); }
+td:first-child { white-space:nowrap; }
 summary { cursor:pointer; font-weight:600; }
 section p + p, section p + .scroll, .legend { margin-top:.4rem; }
 svg { display:block; max-width:100%; }

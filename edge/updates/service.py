@@ -244,7 +244,14 @@ class BundleUpdates:
         assert state.candidate is not None
         candidate = self._bundles[state.candidate]
         reference = self._bundles.get(state.active or "")
-        comparison = self._compare(candidate, reference, state.candidate_since, time)
+        try:
+            comparison = self._compare(candidate, reference, state.candidate_since, time)
+        except BundleError as error:
+            with self._lock:
+                state.candidate = None
+            self._reject(time, candidate.identity, candidate.label, f"cannot predict: {error}", None, {})
+            self._tidy()
+            return
         if not any(pair.count for pair in comparison.pairs):
             # A log full of gaps says nothing about the candidate; it waits for a better day.
             with self._lock:

@@ -16,7 +16,7 @@ from edge.status.page import render_page
 
 @pytest.fixture
 async def server():
-    made = StatusServer(0, ZONE)
+    made = StatusServer(0)
     await made.start()
     yield made
     await made.close()
@@ -46,7 +46,7 @@ async def test_before_the_first_cycle_nothing_is_claimed(server: StatusServer) -
 
 async def test_health_follows_link_and_cycles() -> None:
     now = 0.0
-    server = StatusServer(0, ZONE, late_after=60.0, wall=lambda: now)
+    server = StatusServer(0, late_after=60.0, wall=lambda: now)
     await server.start()
     server.publish(snapshot())
     assert (await get(server, "/health"))[0] == 200
@@ -171,11 +171,29 @@ async def test_too_many_visitors_are_turned_away_and_the_next_is_served(server: 
 
 
 async def test_a_port_that_is_taken_is_a_problem_and_no_reason_to_stop(server: StatusServer) -> None:
-    second = StatusServer(server.port, ZONE)
+    second = StatusServer(server.port)
     await second.start()
     assert f"port {server.port}" in second.problem
     second.publish(snapshot())
     await second.close()
+
+
+async def test_the_last_state_is_left_in_a_file_for_when_nobody_listens(tmp_path) -> None:
+    server = StatusServer(0, tmp_path / "status.json")
+    await server.start()
+    server.publish(snapshot())
+    left = json.loads((tmp_path / "status.json").read_text())
+    assert left["port"] == server.port
+    assert left["state"]["why"] == snapshot().why
+    server.publish(snapshot(why="another reason"))
+    await server.close()
+    assert json.loads((tmp_path / "status.json").read_text())["state"]["why"] == "another reason"
+
+
+async def test_a_state_file_that_cannot_be_written_is_a_problem_and_no_reason_to_stop(tmp_path) -> None:
+    server = StatusServer(0, tmp_path / "absent" / "status.json")
+    server.publish(snapshot())
+    assert "status.json" in server.problem
 
 
 def test_the_history_is_a_day_of_points_five_minutes_apart() -> None:

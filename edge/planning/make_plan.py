@@ -1,0 +1,130 @@
+"""From a request to a plan: what the planning process runs."""
+
+from __future__ import annotations
+
+import functools
+import math
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.planning.forecast import from_forecast, persistence
+from edge.ports import Plan, PlanRequest
+from igrow_core.bundle import Bundle, read_bundle
+from igrow_core.errors import IgrowError
+from igrow_core.planner import Budget, PlanningState, Simulator, optimise
+from igrow_core.planner.onnx_generation import OnnxGeneration
+from igrow_core.planner.template import for_site
+from igrow_core.quantities import SETPOINTS
+from igrow_core.simulator.plan import BundleSimulator
+from igrow_core.site import Site
+from igrow_core.telemetry import Telemetry
+
+HOUR = 3600
+PRESENT_SECONDS = 2 * HOUR
+"""A value of the log that is older says nothing about the present (slow quantities excepted)."""
+VALID_HOURS = 24
+"""Longest time a plan is followed; the site's pace of planning replaces it much sooner."""
+SLOW = ("leaf_area_index", "plant_load", "net_growth", "fruit_fresh_weight")
+"""Quantities whose last value counts, however old: they are counted by hand, weekly."""
+
+
+def make_plan(site: Site, request: PlanRequest) -> Plan:
+    """Search for the setpoints over the request's horizon; raises IgrowError where something is missing."""
+    bundle, simulator, generation = _open(request.bundle)
+    start = int(request.time)
+    horizon = round(len(next(iter(request.recipe.values()))) * request.step_seconds)
+    # The simulator knows whole days; the hours beyond the horizon are planned too, and not used.
+    hours = 24 * math.ceil(horizon / (24 * HOUR))
+    forecast = (
+        persistence(request.telemetry, start, hours)
+        if request.forecast is None
+        else from_forecast(request.forecast, request.telemetry, start, hours)
+    )
+    state = PlanningState(
+        time=np.datetime64(start, "s"),
+        initial=present(request.telemetry, start),
+        applied=present(request.telemetry.only(name for name in SETPOINTS if name in request.telemetry), start),
+    )
+    result = optimise(
+        simulator,
+        site,
+        state,
+        forecast,
+        hourly_recipe(site, request, hours),
+        np.random.default_rng(request.seed),
+        Budget(),
+        generation=generation,
+        template=for_site(site, state.time, hours),
+    )
+    steps = round(horizon / request.step_seconds)
+    hour_of_step = [int(step * request.step_seconds) // HOUR for step in range(steps)]
+    outcome = result.outcome
+    return Plan(
+        created=request.time,
+        start=request.time,
+        step_seconds=request.step_seconds,
+        setpoints={
+            name: tuple(float(result.setpoints[hour, column]) for hour in hour_of_step)
+            for column, name in enumerate(SETPOINTS)
+            if name in request.recipe
+        },
+        valid_until=request.time + min(horizon, VALID_HOURS * HOUR),
+        bundle=bundle.label,
+        expected_profit=result.expected_profit,
+        recipe_profit=result.recipe_profit,
+        leaves_range=result.leaves_range,
+        note="follows the recipe: nothing better was found" if result.follows_recipe else "",
+        predicted={
+            name: tuple(float(values[:, 0, hour].mean()) for hour in hour_of_step)
+            for name, values in (
+                ("air_temperature", outcome.air_temperature),
+                ("air_humidity", outcome.air_humidity),
+                ("air_co2", outcome.air_co2),
+            )
+        },
+    )
+
+
+def present(log: Telemetry, start: int) -> dict[str, float]:
+    """Return the last value of each quantity before `start` that still counts."""
+    seconds = log.time.astype(np.int64)
+    values = {}
+    for name, column in log.columns.items():
+        usable = np.isfinite(column) & (seconds <= start)
+        if name not in SLOW:
+            usable &= seconds > start - PRESENT_SECONDS
+        found = np.flatnonzero(usable)
+        if len(found):
+            values[name] = float(column[found[-1]])
+    return values
+
+
+def hourly_recipe(site: Site, request: PlanRequest, hours: int) -> NDArray[np.float64]:
+    """Return the recipe (hours, 4) in the order of `SETPOINTS`; a setpoint that the site lacks stands at safe."""
+    table = np.empty((hours, len(SETPOINTS)))
+    for column, name in enumerate(SETPOINTS):
+        course = request.recipe.get(name)
+        if course is None:
+            table[:, column] = site.limits[name].safe
+            continue
+        given = [course[int(hour * HOUR / request.step_seconds)] for hour in range(_covered(course, request, hours))]
+        # What lies beyond the course repeats the day before.
+        for hour in range(hours):
+            table[hour, column] = given[hour] if hour < len(given) else table[hour - min(24, len(given)), column]
+    if not np.isfinite(table).all():
+        raise IgrowError("the recipe holds a value that is no number")
+    return table
+
+
+def _covered(course: tuple[float, ...], request: PlanRequest, hours: int) -> int:
+    """Return how many of the hours begin within a course."""
+    return min(hours, math.ceil(len(course) * request.step_seconds / HOUR))
+
+
+@functools.lru_cache(maxsize=1)
+def _open(folder: Path) -> tuple[Bundle, Simulator, OnnxGeneration]:
+    """Open the bundle in force once; a request with another bundle closes it."""
+    bundle = read_bundle(folder)
+    return bundle, BundleSimulator(bundle), OnnxGeneration(bundle.graph("optimizer"))
