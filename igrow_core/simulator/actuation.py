@@ -56,6 +56,7 @@ _ROWS = (
     ("lamp_radiation_limit", "W m-2", 400.0, 0.0, 1500.0, "global radiation above which the PLC puts the lamps off"),
     ("co2_capacity", "kg m-2 h-1", 0.015, 0.0, 0.1, "most CO2 dosed"),
     ("co2_offset", "ppm", -20.0, -300.0, 300.0, "air above the CO2 setpoint while the PLC doses"),
+    ("irrigation_rate", "L m-2 h-1", 1.5, 0.0, 20.0, "irrigation while it is asked for, mean over its pulses"),
     ("co2_vent_stop", "1", 0.5, 0.02, 2.0, "mean vent opening at which dosing has stopped"),
 )
 

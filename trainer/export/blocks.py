@@ -62,6 +62,16 @@ def trace(name: str, formula: Formula, inputs: Sequence[str]) -> Block:
     return Block(name, tuple(kept), tuple(results), function)
 
 
+def grouped(arrays: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return arrays named ``group:name`` as {group: {name: array}}; others are left out."""
+    groups: dict[str, dict[str, Any]] = {}
+    for key, value in arrays.items():
+        group, colon, name = key.partition(":")
+        if colon:
+            groups.setdefault(group, {})[name] = value
+    return groups
+
+
 class Wiring:
     """The nodes of one graph as they are put together; tensors are known by their names."""
 

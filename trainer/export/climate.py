@@ -16,7 +16,7 @@ from igrow_core.simulator.hybrid import climate
 from igrow_core.simulator.hybrid.climate import memory_name
 from igrow_core.simulator.hybrid.measurement import PREDICTED
 from igrow_core.simulator.hybrid.parameters import PARAMETERS
-from trainer.export.blocks import Block, Wiring, trace
+from trainer.export.blocks import Block, Wiring, grouped, trace
 
 CONSTANTS = ("mean_height", "lamp_efficacy")
 """Site constants that travel with the parameters."""
@@ -46,6 +46,8 @@ class ClimateBlocks:
     """`climate.STATES` and the memories of the active effects."""
     parameters: tuple[str, ...]
     """Constants, physical parameters, and parameters of the effects as ``effect:name:parameter``; then onsets."""
+    channels: tuple[str, ...]
+    """What the active effects add, as ``added:channel``."""
     derive: Block
     relax: Block
     from_measured: Block
@@ -88,7 +90,16 @@ def climate_blocks(effects: Sequence[str]) -> ClimateBlocks:
         names += [effect_parameter(effect.name, parameter.name) for parameter in effect.parameters]
         names += [effect_parameter(effect.name, "onset")] if "elapsed_days" in effect.drivers else []
     from_measured = trace("climate_state", _state_formula, PREDICTED)
-    return ClimateBlocks(inputs, (*climate.STATES, *memories), tuple(names), derive, relax, from_measured, blocks)
+    return ClimateBlocks(
+        inputs,
+        (*climate.STATES, *memories),
+        tuple(names),
+        tuple(_tag("added", channels)),
+        derive,
+        relax,
+        from_measured,
+        blocks,
+    )
 
 
 def effect_parameter(effect: str, parameter: str) -> str:
@@ -118,6 +129,28 @@ def wire_step(
         day: tensor (1,), days since the bundle's reference time, for effects that age.
     """
     drivers = wire_drivers(wiring, blocks, state, inputs, parameters)
+    added, following = wire_effects(wiring, blocks, drivers, state, parameters, seconds=seconds, day=day)
+    tensors = (
+        {f"state:{name}": state[name] for name in climate.STATES}
+        | {f"driver:{name}": tensor for name, tensor in drivers.items()}
+        | added
+        | dict(parameters)
+        | {"seconds": seconds}
+    )
+    return following | wiring.call(blocks.relax, tensors), drivers
+
+
+def wire_effects(
+    wiring: Wiring,
+    blocks: ClimateBlocks,
+    drivers: Mapping[str, str],
+    state: Mapping[str, str],
+    parameters: Mapping[str, str],
+    *,
+    seconds: str,
+    day: str,
+) -> tuple[dict[str, str], dict[str, str]]:
+    """Wire the active effects; returns what they add, as ``added:channel``, and their following memories."""
     added: dict[str, list[str]] = {}
     following: dict[str, str] = {}
     for one in blocks.effects:
@@ -127,15 +160,7 @@ def wire_step(
                 added.setdefault(channel, []).append(tensor)
         if one.memory:
             following[memory_name(one.effect.name)] = wiring.call(one.memory, tensors | {"seconds": seconds})["memory"]
-    tensors = (
-        {f"state:{name}": state[name] for name in climate.STATES}
-        | {f"driver:{name}": tensor for name, tensor in drivers.items()}
-        | {f"added:{channel}": wiring.total(parts) for channel, parts in added.items()}
-        | dict(parameters)
-        | {"seconds": seconds}
-    )
-    following |= wiring.call(blocks.relax, tensors)
-    return following, drivers
+    return {f"added:{channel}": wiring.total(parts) for channel, parts in added.items()}, following
 
 
 def wire_drivers(
@@ -146,12 +171,12 @@ def wire_drivers(
     parameters: Mapping[str, str],
 ) -> dict[str, str]:
     """Wire the drivers; where the pipe sensors are known to be off, they are corrected first."""
-    drivers = _call_derive(wiring, blocks, state, inputs, parameters)
+    drivers = wire_derived(wiring, blocks, state, inputs, parameters)
     for one in blocks.effects:
         if one.effect.name == "pipe_temperature_offset":
             errors = wiring.call(one.contribution, _effect_tensors(wiring, one, drivers, state, parameters, ""))
             corrected = {name: wiring.add("Sub", [inputs[name], error])[0] for name, error in errors.items()}
-            drivers = _call_derive(wiring, blocks, state, dict(inputs) | corrected, parameters)
+            drivers = wire_derived(wiring, blocks, state, dict(inputs) | corrected, parameters)
     return drivers
 
 
@@ -199,7 +224,7 @@ def wire_rest(
     """Wire the state that agrees with a measured climate: floor as warm as the air, memories at rest."""
     state = wiring.call(blocks.from_measured, measured)
     state["mass_temperature"] = state["air_temperature"]
-    drivers = _call_derive(wiring, blocks, state, inputs, parameters)
+    drivers = wire_derived(wiring, blocks, state, inputs, parameters)
     for one in blocks.effects:
         if one.start:
             # A memory at rest does not depend on the memory; the tensor only fills the block's signature.
@@ -212,13 +237,14 @@ def _no_memory(one: EffectBlocks) -> dict[str, str]:
     return {memory_name(one.effect.name): ""}
 
 
-def _call_derive(
+def wire_derived(
     wiring: Wiring,
     blocks: ClimateBlocks,
     state: Mapping[str, str],
     inputs: Mapping[str, str],
     parameters: Mapping[str, str],
 ) -> dict[str, str]:
+    """Wire the drivers of a state and its inputs."""
     tensors = (
         {f"state:{name}": state[name] for name in climate.STATES}
         | {f"input:{name}": inputs[name] for name in blocks.inputs}
@@ -285,15 +311,15 @@ def _effect_blocks(effect: Effect, drivers: Sequence[str]) -> EffectBlocks:
 
 
 def _derive_formula(xp: Any, arrays: Mapping[str, Any]) -> Mapping[str, Any]:
-    groups = _groups(arrays)
-    derived = climate.derive(xp, groups["state"], groups["input"], groups["parameter"], arrays["lamp_efficacy"])
-    return {name: value for name, value in derived.items() if name not in groups["input"]}
+    named = grouped(arrays)
+    derived = climate.derive(xp, named["state"], named["input"], named["parameter"], arrays["lamp_efficacy"])
+    return {name: value for name, value in derived.items() if name not in named["input"]}
 
 
 def _relax_formula(xp: Any, arrays: Mapping[str, Any]) -> Mapping[str, Any]:
-    groups = _groups(arrays)
+    named = grouped(arrays)
     return climate.relax(
-        xp, groups["state"], groups["driver"], groups["parameter"], groups.get("added", {}), arrays["seconds"]
+        xp, named["state"], named["driver"], named["parameter"], named.get("added", {}), arrays["seconds"]
     )
 
 
@@ -304,15 +330,6 @@ def _state_formula(xp: Any, arrays: Mapping[str, Any]) -> Mapping[str, Any]:
         "vapour_concentration": air.vapour_concentration(xp, temperature, arrays["air_humidity"]),
         "co2_concentration": air.co2_concentration(temperature, arrays["air_co2"]),
     }
-
-
-def _groups(arrays: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    groups: dict[str, dict[str, Any]] = {}
-    for key, value in arrays.items():
-        group, colon, name = key.partition(":")
-        if colon:
-            groups.setdefault(group, {})[name] = value
-    return groups
 
 
 def _tag(group: str, names: Sequence[str] | Mapping[str, Any]) -> list[str]:

@@ -7,12 +7,12 @@ freely. See `INPUTS` and `OUTPUTS` for the shapes; everything is float32.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from onnx import GraphProto, ModelProto, TensorProto, ValueInfoProto, checker, helper
 
 from igrow_core.simulator.hybrid.measurement import PREDICTED
-from trainer.export.blocks import DOMAIN, IR_VERSION, OPSET, Wiring
+from trainer.export.blocks import DOMAIN, IR_VERSION, OPSET, Block, Wiring
 from trainer.export.climate import ClimateBlocks, wire_drivers, wire_errors, wire_measured, wire_rest, wire_step
 
 INPUTS: Mapping[str, tuple[str | int, ...]] = {
@@ -54,19 +54,19 @@ def hindcast_model(blocks: ClimateBlocks) -> ModelProto:
     graph = helper.make_graph(
         outer.nodes,
         "hindcast",
-        [_float(name, shape) for name, shape in INPUTS.items()],
-        [_float(name, shape) for name, shape in OUTPUTS.items()],
+        [float_tensor(name, shape) for name, shape in INPUTS.items()],
+        [float_tensor(name, shape) for name, shape in OUTPUTS.items()],
         outer.initializers,
     )
-    return finished_model(graph, blocks)
+    return finished_model(graph, blocks.blocks)
 
 
-def finished_model(graph: GraphProto, *parts: ClimateBlocks) -> ModelProto:
+def finished_model(graph: GraphProto, blocks: Sequence[Block]) -> ModelProto:
     """Return the checked model of a graph with the blocks that it calls."""
     model = helper.make_model(
         graph,
         opset_imports=[helper.make_opsetid("", OPSET), helper.make_opsetid(DOMAIN, 1)],
-        functions=[block.function for part in parts for block in part.blocks],
+        functions=[block.function for block in blocks],
         ir_version=IR_VERSION,
         producer_name="igrow",
     )
@@ -101,16 +101,20 @@ def _row_graph(blocks: ClimateBlocks, parameters: Mapping[str, str]) -> GraphPro
         wiring.nodes,
         "row",
         [
-            _float("state", (len(blocks.states), "batch")),
-            _float("row_inputs", (len(blocks.inputs), "batch")),
-            _float("row_measured", (len(PREDICTED), "batch")),
-            _float("row_follow", (1,)),
-            _float("row_day", (1,)),
+            float_tensor("state", (len(blocks.states), "batch")),
+            float_tensor("row_inputs", (len(blocks.inputs), "batch")),
+            float_tensor("row_measured", (len(PREDICTED), "batch")),
+            float_tensor("row_follow", (1,)),
+            float_tensor("row_day", (1,)),
         ],
-        [_float("state_next", (len(blocks.states), "batch")), _float("row_predicted", (len(PREDICTED), "batch"))],
+        [
+            float_tensor("state_next", (len(blocks.states), "batch")),
+            float_tensor("row_predicted", (len(PREDICTED), "batch")),
+        ],
         wiring.initializers,
     )
 
 
-def _float(name: str, shape: tuple[str | int, ...]) -> ValueInfoProto:
+def float_tensor(name: str, shape: tuple[str | int, ...]) -> ValueInfoProto:
+    """Return the description of a float32 input or output."""
     return helper.make_tensor_value_info(name, TensorProto.FLOAT, list(shape))

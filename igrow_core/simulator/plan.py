@@ -1,0 +1,147 @@
+"""A bundle's simulator for the planner: setpoints in, climate, resources, growth and harvest out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow_core import sun
+from igrow_core.bundle import Bundle, BundleError, open_session
+from igrow_core.errors import IgrowError
+from igrow_core.planner.objective import Outcome
+from igrow_core.quantities import GROWTH, WEATHER
+from igrow_core.simulator.hindcast import SimulatorSettings
+from igrow_core.simulator.hybrid.measurement import PREDICTED
+
+Floats = NDArray[np.float64]
+
+STEPS_PER_HOUR = 2
+"""Steps of the climate and the actuation stage in an hour."""
+CLOCK = ("sun_elevation", "sun_azimuth", "hour")
+"""What the graph's input `clock` holds at the middle of each hour."""
+EQUIPMENT = ("vent_lee", "vent_wind", "rail_pipe_excess", "co2_dosing")
+"""Where the equipment stands when the plan begins: %, %, K and kg m-2 h-1."""
+CLIMATE_OUT = (*PREDICTED, "par")
+"""What the graph's output `climate` holds at the end of each hour (par: its mean)."""
+RESOURCES = ("heat", "electricity", "co2")
+"""MJ m-2, kWh m-2 and kg m-2 used in each hour."""
+
+_ABSENT_WEATHER = {"wind_direction": 225.0, "rain": 0.0}
+"""Stand-ins for weather that no forecast holds."""
+_USUAL = {
+    "air_temperature": 20.0,
+    "air_humidity": 75.0,
+    "air_co2": 500.0,
+    "leaf_area_index": 3.0,
+    "plant_load": 100.0,
+    "net_growth": 0.0,
+    "fruit_fresh_weight": 0.0,
+}
+"""Stand-ins for an initial value that is not known."""
+
+
+class BundleSimulator:
+    """Runs simulator.onnx of a bundle; implements `igrow_core.planner.objective.Simulator`."""
+
+    def __init__(self, bundle: Bundle, *, threads: int = 1, members: int | None = None) -> None:
+        """Open the graph.
+
+        Args:
+            bundle: with a `simulator` of the hybrid variant.
+            threads: of onnxruntime.
+            members: how many of the posterior's draws to run (None: all that the bundle carries; 1: the mean alone).
+
+        Raises:
+            BundleError: the graph or the manifest cannot be used.
+        """
+        self.settings = SimulatorSettings.of(bundle)
+        self._session = open_session(bundle.graph("simulator"), threads=threads)
+        try:
+            tensors = {one.name: one.quantities for one in bundle.manifest.graphs["simulator"].inputs}
+            self._weather = tensors["weather"]
+            names = tensors["parameters"]
+            mean = np.array([self.settings.parameters[name] for name in names])
+            draws = [[draw[name] for name in names if name in draw] for draw in bundle.manifest.simulator["members"]]
+            varied = [name for name in names if draws and name in bundle.manifest.simulator["members"][0]]
+        except (KeyError, TypeError) as error:
+            raise BundleError(f"{bundle.folder}: manifest.json: {error} is missing or not usable") from None
+        self._parameters = np.tile(mean, (1 + len(draws), 1))
+        columns = [names.index(name) for name in varied]
+        for row, draw in enumerate(draws, start=1):
+            self._parameters[row, columns] = draw
+        self._parameters = self._parameters[: members or len(self._parameters)]
+
+    def simulate(self, initial: dict[str, float], weather: Floats, setpoints: Floats, start: np.datetime64) -> Outcome:
+        """Return what candidates do; see `igrow_core.planner.objective.Simulator`.
+
+        Raises:
+            IgrowError: the horizon is not a number of whole days.
+        """
+        candidates, hours, _ = setpoints.shape
+        if hours == 0 or hours % 24:
+            raise IgrowError(f"a plan needs whole days, not {hours} hours")
+        members = len(self._parameters)
+        batch = members * candidates
+        time = start.astype("datetime64[s]") + np.arange(hours) * np.timedelta64(3600, "s")
+        given = {name: _known(initial, name) for name in (*PREDICTED, *GROWTH, "fruit_fresh_weight")}
+        positions = [initial.get(name, 0.0) for name in ("vent_lee", "vent_wind", "co2_dosing")]
+        excess = max(initial.get("rail_pipe_temperature", 0.0) - given["air_temperature"], 0.0)
+
+        def spread(values: list[float]) -> Floats:
+            return np.tile(np.nan_to_num(np.array(values))[:, None], (1, batch))
+
+        feed = {
+            "climate": spread([given[name] for name in PREDICTED]),
+            "growth": spread([given[name] for name in GROWTH]),
+            "harvest": spread([given["fruit_fresh_weight"]]),
+            "equipment": spread([*positions[:2], excess, positions[2]]),
+            "weather": self._columns(weather)[:, :, None],
+            "clock": self._clock(time)[:, :, None],
+            "day": self.settings.day(time)[:, None],
+            "setpoints": np.tile(np.moveaxis(setpoints, 0, -1), (1, 1, members)),
+            "parameters": np.repeat(self._parameters.T, candidates, axis=1),
+        }
+        names = ["climate_out", "resources", "growth_out", "harvest_out", "outside"]
+        results = self._session.run(
+            names, {name: np.ascontiguousarray(array, dtype=np.float32) for name, array in feed.items()}
+        )
+        out = {name: np.moveaxis(array, 0, -1).astype(np.float64) for name, array in zip(names, results, strict=True)}
+
+        def member(array: Floats) -> Floats:
+            return array.reshape(members, candidates, hours)
+
+        net_growth = out["growth_out"][GROWTH.index("net_growth")]
+        before = np.full((batch, 1), given["net_growth"])
+        picked = np.diff(out["harvest_out"][0], axis=-1, prepend=given["fruit_fresh_weight"])
+        return Outcome(
+            air_temperature=member(out["climate_out"][0]),
+            air_humidity=member(out["climate_out"][1]),
+            air_co2=member(out["climate_out"][2]),
+            heat=member(out["resources"][0]),
+            electricity=member(out["resources"][1]),
+            co2=member(out["resources"][2]),
+            net_growth=member(np.diff(net_growth, axis=-1, prepend=before)),
+            fruit_fresh_weight=member(np.repeat(picked / 24.0, 24, axis=-1)),
+            outside=member(out["outside"]),
+        )
+
+    def _columns(self, weather: Floats) -> Floats:
+        """Return the graph's weather (hours, w) from the planner's six columns."""
+        columns = []
+        for name in self._weather:
+            if WEATHER.index(name) < weather.shape[1]:
+                columns.append(weather[:, WEATHER.index(name)])
+            else:
+                columns.append(np.full(len(weather), _ABSENT_WEATHER[name]))
+        return np.stack(columns, axis=1)
+
+    def _clock(self, time: NDArray[np.datetime64]) -> Floats:
+        middle = sun.unix_seconds(time) + 1800.0
+        return np.stack(sun.position(np, middle, self.settings.latitude, self.settings.longitude), axis=1)
+
+
+def _known(initial: Mapping[str, float], name: str) -> float:
+    value = initial.get(name, np.nan)
+    return value if np.isfinite(value) else _USUAL[name]
