@@ -150,8 +150,8 @@ class GreenhouseParameters:
     # Canopy gas exchange
     boundary_resistance: Number = 275.0
     """Resistance of the leaf boundary layer to vapour, s m-1 [V]."""
-    minimum_stomatal_resistance: Number = 110.0
-    """Stomatal resistance at full light, s m-1 [V] 82."""
+    minimum_stomatal_resistance: Number = 82.0
+    """Stomatal resistance at full light, s m-1 [V]."""
     night_stomatal_resistance: Number = 1600.0
     """Upper limit of the stomatal resistance, s m-1 [C] after [S]."""
     floor_wetness: Number = 0.03

@@ -25,6 +25,8 @@ from igrow_core.greenhouse.sensors import Sensors
 from igrow_core.greenhouse.state import PlantState, add
 from igrow_core.greenhouse.weather_table import WeatherTable
 
+__all__ = ["SCAN", "SLOW", "TICK", "Plant", "PlantState"]
+
 SCAN = 60.0
 """Time between two decisions of the climate computer, s; as on many PLCs, and independent of the climate's step."""
 TICK = 60.0
@@ -87,6 +89,7 @@ class Plant:
             noise={},
             sensor_errors={},
             memory=[],
+            trend=[0.0 * like] * 5,
             generator=np.random.default_rng(seed),
         )
         self._area = tomato.leaf_area_index(parameters, grown)
@@ -121,10 +124,13 @@ class Plant:
                 SCAN,
             )
         c = s.control
-        air = s.climate.air
-        ppm = co2_fraction(air, s.climate.co2)
+        # What is held during a tick is taken at its middle, where the last tick's trend leads: second order again.
+        air, top, leaf, vapour_content, co2_content = (
+            value + 0.5 * seconds * slope for value, slope in zip(_guided(s.climate), s.trend, strict=True)
+        )
+        ppm = co2_fraction(air, co2_content)
         vent = ventilation.through_vents(
-            xp, p, c.vent_lee, c.vent_wind, weather.wind_speed, s.climate.top - weather.outdoor_temperature
+            xp, p, c.vent_lee, c.vent_wind, weather.wind_speed, top - weather.outdoor_temperature
         )
         leak = 0.5 * ventilation.leakage(xp, p, weather.wind_speed)
         lamp_power = p.lamp_capacity * c.lamp
@@ -141,12 +147,12 @@ class Plant:
         )
 
         # Gas exchange of the crop
-        leaf_vapour = saturation_pressure(xp, s.climate.canopy) - 461.5 * s.climate.vapour * (air + 273.15)
+        leaf_vapour = saturation_pressure(xp, leaf) - 461.5 * vapour_content * (air + 273.15)
         stress = clip(xp, s.slab / (0.5 * p.slab_capacity), 0.0, 1.0)
         radiation = light.par * (1.0 / 2.1)
         stomata = canopy.stomatal_resistance(xp, p, radiation, ppm, xp.maximum(leaf_vapour, 0.0), stress)
         conductance = canopy.vapour_conductance(p, area, stomata)
-        fixed = canopy.photosynthesis(xp, p, light.par_absorbed, ppm, s.climate.canopy, area)
+        fixed = canopy.photosynthesis(xp, p, light.par_absorbed, ppm, leaf, area)
         fixed = fixed * tomato.assimilation_share(xp, s.crop) * (0.3 + 0.7 * stress)
         uptake = 0.04401 * fixed + added.get("assimilation", zero)
         respired = tomato.CO2_PER_CARBOHYDRATE * s.respiration
@@ -183,7 +189,9 @@ class Plant:
             rail_heat=c.rail_heat,
             grow_heat=c.grow_heat,
         )
+        before = _guided(s.climate)
         s.climate, ledger = climate.advance(xp, p, s.climate, conditions, seconds)
+        s.trend = [(after - old) / seconds for after, old in zip(_guided(s.climate), before, strict=True)]
         s.light = light
         s.transpiration = ledger.transpiration / seconds
         s.assimilation = uptake
@@ -261,6 +269,11 @@ class Plant:
         """Take up a saved state; the plant goes on exactly as it would have."""
         self.state = copy.deepcopy(state)
         self._area = tomato.leaf_area_index(self.parameters, self.state.crop)
+
+
+def _guided(state: Climate) -> tuple[Array, ...]:
+    """Return the states on which stomata, photosynthesis and vents depend."""
+    return state.air, state.top, state.canopy, state.vapour, state.co2
 
 
 def _picking_day(seconds: float, longitude: float) -> int:

@@ -51,6 +51,8 @@ class PlantState:
     sensor_errors: dict[str, Array]
     memory: list[Any]
     """Of the hidden effects."""
+    trend: list[Array]
+    """Change per second, in the last tick, of the states that the gas exchange depends on."""
     generator: np.random.Generator
     totals: dict[str, Array] = field(default_factory=dict)
     """Everything that crossed the boundary since the start: J m-2 and kg m-2."""

@@ -64,7 +64,7 @@ class Crop(NamedTuple):
     removed: Array
     """Carbohydrate in picked leaves, kg m-2, cumulative."""
     net_growth: Array
-    """Assimilation less respiration, kg carbohydrate m-2, cumulative."""
+    """What was planted and, since, assimilation less respiration: kg carbohydrate m-2, cumulative."""
 
 
 class Rates(NamedTuple):
@@ -101,7 +101,7 @@ def young_crop(p: GreenhouseParameters, like: Array, leaf_area_index: float = 0.
         growth_rate=zero + 5e-7,
         harvested=zero,
         removed=zero,
-        net_growth=zero,
+        net_growth=zero + 0.004 + 2.2 * leaf,
     )
 
 
@@ -112,12 +112,13 @@ def mature_crop(p: GreenhouseParameters, like: Array, leaf_area_index: float = 2
     ones = np.ones((STAGES, *np.shape(like)))
     fruits = ones * (truss_rate(20.0) * 86_400.0 * 51.0 / STAGES) * p.stem_density * p.fruits_per_truss
     weight = np.cumsum(SINK) / np.sum(SINK) * 0.0011
-    return young._replace(
+    grown = young._replace(
         stem=12.0 * young.leaf,
         fruit=fruits * weight.reshape(shape),
         fruits=fruits,
         temperature_sum=young.temperature_sum + 150.0 + p.generative_sum,
     )
+    return grown._replace(net_growth=stored_carbohydrate(grown))
 
 
 def truss_rate(temperature: Array) -> Array:

@@ -47,8 +47,8 @@ def autoregressive(
 ) -> NDArray[np.float64]:
     """Return a stationary AR(1) series of unit variance, shape (count,), with the given correlation time."""
     keep = float(np.exp(-step / correlation_seconds))
-    drawn = rng.standard_normal(count) * np.sqrt(1.0 - keep * keep)
-    drawn[0] = rng.standard_normal()
+    drawn = rng.standard_normal(count)
+    drawn[1:] *= np.sqrt(1.0 - keep * keep)
     # Blocks turn the recursion into products of whole arrays; 256 steps keep the powers within range.
     series = np.empty(count)
     block = 256

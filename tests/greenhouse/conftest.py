@@ -1,0 +1,19 @@
+"""Two weeks of generated weather, in winter and in spring."""
+
+from __future__ import annotations
+
+import pytest
+from greenhouse_seasons import SPRING, WINTER, hours
+
+from igrow_core.greenhouse import generate_weather
+from igrow_core.telemetry import Telemetry
+
+
+@pytest.fixture(scope="session")
+def winter() -> Telemetry:
+    return generate_weather(WINTER, WINTER + hours(24 * 15), seed=5)
+
+
+@pytest.fixture(scope="session")
+def spring() -> Telemetry:
+    return generate_weather(SPRING, SPRING + hours(24 * 15), seed=7)

@@ -1,0 +1,74 @@
+"""A batch on arrays and a single greenhouse on floats are the same plant."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+from greenhouse_seasons import SPRING, hours
+
+from igrow_core.errors import IgrowError
+from igrow_core.greenhouse import GreenhouseParameters, HiddenEffect, recipe, simulate, simulate_many
+from igrow_core.greenhouse.disturbances import QUIET
+from igrow_core.greenhouse.parameters import KNOWN
+from igrow_core.greenhouse.sensors import EXACT
+from igrow_core.telemetry import Telemetry
+
+
+def test_each_of_a_batch_runs_as_it_would_alone(spring: Telemetry) -> None:
+    rng = np.random.default_rng(4)
+    parameters = [GreenhouseParameters().varied(rng) for _ in range(3)]
+    effects = [
+        [HiddenEffect("wind_infiltration", 0.2)],
+        [],
+        [HiddenEffect("soil_heat_storage"), HiddenEffect("co2_drift")],
+    ]
+    end = SPRING + hours(18)
+    together = simulate_many(
+        parameters, spring, recipe, SPRING, end, count=3, seed=1, effects=effects, disturbances=QUIET, sensors=EXACT
+    )
+    for one, own, batch in zip(parameters, effects, together, strict=True):
+        alone = simulate(one, spring, recipe, SPRING, end, seed=1, effects=own, disturbances=QUIET, sensors=EXACT)
+        for name, values in alone.measured.columns.items():
+            np.testing.assert_allclose(batch.measured[name], values, rtol=1e-7, atol=1e-7, err_msg=name)
+        assert batch.total("heat") == pytest.approx(alone.total("heat"), rel=1e-9)
+
+
+def test_each_of_a_batch_may_have_its_own_weather_and_setpoints(winter: Telemetry, spring: Telemetry) -> None:
+    shifted = Telemetry(spring.time, {name: winter[name] for name in spring.columns})
+    cold = Telemetry(spring.time[:1], {"heating_setpoint": np.array([15.0])})
+    warm = Telemetry(spring.time[:1], {"heating_setpoint": np.array([22.0])})
+    first, second = simulate_many(
+        GreenhouseParameters(), [spring, shifted], [cold, warm], SPRING, SPRING + hours(12), count=2, seed=1
+    )
+    assert second.total("heat") > first.total("heat") + 1.0
+    np.testing.assert_allclose(second.true["wind_speed"], winter["wind_speed"][: len(second.true)], atol=1e-9)
+    assert (first.true["heating_setpoint"][-1], second.true["heating_setpoint"][-1]) == (15.0, 22.0)
+    assert not np.allclose(first.true["wind_speed"], second.true["wind_speed"])
+
+
+def test_a_list_of_the_wrong_length_is_refused(spring: Telemetry) -> None:
+    with pytest.raises(IgrowError, match="3 greenhouses needs 3 sets"):
+        simulate_many([GreenhouseParameters()], spring, recipe, SPRING, SPRING + hours(1), count=3, seed=1)
+    with pytest.raises(IgrowError, match="one list each"):
+        simulate_many(
+            GreenhouseParameters(), spring, recipe, SPRING, SPRING + hours(1), count=3, seed=1, effects=[[], []]
+        )
+
+
+def test_varied_parameters_are_off_by_the_asked_size_and_known_ones_not_at_all() -> None:
+    rng = np.random.default_rng(0)
+    base = GreenhouseParameters()
+    factors = [np.log(base.varied(rng, 0.08).air_height / base.air_height) for _ in range(400)]
+    assert np.std(factors) == pytest.approx(0.08, rel=0.15)
+    varied = base.varied(rng)
+    assert all(getattr(varied, name) == getattr(base, name) for name in KNOWN)
+    assert varied.cover_transmission <= 0.98
+
+
+@pytest.mark.soak
+def test_one_step_of_one_greenhouse_costs_at_most_two_milliseconds(spring: Telemetry) -> None:
+    start = time.perf_counter()
+    simulate(GreenhouseParameters(), spring, recipe, SPRING, SPRING + hours(96), seed=1)
+    assert (time.perf_counter() - start) / (96 * 12) < 2e-3
