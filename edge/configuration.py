@@ -43,7 +43,11 @@ class ClockSource(Enum):
     """Whose clock the daemon follows."""
 
     SYSTEM = "system"
+    """The machine's own: a real greenhouse."""
     PLC = "plc"
+    """The register plc_clock: a simulated plant that runs at its own pace."""
+    LOCKSTEP = "lockstep"
+    """The same, of a simulated plant that moves on with each heartbeat and so waits for plans and updates."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +58,7 @@ class CycleSettings:
         low=_SECOND, high=10 * _MINUTE, default=10 * _SECOND, help="time between two cycles"
     )
     clock: ClockSource = setting(
-        default=ClockSource.SYSTEM, help="plc follows the register plc_clock: for simulated plants, faster than time"
+        default=ClockSource.SYSTEM, help="system; for simulated plants plc or lockstep, which follow plc_clock"
     )
     confirm_within: datetime.timedelta = setting(
         low=_SECOND, high=_HOUR, default=_MINUTE, help="time for a write to show in a later reading"
@@ -90,12 +94,12 @@ class InterlockSettings:
 
     name: str = setting(help="short name, for the ledger")
     quantity: str = setting(help="what it watches: a quantity or a system point of the register map")
-    above: float | None = setting(default=None, help="engages above this value")
-    below: float | None = setting(default=None, help="or engages below this value")
     release: float = setting(help="lets go when the value is back beyond this")
     bounds: Mapping[str, BoundSettings] = setting(
         keys=(*SETPOINTS, *ACTUATORS), help="what it leaves to each point while engaged"
     )
+    above: float | None = setting(default=None, help="engages above this value")
+    below: float | None = setting(default=None, help="or engages below this value")
     when_unknown: Mapping[str, BoundSettings] = setting(
         keys=(*SETPOINTS, *ACTUATORS), default_factory=dict, help="bounds while the quantity cannot be believed"
     )
@@ -181,6 +185,9 @@ class UpdateSettings:
     shadow: datetime.timedelta = setting(
         low=_HOUR, high=30 * _DAY, default=2 * _DAY, help="how long a new bundle runs in the shadow"
     )
+    watch: datetime.timedelta = setting(
+        low=_HOUR, high=30 * _DAY, default=3 * _DAY, help="how long it may still be taken back by itself"
+    )
     trusted_root: str | None = setting(default=None, help="root.json of the trainer's signing keys")
 
 
@@ -238,6 +245,12 @@ class Configuration:
         return None if self.file.bundle is None else self._folder(self.file.bundle)
 
     @property
+    def trusted_root(self) -> Path | None:
+        """The trainer's root of trust, or None: then no bundle is fetched."""
+        root = self.file.updates.trusted_root
+        return None if root is None else self._folder(root)
+
+    @property
     def forecast_file(self) -> Path | None:
         """The weather forecast, or None."""
         forecast = self.file.planning.forecast
@@ -269,8 +282,11 @@ def put_together(path: Path, file: DaemonFile, site: Site, register_map: Registe
             f"{register_map.path or register_map.title}: the site commands {', '.join(missing)}, which this map has no "
             "writable point for; add the point, or take it out of `setpoints` in the site's file"
         )
-    if file.cycle.clock is ClockSource.PLC and "plc_clock" not in points:
-        raise ConfigurationError(f"{path}: `clock: plc` needs the point plc_clock in the register map")
+    clock = file.cycle.clock
+    needed = () if clock is ClockSource.SYSTEM else ("plc_clock",)
+    for name in (*needed, "heartbeat") if clock is ClockSource.LOCKSTEP else needed:
+        if name not in points:
+            raise ConfigurationError(f"{path}: `clock: {clock.value}` needs the point {name} in the register map")
     setpoints = tuple(name for name in setpoints if name in site.setpoints)
     for name in file.guard.points:
         if name not in points or not points[name].writable:

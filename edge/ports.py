@@ -152,8 +152,8 @@ class PlanningService(Protocol):
     def health(self) -> str:
         """Empty when all is well, else one line (the last plan timed out, crashed, ...)."""
 
-    async def wait(self, at_most: float) -> None:
-        """Return when no plan is being made any more, or after `at_most` seconds of wall clock.
+    async def wait(self, timeout: float) -> None:  # noqa: ASYNC109 - it ends quietly, it does not cancel
+        """Return when no plan is being made any more, or after `timeout` seconds of wall clock.
 
         Only for plants that wait for us (lock-step): a real greenhouse never waits for a plan.
         """
@@ -189,8 +189,8 @@ class UpdateService(Protocol):
     def busy(self) -> bool:
         """A check, a self-test or a shadow run is under way."""
 
-    async def wait(self, at_most: float) -> None:
-        """Return when not busy, or after `at_most` seconds of wall clock; only for lock-step plants."""
+    async def wait(self, timeout: float) -> None:  # noqa: ASYNC109 - it ends quietly, it does not cancel
+        """Return when not busy, or after `timeout` seconds of wall clock; only for lock-step plants."""
 
     def describe(self) -> Mapping[str, object]:
         """Return what the status page and `igrow-edge status` show: bundle, candidate, live errors, last verdict."""

@@ -36,11 +36,11 @@ class Recipe:
     """Day and night by the clock, for each setpoint; an empty list leaves that setpoint to the safe value."""
 
     heating_setpoint: tuple[Period, ...] = setting(
-        help="degC", default_factory=lambda: _periods((6, 20.0), (17, 18.5), (21, 17.0))
+        help="degC", default_factory=lambda: _periods((1, 18.5), (7, 20.5), (17, 19.0), (20, 17.0))
     )
-    co2_setpoint: tuple[Period, ...] = setting(help="ppm", default_factory=lambda: _periods((6, 700.0), (18, 400.0)))
-    lamp_on: tuple[Period, ...] = setting(help="0 to 1", default_factory=lambda: _periods((2, 1.0), (18, 0.0)))
-    irrigation_on: tuple[Period, ...] = setting(help="0 to 1", default_factory=lambda: _periods((8, 0.5), (17, 0.0)))
+    co2_setpoint: tuple[Period, ...] = setting(help="ppm", default_factory=lambda: _periods((1, 800.0), (17, 400.0)))
+    lamp_on: tuple[Period, ...] = setting(help="0 to 1", default_factory=lambda: _periods((1, 1.0), (17, 0.0)))
+    irrigation_on: tuple[Period, ...] = setting(help="0 to 1", default_factory=lambda: _periods((3, 1.0), (16, 0.0)))
     lamps_off_above: float | None = setting(
         unit="W m-2", low=0, high=1500, default=300.0, help="global radiation above which the lamps stay off, or null"
     )

@@ -1,0 +1,60 @@
+"""`igrow-edge check-config`: what is wrong with the configuration, or what it means."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+
+from edge.cli.common import add_configuration, configuration_of
+from edge.configuration import Configuration
+from edge.registers.bus_load import estimate
+from edge.registers.model import SYSTEM_POINTS
+
+EXAMPLE = "igrow-edge check-config /etc/igrow/daemon.yaml"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    add_configuration(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Check; print what was understood. An error is one line and exit code 2."""
+    for line in describe(configuration_of(options)):
+        print(line)
+    return 0
+
+
+def describe(configuration: Configuration) -> Iterator[str]:
+    """Yield what the configuration means, for people."""
+    site, register_map, file = configuration.site, configuration.register_map, configuration.file
+    yield f"{configuration.path}: correct"
+    yield f"site        {site.name} ({site.latitude:g}, {site.longitude:g}), {site.time_zone}"
+    tested = "" if register_map.hardware_tested else "; never tested on hardware"
+    yield f"registers   {register_map.title}: {len(register_map.points)} points{tested}"
+    for load in estimate(register_map):
+        yield f"  bus       {load}"
+    yield f"cycle       each {file.cycle.interval.total_seconds():g} s, clock: {file.cycle.clock.value}"
+    for name, rule in configuration.guard_rules.points.items():
+        parts = [f"{rule.low:g} to {rule.high:g}", f"safe {rule.safe:g}"]
+        if rule.slew is not None:
+            parts.append(f"{3600 * rule.slew:g} per hour")
+        if rule.refresh is not None:
+            parts.append(f"refreshed each {rule.refresh:g} s")
+        if rule.daily_budget is not None:
+            parts.append(f"{rule.daily_budget} writes a day")
+        yield f"  writes    {name}: {', '.join(parts)}"
+    for interlock in configuration.guard_rules.interlocks:
+        at_work = interlock.quantity in register_map.points
+        points = [name for name in interlock.bounds if name in configuration.guard_rules.points]
+        state = "" if at_work and points else " (not at work: this map lacks what it watches or moves)"
+        yield f"  interlock {interlock.name}: {interlock.quantity} moves {', '.join(points) or 'nothing'}{state}"
+    for name in SYSTEM_POINTS:
+        if name in ("heartbeat", "plc_fallback") and name not in register_map.points:
+            yield f"  note      no point {name}: see docs/commissioning.md for why the PLC should have it"
+    exchange = configuration.exchange_folder
+    yield f"state       {configuration.state_folder}; exchange: {exchange if exchange else 'none'}"
+    bundle = configuration.bundle_folder
+    yield f"planning    {'on' if file.planning.enabled else 'off'}; first bundle: {bundle if bundle else 'none'}"
+    if file.updates.enabled and configuration.trusted_root is None:
+        yield "updates     off: no updates.trusted_root, so nothing could be verified"

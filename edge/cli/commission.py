@@ -1,0 +1,26 @@
+"""`igrow-edge commission`: walks through the checks with a new PLC."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+
+from edge.cli.common import add_configuration, configuration_of
+from edge.commission import Commissioning, Console
+
+EXAMPLE = "igrow-edge commission /etc/igrow/daemon.yaml"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    add_configuration(parser)
+    parser.add_argument("--fallback-after", type=float, default=900.0, help="seconds of the PLC's heartbeat timeout")
+    parser.add_argument("--only-read", action="store_true", help="confirm the points and write nothing at all")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Walk through; the exit code is 0 when everything was confirmed, else 1."""
+    commissioning = Commissioning(
+        configuration_of(options), Console(), fallback_after=options.fallback_after, only_read=options.only_read
+    )
+    return 0 if asyncio.run(commissioning.run()) else 1

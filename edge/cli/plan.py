@@ -1,0 +1,88 @@
+"""`igrow-edge plan`: one plan, computed now and printed; nothing is written to the PLC."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from datetime import datetime
+from pathlib import Path
+from zoneinfo import ZoneInfo
+
+from edge.cli.common import add_configuration, configuration_of, parse_time, store_folder
+from edge.configuration import Configuration
+from edge.planning.make_plan import make_plan
+from edge.ports import Plan, PlanRequest
+from edge.sources.recipe import recipe_course
+from edge.store import read_telemetry
+from edge.updates.state import load_state
+from igrow_core.errors import IgrowError
+from igrow_core.quantities import QUANTITIES
+from igrow_core.telemetry import read_csv
+
+EXAMPLE = "igrow-edge plan /etc/igrow/daemon.yaml"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    add_configuration(parser)
+    parser.add_argument("--bundle", type=Path, help="folder of a bundle (default: the one in force)")
+    parser.add_argument("--at", default=None, help="plan from this UTC time (default: the end of the log)")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Compute and print."""
+    configuration = configuration_of(options)
+    plan = compute(configuration, options.bundle, options.at)
+    print("\n".join(table(plan, configuration.zone)))
+    return 0
+
+
+def compute(configuration: Configuration, bundle: Path | None, at: str | None) -> Plan:
+    """Return one plan from the stored log; raises IgrowError when log or bundle are missing."""
+    settings, site = configuration.file.planning, configuration.site
+    folder = bundle or _bundle_in_force(configuration) or configuration.bundle_folder
+    if folder is None:
+        raise IgrowError("no bundle is in force; name one with --bundle")
+    log = read_telemetry(store_folder(configuration), 0.0, 8e9)
+    if not len(log):
+        raise IgrowError(f"{store_folder(configuration)}: the log is empty, so there is nothing to plan from")
+    now = parse_time(at) if at else float(log.time[-1].astype("datetime64[s]").astype(float))
+    step = settings.step.total_seconds()
+    start = now - now % step
+    steps = round(site.planning.horizon.total_seconds() / step)
+    forecast = configuration.forecast_file
+    request = PlanRequest(
+        time=start,
+        step_seconds=step,
+        telemetry=read_telemetry(store_folder(configuration), now - settings.history.total_seconds(), now + 1.0),
+        recipe=recipe_course(configuration.file.recipe, configuration.zone, start, step, steps),
+        bundle=folder,
+        forecast=read_csv(forecast) if forecast and forecast.exists() else None,
+        seed=settings.seed,
+    )
+    return make_plan(site, request)
+
+
+def _bundle_in_force(configuration: Configuration) -> Path | None:
+    updates = configuration.state_folder / "updates"
+    identity = load_state(updates / "state.json").active
+    return None if identity is None else updates / "bundles" / identity
+
+
+def table(plan: Plan, zone: ZoneInfo) -> Iterator[str]:
+    """Yield the plan for people, in the site's own time."""
+    names = list(plan.setpoints)
+    predicted = list(plan.predicted)
+    yield f"simulator {plan.bundle}"
+    yield f"expected  {plan.expected_profit:.4f} EUR m-2 by the plan, {plan.recipe_profit:.4f} by the recipe"
+    if plan.leaves_range:
+        yield "careful: this plan leaves the range of the data that the simulator was made from"
+    if plan.note:
+        yield plan.note
+    heads = [f"{name} ({QUANTITIES[name].unit})" for name in names] + [f"-> {name}" for name in predicted]
+    yield "  ".join(["time            ", *heads])
+    for step in range(len(plan.setpoints[names[0]])):
+        moment = datetime.fromtimestamp(plan.start + step * plan.step_seconds, zone)
+        cells = [*(plan.setpoints[name][step] for name in names), *(plan.predicted[name][step] for name in predicted)]
+        padded = (f"{cell:>{len(head)}.4g}" for cell, head in zip(cells, heads, strict=True))
+        yield "  ".join([moment.strftime("%Y-%m-%d %H:%M"), *padded])

@@ -1,0 +1,87 @@
+"""`igrow-edge status`: what a running daemon does and why, from its status endpoint."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import urllib.error
+import urllib.request
+from collections.abc import Iterator, Mapping
+from datetime import UTC, datetime
+from typing import Any
+
+from edge.cli.common import add_configuration, configuration_of
+from igrow_core.errors import IgrowError
+from igrow_core.quantities import QUANTITIES
+
+EXAMPLE = "igrow-edge status /etc/igrow/daemon.yaml"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    add_configuration(parser)
+    parser.add_argument("--port", type=int, help="the status page's port (default: the configuration's)")
+    parser.add_argument("--json", action="store_true", help="print everything, for programs")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Ask the daemon and print."""
+    port = options.port or configuration_of(options).file.status.port
+    state = fetch(port)
+    if options.json:
+        print(json.dumps(state, indent=1))
+    else:
+        print("\n".join(lines(state)))
+    return 0
+
+
+def fetch(port: int) -> dict[str, Any]:
+    """Return the daemon's state; raises IgrowError when nobody answers."""
+    try:
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/state.json", timeout=5.0) as answer:
+            return dict(json.load(answer))
+    except urllib.error.HTTPError as error:
+        raise IgrowError(f"the daemon on port {port} says: {error.read().decode().strip()}") from None
+    except (OSError, ValueError):
+        raise IgrowError(f"no daemon answers on port {port} of this machine; is igrow-edge running?") from None
+
+
+def lines(state: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the state for people."""
+    when = "clock not trusted" if state["time"] is None else _date(state["time"])
+    link = "PLC answers" if state["link_ok"] else "PLC DOES NOT ANSWER"
+    yield f"{state['site']}: {when}, cycle {state['cycle']}, {link}"
+    yield f"decides  {state['source']}: {state['why']}"
+    for name, setpoint in state["setpoints"].items():
+        unit = QUANTITIES[name].unit if name in QUANTITIES else ""
+        held = "; changed by hand, respected" if setpoint["held_until"] is not None else ""
+        yield (
+            f"  {name:<18} asked {_number(setpoint['requested'])}, written {_number(setpoint['applied'])}, "
+            f"PLC shows {_number(setpoint['shown'])} {unit} ({setpoint['source'] or 'nobody'}{held})"
+        )
+    yield "measured"
+    for name, value in state["values"].items():
+        if name in QUANTITIES and name not in state["setpoints"]:
+            note = "" if value["quality"] == "good" else f"  {value['quality']}: {value['why']}"
+            yield f"  {name:<22} {_number(value['value']):>8} {QUANTITIES[name].unit}{note}"
+    plan = state.get("plan")
+    if plan:
+        expected, recipe = plan["expected_profit"], plan["recipe_profit"]
+        yield f"plan     of {_date(plan['start'])}: {_number(expected)} EUR m-2 expected, the recipe {_number(recipe)}"
+    bundle = state.get("bundle") or {}
+    yield f"bundle   {bundle.get('name') or 'none'}"
+    for alarm in state["alarms"]:
+        yield f"ALARM    {alarm['text']}"
+    for problem in state["problems"]:
+        yield f"problem  {problem}"
+    for clamp in list(state["clamps"])[:5]:
+        asked, applied = _number(clamp["requested"]), _number(clamp["applied"])
+        yield f"clamp    {clamp['point']}: {asked} -> {applied}, {clamp['reason']}"
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.4g}"
+
+
+def _date(seconds: float) -> str:
+    return datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%d %H:%M UTC")

@@ -1,0 +1,205 @@
+"""Commissioning: a person and the daemon check together that a PLC does what the register map says.
+
+Nothing is toggled without being asked for. Each write goes through the guard and its writer, as in control. Last,
+the daemon pulls the plug on itself: it stops its heartbeat and checks that the PLC falls back to safe setpoints.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from typing import Protocol
+
+from edge.bus.plc import Reading, RegisterPlc
+from edge.configuration import Configuration
+from edge.guard import GuardedWriter, GuardRules, GuardState, Request, guard
+from edge.image import Image
+from edge.registers.model import SYSTEM_POINTS
+from igrow_core.quantities import QUANTITIES
+
+READ_AGAIN = 2.0
+"""Seconds after a write until it is read again."""
+
+
+class Dialogue(Protocol):
+    """The person at the other end."""
+
+    def tell(self, line: str) -> None:
+        """Show one line."""
+
+    def ask(self, question: str) -> bool:
+        """Return the answer to a yes-or-no question."""
+
+
+class Console:
+    """A person at a terminal; the end of the input means no."""
+
+    def tell(self, line: str) -> None:
+        """Print."""
+        print(line, flush=True)
+
+    def ask(self, question: str) -> bool:
+        """Ask until the answer is yes or no."""
+        while True:
+            try:
+                answer = input(f"{question} [y/n] ").strip().lower()
+            except EOFError:
+                return False
+            if answer in ("y", "yes", "n", "no"):
+                return answer.startswith("y")
+
+
+class Commissioning:
+    """One walk through the checks."""
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        dialogue: Dialogue,
+        *,
+        fallback_after: float = 900.0,
+        only_read: bool = False,
+        plc: RegisterPlc | None = None,
+    ) -> None:
+        """`fallback_after` in seconds of the PLC's clock. `plc` replaces the real one in tests."""
+        self._configuration = configuration
+        self._dialogue = dialogue
+        self._fallback_after = fallback_after
+        self._only_read = only_read
+        self._given_plc = plc
+        self._wrong: list[str] = []
+
+    async def run(self) -> bool:
+        """Walk through all checks; tell whether every one was passed."""
+        plc = self._given_plc or RegisterPlc(self._configuration.register_map)
+        plc.start()
+        writer = GuardedWriter(plc, has_heartbeat="heartbeat" in self._configuration.register_map.points)
+        tell = self._dialogue.tell
+        try:
+            if not await self._line_is_up(plc):
+                return False
+            await self._confirm_readings(plc)
+            if self._only_read:
+                tell("setpoints and heartbeat were left alone (--only-read)")
+            else:
+                await self._try_setpoints(plc, writer)
+                await self._pull_the_plug(plc, writer)
+        finally:
+            await plc.close()
+        for line in self._wrong:
+            tell(f"NOT PASSED  {line}")
+        tell("all checks were passed" if not self._wrong else f"{len(self._wrong)} checks were not passed")
+        return not self._wrong
+
+    async def _line_is_up(self, plc: RegisterPlc) -> bool:
+        """Wait a little for the line; without it nothing can be checked."""
+        ends = time.monotonic() + 10.0
+        while True:
+            readings = await plc.read(list(self._configuration.register_map.points))
+            errors = [reading.error for reading in readings.values()]
+            if any(error is None for error in errors):
+                return True
+            if time.monotonic() > ends:
+                self._dialogue.tell(f"NOT PASSED  no point can be read: {errors[0] if errors else 'the map is empty'}")
+                return False
+            await asyncio.sleep(0.5)
+
+    async def _confirm_readings(self, plc: RegisterPlc) -> None:
+        readings = await plc.read(list(self._configuration.register_map.points))
+        for name, reading in readings.items():
+            rule = self._configuration.sensor_rules[name]
+            text = _shown(name, reading)
+            if reading.value is None:
+                self._wrong.append(f"{name} cannot be read: {reading.error}")
+            elif not rule.low <= reading.value <= rule.high:
+                self._wrong.append(f"{text} is outside {rule.low:g} to {rule.high:g}: look at scale and byte order")
+            elif not self._dialogue.ask(f"{text}. Does the PLC show the same?"):
+                self._wrong.append(f"{text}, but the PLC shows something else")
+
+    async def _try_setpoints(self, plc: RegisterPlc, writer: GuardedWriter) -> None:
+        for name in self._configuration.setpoints:
+            rule = self._configuration.guard_rules.points[name]
+            before = (await plc.read([name]))[name].value
+            if before is None:
+                continue
+            step = max(rule.resolution, rule.dead_band, 0.02 * (rule.high - rule.low))
+            target = before + step if before + step <= rule.high else before - step
+            target = min(max(target, rule.low), rule.high)
+            if not self._dialogue.ask(f"May {name} be set from {before:g} to {target:g} for a moment, and back?"):
+                self._wrong.append(f"{name} was not tried")
+                continue
+            if not await self._set(plc, writer, name, target):
+                continue
+            if not self._dialogue.ask(f"Does the PLC show {name} = {target:g}?"):
+                self._wrong.append(f"{name} reads back as written, but the PLC shows something else")
+            await self._set(plc, writer, name, before)
+
+    async def _set(self, plc: RegisterPlc, writer: GuardedWriter, name: str, value: float) -> bool:
+        """Write through the guard and read again; tell whether the PLC took it."""
+        rules = self._configuration.guard_rules.points
+        # One point alone and no waiting: the person has just agreed to this very step.
+        rule = rules[name]
+        free = type(rule)(low=rule.low, high=rule.high, safe=rule.safe, resolution=rule.resolution)
+        image = Image(time.monotonic(), None)
+        verdict = guard({name: Request(value, "commission")}, {}, {}, image, GuardState(), GuardRules({name: free}))
+        outcomes = await writer.carry_out(verdict.writes)
+        await asyncio.sleep(READ_AGAIN if self._given_plc is None else 0.0)
+        shown = (await plc.read([name]))[name].value
+        for outcome in outcomes:
+            if outcome.error is not None:
+                self._wrong.append(f"{name} cannot be written: {outcome.error}")
+                return False
+            if shown is None or not rule.same(shown, outcome.write.value):
+                self._wrong.append(f"{name}: {outcome.write.value:g} was written, but {shown} is read back")
+                return False
+        return True
+
+    async def _pull_the_plug(self, plc: RegisterPlc, writer: GuardedWriter) -> None:
+        points = self._configuration.register_map.points
+        if "heartbeat" not in points:
+            self._wrong.append("the map has no heartbeat: the PLC cannot know that the daemon is gone")
+            return
+        question = (
+            f"Now the heartbeat stops for {self._fallback_after / 60:.0f} min, so that the PLC falls back to its own "
+            "safe setpoints. Go on?"
+        )
+        if not self._dialogue.ask(question):
+            self._wrong.append("the fallback was not tried")
+            return
+        error = await writer.heartbeat()
+        if error is not None:
+            self._wrong.append(f"the heartbeat cannot be written: {error}")
+            return
+        if "plc_fallback" not in points:
+            self._dialogue.tell("the map has no plc_fallback: look at the PLC's own display")
+            await asyncio.sleep(1.2 * self._fallback_after)
+            if not self._dialogue.ask("Is the PLC on its own safe setpoints?"):
+                self._wrong.append("the PLC did not fall back when the heartbeat stopped")
+            return
+        await self._watch_fallback(plc)
+        await writer.heartbeat()
+        await asyncio.sleep(READ_AGAIN if self._given_plc is None else 0.0)
+        if _is_set((await plc.read(["plc_fallback"]))["plc_fallback"]):
+            self._wrong.append("the PLC stays in its fallback although the heartbeat is back")
+
+    async def _watch_fallback(self, plc: RegisterPlc) -> None:
+        began = time.monotonic()
+        while not _is_set((await plc.read(["plc_fallback"]))["plc_fallback"]):
+            if time.monotonic() - began > 1.2 * self._fallback_after + 10.0:
+                self._wrong.append("the PLC did not fall back when the heartbeat stopped")
+                return
+            await asyncio.sleep(min(5.0, self._fallback_after / 20.0))
+        self._dialogue.tell(f"the PLC fell back after {time.monotonic() - began:.0f} s")
+        readings = await plc.read(self._configuration.setpoints)
+        for name, reading in readings.items():
+            self._dialogue.tell(f"  its own {_shown(name, reading)}")
+
+
+def _shown(name: str, reading: Reading) -> str:
+    unit = QUANTITIES[name].unit if name in QUANTITIES else SYSTEM_POINTS[name].unit
+    value = "nothing" if reading.value is None else f"{reading.value:.6g}"
+    return f"{name} = {value}" + ("" if unit == "1" else f" {unit}")
+
+
+def _is_set(reading: Reading) -> bool:
+    return reading.value is not None and reading.value >= 0.5

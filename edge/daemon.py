@@ -1,0 +1,230 @@
+"""The daemon's life: start without waiting for anybody, one cycle after the other, reload, stop at safe setpoints."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import signal
+from pathlib import Path
+
+from edge.configuration import Configuration, load_configuration
+from edge.cycle import CycleResult
+from edge.journal import Journal
+from edge.notify import Notifier
+from edge.ports import Plan, Snapshot
+from edge.wiring import Control, Services, build_control, open_services, remember
+from igrow_core.errors import IgrowError
+
+STOP_SECONDS = 5.0
+"""Longest time that the safe setpoints may take on the way out."""
+LOCKSTEP_PLAN_SECONDS = 900.0
+LOCKSTEP_UPDATE_SECONDS = 900.0
+
+log = logging.getLogger("igrow.edge")
+
+
+class Daemon:
+    """Runs control for one site until it is told to stop."""
+
+    def __init__(
+        self, configuration: Configuration, services: Services | None = None, notifier: Notifier | None = None
+    ):
+        """`services` and `notifier` replace the real ones in tests."""
+        self.configuration = configuration
+        self.services = services or open_services(configuration)
+        self._notifier = notifier or Notifier()
+        self._journal = Journal(self.services.store)
+        self._control: Control | None = None
+        self._stopping = asyncio.Event()
+        self._reload = False
+        self._configuration_problem = ""
+        self._plan: Plan | None = None
+        self.cycles = 0
+        self.last: CycleResult | None = None
+
+    def stop(self) -> None:
+        """End after the present cycle."""
+        self._stopping.set()
+
+    def reload(self) -> None:
+        """Read the configuration again before the next cycle."""
+        self._reload = True
+
+    async def run(self) -> None:
+        """Control until `stop`; then write the safe setpoints and close everything."""
+        self._control = self._begin(None)
+        await self.services.status.start()
+        self._notifier.ready()
+        self._journal.event("started", site=self.configuration.site.name)
+        try:
+            remembered = False
+            while await self._due():
+                if not remembered:
+                    remember(self._control, self.services.store, budgets=True)
+                    remembered = True
+                if self._reload:
+                    await self._reload_now()
+                await self._cycle()
+        finally:
+            await self._end()
+
+    async def _due(self) -> bool:
+        """Wait for the next cycle; tell whether there is one."""
+        assert self._control is not None
+        pace = asyncio.ensure_future(self._control.pace.wait())
+        stop = asyncio.ensure_future(self._stopping.wait())
+        try:
+            await asyncio.wait((pace, stop), return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in (pace, stop):
+                if not task.done():
+                    task.cancel()
+                    with contextlib.suppress(asyncio.CancelledError):
+                        await task
+        if self._stopping.is_set():
+            return False
+        pace.result()
+        return True
+
+    async def _cycle(self) -> None:
+        control = self._control
+        assert control is not None
+        result = await control.cycle.run()
+        self.last = result
+        self.cycles += 1
+        image = result.image
+        control.holds.keep(control.cycle.readback.held(image.monotonic), image.true_time)
+        self.services.updates.tick(image.true_time)
+        if self.services.exchange is not None:
+            self.services.exchange.tick(image.true_time)
+        await self._plan_ahead(control, result)
+        if control.lockstep and self.services.updates.busy:
+            await self.services.updates.wait(LOCKSTEP_UPDATE_SECONDS)
+        self.services.status.publish(self._snapshot(control, result))
+        self._notifier.cycle_completed(f"{result.decision.source}: {result.decision.why}")
+
+    async def _plan_ahead(self, control: Control, result: CycleResult) -> None:
+        planning, schedule = self.services.planning, control.schedule
+        if planning is None or schedule is None:
+            return
+        asked = await schedule.tick(result.image, self.services.updates.active())
+        if asked and control.lockstep:
+            await planning.wait(LOCKSTEP_PLAN_SECONDS)
+        if planning.health and not planning.busy:
+            schedule.retry_soon(result.image.monotonic)
+        plan = planning.latest()
+        if plan is not None and plan is not self._plan:
+            self._plan = plan
+            self._journal.event(
+                "plan",
+                start=plan.start,
+                bundle=plan.bundle,
+                expected_profit=plan.expected_profit,
+                recipe_profit=plan.recipe_profit,
+                leaves_range=plan.leaves_range,
+                note=plan.note,
+            )
+
+    def _begin(self, before: Control | None) -> Control:
+        control = build_control(
+            self.configuration,
+            self.services,
+            self._journal,
+            clock=before.clock if before else None,
+            state=before.cycle.state if before else None,
+        )
+        control.plc.start()
+        return control
+
+    async def _reload_now(self) -> None:
+        self._reload = False
+        before = self._control
+        assert before is not None
+        self._notifier.reloading()
+        try:
+            configuration = load_configuration(self.configuration.path)
+            _refuse_what_needs_a_restart(self.configuration, configuration)
+        except (IgrowError, OSError) as error:
+            self._configuration_problem = f"the new configuration is not used: {error}"
+            self._journal.event("reload_refused", reason=str(error))
+        else:
+            self.configuration = configuration
+            self._configuration_problem = ""
+            await before.plc.close()
+            self._control = self._begin(before)
+            remember(self._control, self.services.store, budgets=False)
+            self._journal.event("reloaded", path=str(configuration.path))
+        self._notifier.ready()
+
+    async def _end(self) -> None:
+        self._notifier.stopping()
+        control = self._control
+        assert control is not None
+        try:
+            await asyncio.wait_for(control.cycle.stop(), STOP_SECONDS)
+            self._journal.event("stopped", setpoints="safe values written")
+        except TimeoutError:
+            self._journal.event("stopped", setpoints="the PLC did not answer; its own fallback rules")
+        finally:
+            await control.plc.close()
+            await self.services.status.close()
+            await asyncio.to_thread(self.services.close)
+            self._notifier.close()
+
+    def _snapshot(self, control: Control, result: CycleResult) -> Snapshot:
+        image, services, schedule = result.image, self.services, control.schedule
+        problems = [
+            services.store.health,
+            services.planning.health if services.planning is not None else "",
+            schedule.problem if schedule is not None else "",
+            services.exchange.health if services.exchange is not None else "",
+            self._configuration_problem,
+        ]
+        rules, points = control.configuration.guard_rules.points, control.cycle.state.points
+        return Snapshot(
+            site=control.configuration.site.name,
+            time=image.true_time,
+            monotonic=image.monotonic,
+            clock_ok=image.true_time is not None,
+            cycle=self.cycles,
+            cycle_seconds=result.seconds,
+            link_ok=image.link_ok,
+            source=result.decision.source,
+            why=result.decision.why,
+            values=image.values,
+            setpoints=result.setpoints,
+            clamps=tuple(self._journal.clamps),
+            alarms=self._journal.alarms.active,
+            plan=control.keeper.plan,
+            bundle=services.updates.describe(),
+            problems=tuple(filter(None, problems)),
+            writes_left={
+                name: rule.daily_budget - len(points[name].budget)
+                for name, rule in rules.items()
+                if rule.daily_budget is not None and name in points
+            },
+        )
+
+
+def _refuse_what_needs_a_restart(old: Configuration, new: Configuration) -> None:
+    """Raise IgrowError for a change that a running daemon cannot take."""
+    for what, before, after in (
+        ("the site's name", old.site.name, new.site.name),
+        ("state", old.state_folder, new.state_folder),
+        ("exchange", old.exchange_folder, new.exchange_folder),
+        ("status.port", old.file.status.port, new.file.status.port),
+        ("cycle.clock", old.file.cycle.clock, new.file.cycle.clock),
+    ):
+        if before != after:
+            raise IgrowError(f"{new.path}: {what} changed from {before} to {after}, which needs a restart")
+
+
+async def run_daemon(path: Path) -> None:
+    """Run until SIGTERM or SIGINT; SIGHUP reads the configuration again. Raises IgrowError for a bad configuration."""
+    daemon = Daemon(load_configuration(path))
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        loop.add_signal_handler(number, daemon.stop)
+    loop.add_signal_handler(signal.SIGHUP, daemon.reload)
+    await daemon.run()

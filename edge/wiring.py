@@ -1,0 +1,222 @@
+"""Puts the daemon together: services that live as long as it does, and a control that a reload replaces."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from edge.bus.plc import RegisterPlc
+from edge.clock import Clock, PlcClock, SystemClock
+from edge.configuration import ClockSource, Configuration
+from edge.cycle import ControlCycle
+from edge.exchange import FolderExchange
+from edge.guard import GuardedWriter, GuardState, Readback
+from edge.guard.core import with_earlier_writes
+from edge.holds import HoldFile
+from edge.journal import Journal
+from edge.pace import FollowedPlant, Pace, TickPace
+from edge.planning import PlanningProcess, ProcessLimits
+from edge.planning_schedule import PlanningRules, PlanningSchedule
+from edge.ports import Exchange, Plan, PlanningService, StatusService, Store, UpdateService
+from edge.sensors import ImageBuilder, TwinSensors
+from edge.sources import FreshPlan, GrowerOverride, HandsOff, LastValidPlan, PlanKeeper, RecipeSource
+from edge.status import StatusServer
+from edge.store import SqliteStore, StoreLimits
+from edge.updates import BundleUpdates, SignedSource, UpdateRules
+from igrow_core.simulator.hindcast import HindcastPredictor
+from igrow_core.sun import position
+
+OVERRIDE_FILE = "override.json"
+HOLD_FILE = "holds.json"
+STATUS_FILE = "status.json"
+TWIN_SUFFIX = "_2"
+"""A point named after a quantity with this suffix is a second sensor of it."""
+TWIN_TOLERANCE = {"air_temperature": 1.5, "air_humidity": 8.0, "air_co2": 100.0}
+
+
+@dataclass
+class Services:
+    """What lives as long as the daemon."""
+
+    store: Store
+    planning: PlanningService | None
+    updates: UpdateService
+    exchange: Exchange | None
+    status: StatusService
+
+    def close(self) -> None:
+        """Stop all but the status page; the store last, since the others still write to it."""
+        if self.planning is not None:
+            self.planning.close()
+        self.updates.close()
+        if self.exchange is not None:
+            self.exchange.close()
+        self.store.close()
+
+
+@dataclass
+class Control:
+    """What a reload replaces."""
+
+    configuration: Configuration
+    plc: RegisterPlc
+    clock: Clock
+    pace: Pace
+    cycle: ControlCycle
+    keeper: PlanKeeper
+    schedule: PlanningSchedule | None
+    holds: HoldFile
+
+    @property
+    def lockstep(self) -> bool:
+        """The plant waits for us, so we may wait for plans and updates."""
+        return self.configuration.file.cycle.clock is ClockSource.LOCKSTEP
+
+
+def open_services(configuration: Configuration) -> Services:
+    """Open the store and what works on it. Never raises for a bad disk or a bad bundle: each reports its health."""
+    state, file, site = configuration.state_folder, configuration.file, configuration.site
+    simulated = file.cycle.clock is not ClockSource.SYSTEM
+    limits = StoreLimits(survive_power_cut=not simulated, batch_seconds=3600.0 if simulated else 60.0)
+    store = SqliteStore(state / "store", limits)
+    folder = configuration.exchange_folder
+    exchange = None if folder is None else FolderExchange(folder, site.name, store)
+    source = None
+    if exchange is not None and file.updates.enabled and configuration.trusted_root is not None:
+        source = SignedSource(exchange.bundles, state / "updates" / "trust", configuration.trusted_root)
+    updates = BundleUpdates(
+        state / "updates",
+        site=site.name,
+        igrow_version=importlib.metadata.version("igrow"),
+        store=store,
+        predictor=HindcastPredictor(),
+        source=source,
+        reports=exchange,
+        rules=UpdateRules(
+            shadow_hours=file.updates.shadow.total_seconds() / 3600.0,
+            watch_hours=file.updates.watch.total_seconds() / 3600.0,
+        ),
+        first_bundle=configuration.bundle_folder,
+    )
+    planning = None
+    if file.planning.enabled:
+        planning = PlanningProcess(site, ProcessLimits(timeout_seconds=file.planning.timeout.total_seconds()))
+    late_after = max(60.0, 3.0 * file.cycle.interval.total_seconds())
+    status = StatusServer(file.status.port, state / STATUS_FILE, zone=configuration.zone, late_after=late_after)
+    return Services(store, planning, updates, exchange, status)
+
+
+def build_control(
+    configuration: Configuration,
+    services: Services,
+    journal: Journal,
+    *,
+    clock: Clock | None = None,
+    state: GuardState | None = None,
+) -> Control:
+    """Build what runs the cycles; connects nothing yet. `state` is the guard's memory from before a reload."""
+    file, site, rules = configuration.file, configuration.site, configuration.guard_rules
+    interval = file.cycle.interval.total_seconds()
+    respect_hand = file.cycle.respect_hand.total_seconds()
+    plc = RegisterPlc(configuration.register_map)
+    readable: RegisterPlc | FollowedPlant = plc
+    pace: Pace
+    if file.cycle.clock is ClockSource.SYSTEM:
+        clock = clock or SystemClock()
+        pace = TickPace(interval)
+    else:
+        # A reload must not begin the plant's time again, as the guard's memory is dated by it.
+        clock = clock if isinstance(clock, PlcClock) else PlcClock()
+        names = configuration.register_map.points
+        lockstep = file.cycle.clock is ClockSource.LOCKSTEP
+        readable = pace = FollowedPlant(plc, clock, names=names, interval=interval, lockstep=lockstep)
+    keeper = PlanKeeper(services.planning.latest if services.planning is not None else _no_plan)
+    every = site.planning.replan_every.total_seconds()
+    cycle = ControlCycle(
+        readable,
+        clock,
+        ImageBuilder(configuration.sensor_rules, _twins(configuration), sun_elevation(site.latitude, site.longitude)),
+        [
+            GrowerOverride(configuration.state_folder / OVERRIDE_FILE),
+            FreshPlan(keeper, fresh_for=1.5 * every),
+            LastValidPlan(keeper),
+            RecipeSource(file.recipe, configuration.zone),
+            HandsOff({name: rules.points[name].safe for name in configuration.setpoints}),
+        ],
+        rules,
+        Readback(
+            rules.points,
+            confirm_within=max(file.cycle.confirm_within.total_seconds(), 3.0 * interval),
+            respect_hand=respect_hand,
+        ),
+        GuardedWriter(plc, has_heartbeat="heartbeat" in configuration.register_map.points),
+        journal,
+        setpoints=configuration.setpoints,
+        respect_hand=respect_hand,
+        state=state,
+    )
+    return Control(
+        configuration, plc, clock, pace, cycle, keeper, _schedule(configuration, services),
+        HoldFile(configuration.state_folder / HOLD_FILE),
+    )  # fmt: skip
+
+
+def remember(control: Control, store: Store, *, budgets: bool) -> None:
+    """Carry over what a restart must not forget: hands that are respected and, with `budgets`, writes of the last day.
+
+    To be called when the clock was first read. A write whose age cannot be known counts as just done.
+    """
+    now, true_time = control.clock.monotonic(), control.clock.true_time()
+    for name, seconds in control.holds.load(true_time).items():
+        control.cycle.readback.restore_hold(name, now + seconds)
+    rules = control.configuration.guard_rules.points
+    if not budgets or all(rule.daily_budget is None for rule in rules.values()):
+        return
+    times: dict[str, list[float]] = {}
+    for record in store.writes_of_last_day():
+        rule = rules.get(record.point)
+        if rule is not None and rule.daily_budget is not None:
+            age = 0.0 if true_time is None or record.time is None else max(0.0, true_time - record.time)
+            times.setdefault(record.point, []).append(now - age)
+    control.cycle.state = with_earlier_writes(control.cycle.state, times)
+
+
+def _schedule(configuration: Configuration, services: Services) -> PlanningSchedule | None:
+    if services.planning is None:
+        return None
+    settings, site = configuration.file.planning, configuration.site
+    rules = PlanningRules(
+        every=site.planning.replan_every.total_seconds(),
+        horizon=site.planning.horizon.total_seconds(),
+        step=settings.step.total_seconds(),
+        history=settings.history.total_seconds(),
+        seed=settings.seed,
+        forecast=configuration.forecast_file,
+    )
+    return PlanningSchedule(rules, services.planning, services.store, configuration.file.recipe, configuration.zone)
+
+
+def _twins(configuration: Configuration) -> list[TwinSensors]:
+    points = configuration.register_map.points
+    return [
+        TwinSensors(name, name + TWIN_SUFFIX, tolerance)
+        for name, tolerance in TWIN_TOLERANCE.items()
+        if name in points and name + TWIN_SUFFIX in points
+    ]
+
+
+def sun_elevation(latitude: float, longitude: float) -> Callable[[float], float]:
+    """Return a function from seconds since 1970 UTC to the sun's elevation in degrees."""
+    return lambda time: float(position(math, time, latitude, longitude)[0])
+
+
+def _no_plan() -> Plan | None:
+    return None
+
+
+def override_file(state_folder: Path) -> Path:
+    """Return where the grower's overrides are kept."""
+    return state_folder / OVERRIDE_FILE
