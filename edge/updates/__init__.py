@@ -10,7 +10,8 @@
    in the exchange.
 """
 
-from edge.updates.service import BundleUpdates, UpdateRules
+from edge.updates.rules import UpdateRules
+from edge.updates.service import BundleUpdates
 from edge.updates.shadow import Comparison, Predictor, compare, hindcast_errors
 from edge.updates.shelf import Shelf
 from edge.updates.signed_source import SignedSource, UpdateError

@@ -9,14 +9,13 @@ import sqlite3
 import threading
 from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
 from edge.ports import ActiveBundle
 from edge.store.store import read_telemetry
+from edge.updates.rules import ReportBox, UpdateRules, UpdateStore
 from edge.updates.shadow import Comparison, Predictor, compare, hindcast_errors
 from edge.updates.shelf import Shelf
 from edge.updates.signed_source import RefusedError, SignedSource, UpdateError
@@ -29,46 +28,6 @@ HOUR = 3600.0
 FIRST_LOOK = 25 * HOUR
 """Into the probation: long enough for a free run of a day to have ended."""
 KEPT_ERRORS = 400
-
-
-@dataclass(frozen=True)
-class UpdateRules:
-    """When a bundle is looked for, adopted and taken back; hours are the plant's."""
-
-    check_hours: float = 1.0
-    shadow_hours: float = 48.0
-    """Length of the shadow run; beyond 24 h, so that there are free runs of a day to compare."""
-    watch_hours: float = 72.0
-    """Length of the probation after adoption."""
-    tolerance: float = 0.02
-    """By how much the candidate's errors, over all, may exceed those of the bundle in force."""
-    worst: float = 0.25
-    """By how much any single one may."""
-    early_tolerance: float = 0.25
-    """During probation, once a day: an excess that ends it at once."""
-    live_error_hours: float = 6.0
-    """How often the live error is computed."""
-    step_seconds: int = 300
-    """Grid on which predictions are compared with measurements."""
-
-
-class UpdateStore(Protocol):
-    """What updates need of the store."""
-
-    folder: Path
-
-    def flush(self) -> None:
-        """Commit the rows in memory."""
-
-    def record_event(self, time: float | None, kind: str, detail: Mapping[str, object]) -> None:
-        """Add one event, durably."""
-
-
-class ReportBox(Protocol):
-    """Where reports for the trainer are left."""
-
-    def leave_report(self, time: float, name: str, content: Mapping[str, object]) -> None:
-        """Leave one report; raises OSError."""
 
 
 class BundleUpdates:
