@@ -1,0 +1,71 @@
+"""The systemd unit: confined, watched, and never giving up."""
+
+from __future__ import annotations
+
+import configparser
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+UNIT = Path(__file__).resolve().parents[2] / "systemd" / "igrow-edge.service"
+
+
+def service() -> dict[str, list[str]]:
+    """Return the settings of the [Service] section; systemd allows a key more than once."""
+    found: dict[str, list[str]] = {}
+    section = ""
+    for line in UNIT.read_text().splitlines():
+        if line.startswith("["):
+            section = line
+        elif section == "[Service]" and "=" in line and not line.startswith("#"):
+            key, value = line.split("=", 1)
+            found.setdefault(key, []).append(value)
+    return found
+
+
+def test_the_exposure_by_systemd_s_own_measure_is_at_most_2() -> None:
+    if shutil.which("systemd-analyze") is None:
+        pytest.skip("systemd-analyze is not installed on this machine")
+    done = subprocess.run(
+        ["systemd-analyze", "security", "--offline=true", "--no-pager", str(UNIT)],
+        check=False,
+        capture_output=True,
+        text=True,
+    )
+    level = re.search(r"Overall exposure level for igrow-edge\.service: ([\d.]+)", done.stdout)
+    if level is None:
+        pytest.skip(f"this systemd-analyze knows no offline analysis: {done.stderr.strip()[:80]}")
+    assert float(level[1]) <= 2.0
+
+
+def test_systemd_finds_no_unknown_setting() -> None:
+    if shutil.which("systemd-analyze") is None:
+        pytest.skip("systemd-analyze is not installed on this machine")
+    done = subprocess.run(["systemd-analyze", "verify", str(UNIT)], check=False, capture_output=True, text=True)
+    complaints = [line for line in done.stderr.splitlines() if "igrow-edge" in line and "not executable" not in line]
+    assert complaints == []
+
+
+def test_the_watchdog_is_fed_through_notify_and_the_daemon_always_comes_back() -> None:
+    settings = service()
+    assert settings["Type"] == ["notify"]
+    assert int(settings["WatchdogSec"][0]) > 0
+    assert settings["Restart"] == ["always"]
+    assert "StartLimitIntervalSec=0" in UNIT.read_text()
+
+
+def test_the_daemon_has_a_user_of_its_own_that_sysusers_makes() -> None:
+    (user,) = service()["User"]
+    text = UNIT.with_name("igrow-edge.sysusers.conf").read_text()
+    assert re.search(rf"^u {user} ", text, re.MULTILINE)
+    assert user != "root"
+
+
+def test_the_unit_is_readable_as_an_ini_file_apart_from_repeated_keys() -> None:
+    parser = configparser.ConfigParser(strict=False, interpolation=None)
+    parser.optionxform = str
+    parser.read_string(UNIT.read_text())
+    assert parser.sections() == ["Unit", "Service", "Install"]
