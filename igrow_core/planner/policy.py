@@ -1,0 +1,95 @@
+"""A learnt policy: from a day's forecast and the crop's state straight to the day's setpoints.
+
+As in Cao et al. (2022) it sees 76 numbers and gives 96, four setpoints for each of 24 hours. It costs one run of
+a small network, so that the search may start from it.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+
+import numpy as np
+import onnxruntime
+from numpy.typing import NDArray
+
+from igrow_core.errors import IgrowError
+from igrow_core.planner.objective import Objective
+from igrow_core.planner.template import Setpoints
+from igrow_core.quantities import SETPOINTS, WEATHER
+from igrow_core.site import Site
+
+HOURS = 24
+FORECAST = {"outdoor_temperature": (10.0, 10.0), "outdoor_humidity": (75.0, 20.0), "global_radiation": (150.0, 250.0)}
+"""Weather that the policy sees for each hour, with the offset and scale that bring it near to -1 to 1."""
+PRESENT = {"air_temperature": (20.0, 5.0), "leaf_area_index": (3.0, 1.0), "plant_load": (300.0, 200.0)}
+"""State that it sees, with offset and scale."""
+OBSERVATIONS = HOURS * len(FORECAST) + len(PRESENT) + 1
+"""76: the last one is the price of growth."""
+ACTIONS = HOURS * len(SETPOINTS)
+"""96: hour by hour, -1 for the lower limit of a setpoint and 1 for the upper one."""
+
+Values = NDArray[np.float64]
+
+
+def observe(site: Site, present: Mapping[str, Values], forecast: Values, start: np.datetime64) -> NDArray[np.float32]:
+    """Return what the policy sees, (B, 76).
+
+    Args:
+        site: for the price of growth.
+        present: quantities of `PRESENT`, each (B,); one that is missing counts as its offset.
+        forecast: (B, 24, 6), hourly means in the registry's order.
+        start: UTC time of the first hour.
+    """
+    count = len(forecast)
+    parts = [(forecast[:, :, WEATHER.index(name)] - offset) / scale for name, (offset, scale) in FORECAST.items()]
+    for name, (offset, scale) in PRESENT.items():
+        value = np.broadcast_to(present.get(name, np.asarray(offset)), count)
+        parts.append(((value - offset) / scale)[:, None])
+    time = start.astype("datetime64[s]") + np.arange(HOURS) * np.timedelta64(3600, "s")
+    price = Objective(site, time).growth_price().mean()
+    parts.append(np.full((count, 1), (price - 2.0) / 1.0))
+    return np.concatenate(parts, axis=1).astype(np.float32)
+
+
+def to_setpoints(site: Site, actions: NDArray[np.float32]) -> Setpoints:
+    """Return the setpoints (B, 24, 4) of actions (B, 96), -1 to 1, within the site's limits."""
+    low = np.array([site.limits[name].low for name in SETPOINTS])
+    high = np.array([site.limits[name].high for name in SETPOINTS])
+    share = (np.clip(actions.astype(np.float64), -1.0, 1.0).reshape(len(actions), HOURS, len(SETPOINTS)) + 1.0) / 2.0
+    return np.asarray(low + share * (high - low))
+
+
+class OnnxPolicy:
+    """A bundle's policy.onnx."""
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        """Open the graph; raises IgrowError where it is no policy of 76 observations and 96 actions."""
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = options.inter_op_num_threads = 1
+        try:
+            self._session = onnxruntime.InferenceSession(
+                os.fspath(path), sess_options=options, providers=["CPUExecutionProvider"]
+            )
+        except Exception as error:
+            raise IgrowError(f"{path}: cannot be opened as an ONNX graph: {str(error).splitlines()[0]}") from None
+        shapes = {item.name: item.shape for item in (*self._session.get_inputs(), *self._session.get_outputs())}
+        if [shapes.get("observation", [0])[-1], shapes.get("action", [0])[-1]] != [OBSERVATIONS, ACTIONS]:
+            raise IgrowError(f"{path}: is no policy of {OBSERVATIONS} observations and {ACTIONS} actions")
+
+    def act(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the actions (B, 96) for observations (B, 76)."""
+        (actions,) = self._session.run(["action"], {"observation": observations})
+        return np.asarray(actions, dtype=np.float32)
+
+    def plan(self, site: Site, present: Mapping[str, float], forecast: Values, start: np.datetime64) -> Setpoints:
+        """Return setpoints (H, 4) for a forecast (H, 6): day by day, the state as it is now."""
+        days = -(-len(forecast) // HOURS)
+        padded = np.concatenate([forecast, forecast[-1:].repeat(days * HOURS - len(forecast), axis=0)])
+        state = {name: np.array([value]) for name, value in present.items()}
+        parts = []
+        for day in range(days):
+            begin = start + np.timedelta64(day * HOURS, "h")
+            piece = padded[None, day * HOURS : (day + 1) * HOURS]
+            parts.append(to_setpoints(site, self.act(observe(site, state, piece, begin)))[0])
+        return np.concatenate(parts)[: len(forecast)]

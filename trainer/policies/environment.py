@@ -1,0 +1,100 @@
+"""What a policy learns in: a batch of mechanistic greenhouses, each under weather of its own, a day at a time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow_core.greenhouse import GreenhouseParameters, generate_weather
+from igrow_core.greenhouse.disturbances import QUIET
+from igrow_core.greenhouse.parameters import stack
+from igrow_core.greenhouse.plant import Plant
+from igrow_core.greenhouse.sensors import EXACT
+from igrow_core.greenhouse.weather_table import WeatherTable
+from igrow_core.planner.objective import Objective, Valuation
+from igrow_core.planner.plant_simulator import run
+from igrow_core.planner.policy import HOURS, PRESENT, observe
+from igrow_core.planner.template import Setpoints, for_site
+from igrow_core.quantities import WEATHER
+from igrow_core.site import Site
+from igrow_core.sun import unix_seconds
+from igrow_core.telemetry import Telemetry, to_grid
+
+Values = NDArray[np.float64]
+DAY = np.timedelta64(86_400, "s")
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """Which greenhouses and which weather: the same seed gives the same ones."""
+
+    start: np.datetime64
+    """UTC; local midnight of the first day."""
+    days: int
+    count: int
+    seed: int
+    variation: float = 0.08
+    """Relative spread of the greenhouses' parameters."""
+
+
+class DailyGreenhouses:
+    """A batch of greenhouses that live through `days` days, one action each day."""
+
+    def __init__(self, site: Site, scenario: Scenario, parameters: GreenhouseParameters | None = None) -> None:
+        rng = np.random.default_rng(scenario.seed)
+        end = scenario.start + (scenario.days + 1) * DAY
+        self.weather = [
+            generate_weather(scenario.start, end, seed=int(rng.integers(2**31))) for _ in range(scenario.count)
+        ]
+        base = parameters or GreenhouseParameters()
+        varied = [base.varied(rng, relative=scenario.variation) for _ in range(scenario.count)]
+        self.site, self.scenario, self.day = site, scenario, 0
+        self._forecast = np.stack([hourly_weather(table, scenario.start, 24 * scenario.days) for table in self.weather])
+        self._plant = Plant(
+            stack(varied),
+            WeatherTable(self.weather),
+            float(unix_seconds(scenario.start)),
+            count=scenario.count,
+            disturbances=QUIET,
+            sensors=EXACT,
+        )
+        self._applied = np.full((scenario.count, 1, 4), np.nan)
+
+    @property
+    def time(self) -> np.datetime64:
+        """UTC start of the day that comes."""
+        return self.scenario.start + self.day * DAY
+
+    @property
+    def done(self) -> bool:
+        """All days are over."""
+        return self.day >= self.scenario.days
+
+    def forecast(self) -> Values:
+        """Return the weather of the day that comes, (N, 24, 6)."""
+        first = min(self.day, self.scenario.days - 1) * HOURS
+        return self._forecast[:, first : first + HOURS]
+
+    def observe(self) -> NDArray[np.float32]:
+        """Return the observations of the day that comes, (N, 76)."""
+        truth = self._plant.truth({})
+        like = np.zeros(self.scenario.count)
+        return observe(self.site, {name: like + truth[name] for name in PRESENT}, self.forecast(), self.time)
+
+    def step(self, setpoints: Setpoints) -> Valuation:
+        """Live through a day under setpoints (N, 24, 4), and return what it was worth, arrays (1, N)."""
+        template = for_site(self.site, self.time, HOURS)
+        first = np.where(np.isnan(self._applied), setpoints[:, :1], self._applied)
+        limited = template.limit(np.concatenate([first, setpoints], axis=1), np.full(4, np.nan))[:, 1:]
+        self._applied = limited[:, -1:]
+        time = self.time + np.arange(HOURS) * np.timedelta64(3600, "s")
+        self.day += 1
+        return Objective(self.site, time).value(run(self._plant, limited))
+
+
+def hourly_weather(weather: Telemetry, start: np.datetime64, hours: int) -> Values:
+    """Return hourly means from `start` on in the registry's order, (H, 6); `start` is a whole hour."""
+    table = to_grid(weather.select(start, start + np.timedelta64(hours, "h")), 3600)
+    return np.stack([table[name] for name in WEATHER[:6]], axis=1)
