@@ -6,7 +6,7 @@
 
 `plans`: two days each, the recipe, the best of random templates and the genetic algorithm (equal numbers of
 simulated candidates), the policy, and the search that starts from the policy. They search on the mechanistic
-greenhouse itself, which is a perfect model, or on a bundle's simulator. `daily`: twenty days in 64 greenhouses: policy,
+greenhouse itself, which is a perfect model, or on a bundle's simulator. `daily`: ten days in 32 greenhouses: policy,
 recipe, and the template of one day that was best on other weather. `speed`: generations a second, no simulator.
 """
 
@@ -37,6 +37,8 @@ from trainer.policies.environment import DailyGreenhouses, Scenario, hourly_weat
 
 DAY = np.timedelta64(86_400, "s")
 SETTINGS = EvolutionSettings(parents=24, offspring=48)
+DAYS, COUNT = 10, 32
+"""Of `daily`."""
 SITE = Path(__file__).resolve().parents[1] / "config" / "site.yaml"
 
 
@@ -84,11 +86,10 @@ def plans(arguments: argparse.Namespace) -> None:
         plant.follow(recipe_table(site, start - DAY, 24))
         model: Simulator = plant
         if arguments.bundle:
-            from igrow_core.simulator.runtime import open_simulator  # noqa: PLC0415
-
             from igrow_core.bundle import read_bundle  # noqa: PLC0415 - not every run has a bundle
+            from igrow_core.simulator.plan import BundleSimulator  # noqa: PLC0415
 
-            model = open_simulator(read_bundle(arguments.bundle))
+            model = BundleSimulator(read_bundle(arguments.bundle))
         state = PlanningState(start, plant.measurements())
         forecast = hourly_weather(weather, start, hours)
         recipe = recipe_table(site, start, hours)
@@ -142,28 +143,28 @@ def daily(arguments: argparse.Namespace) -> None:
         while not world.done:
             scores += world.step(day).score[0]
     fixed = template.decode(genes[[int(scores.argmax())]], np.zeros((HOURS, 4)), np.full(4, np.nan))
-    some = template.decode(genes[:64], np.zeros((HOURS, 4)), np.full(4, np.nan))
+    some = template.decode(genes[:COUNT], np.zeros((HOURS, 4)), np.full(4, np.nan))
 
     methods: dict[str, Any] = {
-        "recipe": lambda world: np.repeat(recipe_table(site, world.time, HOURS)[None], 64, axis=0),
+        "recipe": lambda world: np.repeat(recipe_table(site, world.time, HOURS)[None], COUNT, axis=0),
         "random template": lambda world: some,
-        "best of 500 templates": lambda world: np.repeat(fixed, 64, axis=0),
+        "best of 500 templates": lambda world: np.repeat(fixed, COUNT, axis=0),
     }
     if arguments.policy:
         policy = OnnxPolicy(arguments.policy)
         methods["policy"] = lambda world: to_setpoints(site, policy.act(world.observe()))
-    starts = [np.datetime64("2020-01-14T23:00:00") + 30 * month * DAY for month in range(4)]
+    starts = [np.datetime64("2020-01-14T23:00:00") + 30 * month * DAY for month in range(3)]
     results: dict[str, list[Valuation]] = {}
     for name, method in methods.items():
         for number, start in enumerate(starts):
-            world = DailyGreenhouses(site, Scenario(start, 20, 64, seed=number))
+            world = DailyGreenhouses(site, Scenario(start, DAYS, COUNT, seed=number))
             while not world.done:
                 results.setdefault(name, []).append(world.step(method(world)))
     print(HEADER)
     for name, valuations in results.items():
         # Days of one run depend on one another; its mean is one observation.
-        runs = [_mean(valuations[20 * run : 20 * run + 20]) for run in range(len(starts))]
-        base = [_mean(results["recipe"][20 * run : 20 * run + 20]) for run in range(len(starts))]
+        runs = [_mean(valuations[DAYS * run : DAYS * run + DAYS]) for run in range(len(starts))]
+        base = [_mean(results["recipe"][DAYS * run : DAYS * run + DAYS]) for run in range(len(starts))]
         print(table_line(name, runs, base, 1.0))
 
 
