@@ -1,0 +1,1 @@
+"""The published tables and figures, computed again on the published data, beside the published numbers."""

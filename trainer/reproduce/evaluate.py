@@ -1,0 +1,54 @@
+"""Score a trained network simulator on seasons it has not seen: free runs of whole seasons, R2 per quantity."""
+
+from __future__ import annotations
+
+import json
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from trainer.readers.wur2020 import read_seasons
+from trainer.reproduce.scores import PUBLISHED_BASELINE, PUBLISHED_INCREMENTAL, SCORED, Score, score
+from trainer.reproduce.table1 import run_freely
+from trainer.training.checkpoint import load_simulator
+
+
+def run(bundle: Path, data: Path, out: Path | None = None, report: Callable[[str], None] = print) -> dict[str, Score]:
+    """Run every season of `data` (a file in the format of trajectories.parquet) with the networks of `bundle`.
+
+    `bundle` is a folder with network.npz, or that file. Returns and prints the scores without the two faulty days,
+    prints those over every hour too, and writes both as JSON to `out` where given.
+    """
+    simulator, seasons = load_simulator(bundle), read_seasons(data)
+    predicted = run_freely(simulator, seasons)
+    scores = score(seasons.columns, predicted, seasons.valid)
+    every_hour = score(seasons.columns, predicted, np.ones_like(seasons.valid))
+    report(f"{len(seasons.names)} seasons of {seasons.time.size} hours, free runs from the first hour, R2")
+    report("| quantity | mean | worst season | every hour | published | published, incremental |")
+    report("|---|---|---|---|---|---|")
+    for name in SCORED:
+        mine = scores[name]
+        report(
+            f"| {name} | {mine.mean:.4f} | {mine.low:.4f} | {every_hour[name].mean:.4f} |"
+            f" {PUBLISHED_BASELINE[name]:.3f} | {PUBLISHED_INCREMENTAL[name]:.3f} |"
+        )
+    if out is not None:
+        content = {"seasons": seasons.names, "scores": {name: asdict(value) for name, value in scores.items()}}
+        content["every_hour"] = {name: asdict(value) for name, value in every_hour.items()}
+        out.write_text(json.dumps(content, indent=1))
+    return scores
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Add the arguments of `evaluate`."""
+    parser.add_argument("--bundle", type=Path, required=True, help="folder with network.npz, or the file")
+    parser.add_argument("--data", type=Path, required=True, help="a file in the format of trajectories.parquet")
+    parser.add_argument("--out", type=Path, help="write the scores to this JSON file")
+
+
+def run_command(arguments: Namespace) -> None:
+    """Run `evaluate`."""
+    run(arguments.bundle, arguments.data, arguments.out)

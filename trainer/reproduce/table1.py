@@ -1,0 +1,146 @@
+"""Table 1 of Cao et al. (2022): whole virtual seasons run freely from their first hour, R2 per quantity.
+
+Seasons are split by trajectory into training, selection and test. The test seasons are read for the score only;
+what was chosen (architecture, number of updates) was chosen on the selection seasons. All seasons of this data set
+share one weather year, so beside the networks stands the simplest predictor of all: the mean of the training
+seasons, hour by hour, which knows neither setpoints nor the state.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow_core.simulator.network import NetworkSimulator
+from igrow_core.simulator.network_run import free_run
+from trainer.readers.wur2020 import Seasons, TrajectoryFileError, read_seasons
+from trainer.reproduce.scores import PUBLISHED_BASELINE, PUBLISHED_INCREMENTAL, SCORED, Score, score
+from trainer.training.checkpoint import save_simulator
+from trainer.training.simulator import Layouts, train_simulator, with_setting_drivers
+
+SETTINGS = ("ventilation_offset", "lamp_radiation_limit")
+"""Settings of the virtual greenhouse computer: inputs of the published seasons, the same in all of them."""
+LAYOUTS = with_setting_drivers(Layouts(), *SETTINGS)
+
+
+@dataclass(frozen=True)
+class Split:
+    """Rows of the seasons by their use."""
+
+    training: NDArray[np.int64]
+    selection: NDArray[np.int64]
+    test: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Table:
+    """The table with what it was made from."""
+
+    test: dict[str, Score]
+    every_hour: dict[str, Score]
+    """The test seasons scored over all hours, the two faulty days included."""
+    selection: dict[str, Score]
+    mean_season: dict[str, Score]
+    """The test seasons predicted by the hourly mean of the training seasons."""
+    seconds: float
+    seasons: dict[str, tuple[str, ...]]
+
+
+def split_seasons(count: int, seed: int) -> Split:
+    """Return a split of `count` seasons at random: 60 % training, 15 % selection, 25 % test."""
+    order = np.random.default_rng(seed).permutation(count)
+    first, second = round(0.6 * count), round(0.75 * count)
+    return Split(order[:first], order[first:second], order[second:])
+
+
+def run_freely(simulator: NetworkSimulator, seasons: Seasons) -> dict[str, NDArray[np.float64]]:
+    """Run all seasons from their first hour; see `free_run`."""
+    return free_run(simulator, seasons.columns, seasons.hour)
+
+
+def run(
+    folder: Path, out: Path, seed: int = 7, layouts: Layouts = LAYOUTS, report: Callable[[str], None] = print
+) -> Table:
+    """Train, run the held-out seasons and write table1.json, table1.png and network.npz to `out`."""
+    begin = time.monotonic()
+    seasons = read_seasons(folder)
+    if len(seasons.names) < 4:
+        raise TrajectoryFileError(f"{folder}: {len(seasons.names)} seasons; at least 4 are needed to hold some out")
+    split = split_seasons(len(seasons.names), seed)
+    training, selection, test = (seasons.select(rows) for rows in (split.training, split.selection, split.test))
+    simulator = train_simulator(training.columns, seasons.hour, seasons.valid, layouts, seed, report)
+    out.mkdir(parents=True, exist_ok=True)
+    save_simulator(out, simulator)
+    predicted = run_freely(simulator, test)
+    mean = {name: values.mean(axis=0, keepdims=True) for name, values in training.columns.items()}
+    table = Table(
+        test=score(test.columns, predicted, seasons.valid),
+        every_hour=score(test.columns, predicted, np.ones_like(seasons.valid)),
+        selection=score(selection.columns, run_freely(simulator, selection), seasons.valid),
+        mean_season=score(test.columns, mean, seasons.valid),
+        seconds=time.monotonic() - begin,
+        seasons={"training": training.names, "selection": selection.names, "test": test.names},
+    )
+    (out / "table1.json").write_text(json.dumps(asdict(table), indent=1))
+    plot(out / "table1.png", test, predicted)
+    report(as_text(table))
+    return table
+
+
+def as_text(table: Table) -> str:
+    """Return the table for people; figures are the mean R2 over the test seasons unless said otherwise."""
+    rows = [
+        "| quantity | this work | worst season | every hour | selection | mean of training seasons |"
+        " published | published, incremental |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for name in SCORED:
+        mine, all_hours, chosen, mean = (
+            part[name] for part in (table.test, table.every_hour, table.selection, table.mean_season)
+        )
+        rows.append(
+            f"| {name} | {mine.mean:.4f} | {mine.low:.4f} | {all_hours.mean:.4f} | {chosen.mean:.4f} |"
+            f" {mean.mean:.4f} | {PUBLISHED_BASELINE[name]:.3f} | {PUBLISHED_INCREMENTAL[name]:.3f} |"
+        )
+    count = {use: len(names) for use, names in table.seasons.items()}
+    rows.append(f"{count['training']} training, {count['selection']} selection, {count['test']} test seasons; ")
+    rows[-1] += f"{table.seconds / 60:.1f} minutes."
+    return "\n".join(rows)
+
+
+def plot(path: Path, truth: Seasons, predicted: dict[str, NDArray[np.float64]]) -> None:
+    """Draw the worst test season by air temperature: a week of climate, the whole season of growth and harvest."""
+    import matplotlib.figure  # noqa: PLC0415, only this function draws
+
+    figure = matplotlib.figure.Figure(figsize=(11, 9), layout="constrained")
+    error = np.abs(truth.columns["air_temperature"] - predicted["air_temperature"]).mean(axis=1)
+    row = int(error.argmax())
+    week = slice(100 * 24, 107 * 24)
+    for axes, name in zip(figure.subplots(4, 2).flat, SCORED, strict=True):
+        rows = week if name in ("air_temperature", "air_humidity", "air_co2", "par") else slice(None)
+        axes.plot(truth.time[rows], truth.columns[name][row, rows], "k", label="season")
+        axes.plot(truth.time[rows], predicted[name][row, rows], "C1", label="free run")
+        axes.set_title(name, fontsize=9)
+        axes.tick_params(labelsize=7)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside upper right", fontsize=8)
+    figure.suptitle(f"{truth.names[row]}, the test season with the largest error of air temperature", fontsize=9)
+    figure.savefig(path, dpi=120)
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Add the arguments of `reproduce table1`."""
+    parser.add_argument("--data", type=Path, required=True, help="folder with trajectories.parquet, or the file")
+    parser.add_argument("--out", type=Path, required=True, help="folder for table1.json, table1.png and network.npz")
+    parser.add_argument("--seed", type=int, default=7, help="of the split, the weights and the windows (7)")
+
+
+def run_command(arguments: Namespace) -> None:
+    """Run `reproduce table1`."""
+    run(arguments.data, arguments.out, arguments.seed)

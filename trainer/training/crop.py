@@ -1,0 +1,106 @@
+"""Trains the crop stages of the hybrid simulator: growth hour by hour, harvest day by day."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow_core.errors import IgrowError
+from igrow_core.quantities import GROWTH, QUANTITIES, YIELD
+from igrow_core.simulator.crop import GROWTH_DRIVERS, HARVEST_DRIVERS, CropStages
+from igrow_core.telemetry import Telemetry, to_grid
+from trainer.training.stage import StageData, StageLayout, TrainingPlan, train_stage, untrained
+
+Values = NDArray[np.float64]
+
+GROWTH_PLAN = TrainingPlan(updates=((8, 600), (24, 500), (96, 250)), batch=128, learning_rate=3e-3)
+HARVEST_PLAN = TrainingPlan(updates=((4, 500), (14, 400)), batch=64, learning_rate=3e-3)
+_HIDDEN = (32, 32)
+
+
+def train_crop(
+    seasons: Sequence[Telemetry], *, seed: int = 0, report: Callable[[str], None] | None = None
+) -> CropStages:
+    """Train both stages on seasons of equal length that start at one time.
+
+    Args:
+        seasons: logs with climate, growth and yield (of the mechanistic greenhouse, say).
+        seed: of weights and windows.
+        report: is told of the progress in lines.
+
+    Raises:
+        IgrowError: a season lacks a quantity, or the seasons differ in length.
+    """
+    hourly = [to_grid(season, 3600) for season in seasons]
+    lengths = {len(table) for table in hourly}
+    if len(lengths) != 1:
+        raise IgrowError(f"the seasons must be equally long, not {', '.join(map(str, sorted(lengths)))} hours")
+    growth = StageData(
+        drivers=_stacked(hourly, GROWTH_DRIVERS),
+        states=_stacked(hourly, GROWTH),
+        hour=np.zeros(lengths.copy().pop()),
+        valid=np.ones((len(hourly), lengths.pop()), dtype=bool),
+    )
+    days = growth.drivers.shape[1] // 24
+    daily = np.stack([_by_day(growth.drivers[..., GROWTH_DRIVERS.index("air_temperature")], days),
+                      _by_day(growth.states[..., GROWTH.index("plant_load")], days),
+                      _last(growth.states[..., GROWTH.index("net_growth")], days)], axis=-1)  # fmt: skip
+    daily[..., 2] = np.diff(daily[..., 2], axis=1, prepend=daily[:, :1, 2])
+    harvested = _last(_stacked(hourly, YIELD)[..., 0], days)[..., None]
+    harvest = StageData(
+        drivers=daily[:, 1:],
+        states=harvested[:, 1:],
+        hour=np.zeros(days - 1),
+        valid=np.ones((len(hourly), days - 1), dtype=bool),
+    )
+    return CropStages(
+        growth=train_stage(
+            untrained(_layout("growth", GROWTH, GROWTH_DRIVERS, (False, False, True)), growth, seed),
+            growth, GROWTH_PLAN, report,
+        ),
+        harvest=train_stage(
+            untrained(_layout("harvest", YIELD, HARVEST_DRIVERS, (True,)), harvest, seed), harvest, HARVEST_PLAN, report
+        ),
+    )  # fmt: skip
+
+
+def _layout(name: str, states: tuple[str, ...], drivers: tuple[str, ...], cumulative: tuple[bool, ...]) -> StageLayout:
+    return StageLayout(
+        name=name,
+        states=states,
+        drivers=drivers,
+        time_constants=(),
+        clock=False,
+        step=1.0 if name == "growth" else 24.0,
+        low=tuple(QUANTITIES[state].low for state in states),
+        high=tuple(QUANTITIES[state].high for state in states),
+        cumulative=cumulative,
+        hidden=_HIDDEN,
+    )
+
+
+def _stacked(tables: Sequence[Telemetry], names: Sequence[str]) -> Values:
+    """Return columns as (seasons, hours, names); gaps are bridged linearly."""
+    return np.stack([np.stack([_bridged(table, name) for name in names], axis=-1) for table in tables])
+
+
+def _bridged(table: Telemetry, name: str) -> Values:
+    values = table[name]
+    good = np.flatnonzero(np.isfinite(values))
+    if len(good) == 0:
+        raise IgrowError(f"a season to train on has no {name}")
+    bridged: Values = np.interp(np.arange(len(values)), good, values[good])
+    return bridged
+
+
+def _by_day(values: Values, days: int) -> Values:
+    """Return the means of whole days, (seasons, days)."""
+    means: Values = values[:, : days * 24].reshape(len(values), days, 24).mean(axis=-1)
+    return means
+
+
+def _last(values: Values, days: int) -> Values:
+    """Return the values at the end of whole days, (seasons, days)."""
+    return values[:, 23 : days * 24 : 24]
