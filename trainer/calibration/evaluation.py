@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from igrow_core.errors import IgrowError
 from igrow_core.simulator.hybrid import record as records
 from igrow_core.simulator.hybrid.climate import ActiveEffects
+from igrow_core.simulator.hybrid.disturbance import DisturbanceModel, expected_fluxes, missing_fluxes
 from igrow_core.simulator.hybrid.record import Record
 from trainer.calibration.posterior import Posterior
 
@@ -48,6 +49,7 @@ def evaluate(
     rows: NDArray[np.bool_] | None = None,
     *,
     added: Mapping[str, Floats] | None = None,
+    disturbance: DisturbanceModel | None = None,
     every: float = 11_100.0,
     seed: int = 0,
 ) -> Evaluation:
@@ -60,6 +62,7 @@ def evaluate(
         horizons: of `HORIZONS`.
         rows: a run counts only if all its rows are among these, (n,); None: all.
         added: further fluxes by channel, (n,) (a learned remainder).
+        disturbance: how the fluxes that were missing before a start go on after it; None: they are forgotten.
         every: seconds between starts; the default makes them fall on all times of the day.
         seed: of the bootstrap over days.
 
@@ -69,6 +72,7 @@ def evaluate(
     values = parameters.values if isinstance(parameters, Posterior) else parameters
     states = records.observe(record, values, effects)
     allowed = np.ones(len(record), dtype=bool) if rows is None else rows
+    missing = missing_fluxes(record, values, effects, added) if disturbance is not None else {}
     result: dict[str, dict[str, ErrorSummary]] = {}
     for horizon in horizons:
         if horizon not in HORIZONS:
@@ -77,7 +81,13 @@ def evaluate(
         starts = starts_within(record, allowed, steps, max(1, round(every / record.step)))
         if len(starts) == 0:
             continue
-        shown = records.free_run(record, states, starts, steps, values, effects, added)
+        fluxes = dict(added or {})
+        if disturbance is not None:
+            expected = expected_fluxes(record, missing, starts, steps, disturbance)
+            rows_ahead = starts + np.arange(steps)[:, None]
+            for channel, flux in expected.items():
+                fluxes[channel] = flux + (fluxes[channel][rows_ahead] if channel in fluxes else 0.0)
+        shown = records.free_run(record, states, starts, steps, values, effects, fluxes)
         following = starts + 1 + np.arange(steps)[:, None]
         for quantity, predicted in shown.items():
             measured = record.measured[quantity]
@@ -95,9 +105,7 @@ def evaluate(
 
 def horizon_steps(record: Record, horizon: str) -> int:
     """Return the rows that a horizon spans."""
-    return {"1_step": 1, "1_h": max(1, round(3600.0 / record.step))}.get(horizon) or round(
-        _RUNS[horizon] / record.step
-    )
+    return {"1_step": 1, "1_h": max(1, round(3600.0 / record.step))}.get(horizon) or round(_RUNS[horizon] / record.step)
 
 
 def starts_within(record: Record, allowed: NDArray[np.bool_], steps: int, every: int) -> NDArray[np.int64]:

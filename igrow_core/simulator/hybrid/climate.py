@@ -96,7 +96,10 @@ def derive(xp: Any, state: Values, inputs: Drivers, parameters: Values, lamp_eff
         * (par / (par + parameters["assimilation_light"]))
         * (ppm / (ppm + parameters["assimilation_co2"]))
     )
-    opening = 0.01 * (inputs["vent_lee"] + parameters["vent_windward_ratio"] * inputs["vent_wind"])
+    # De Jong (1990): the flow past lee vents saturates with the opening, that past windward vents does not.
+    lee = 0.01 * inputs["vent_lee"]
+    lee = lee * (1.0 + parameters["vent_curvature"] * (1.0 - lee))
+    opening = lee + 0.01 * parameters["vent_windward_ratio"] * inputs["vent_wind"]
     blocked = 1.0 - 0.01 * parameters["screen_air_blocking"] * xp.maximum(
         inputs["energy_screen"], inputs["blackout_screen"]
     )
@@ -116,6 +119,7 @@ def derive(xp: Any, state: Values, inputs: Drivers, parameters: Values, lamp_eff
         ),
         "vapour_deficit": deficit,
         "ventilation": ventilation,
+        "air_blocked": blocked,
         "transpiration": evaporation / air.LATENT_HEAT,
         "assimilation": assimilation,
         "rail_pipe_excess": xp.maximum(inputs["rail_pipe_temperature"] - temperature, zero),
@@ -153,7 +157,7 @@ def balances(
     height = drivers["mean_height"]
     outdoor = drivers["outdoor_temperature"]
     leakage = (parameters["leakage_still"] + parameters["leakage_wind"] * drivers["wind_speed"]) * height / 3600.0
-    exchange = leakage + drivers["ventilation"] + added.get("air_exchange", 0.0)
+    exchange = leakage * drivers["air_blocked"] + drivers["ventilation"] + added.get("air_exchange", 0.0)
     light = 1.0 - added.get("light_loss", 0.0)
 
     screens = (1.0 - 0.01 * parameters["energy_screen_saving"] * drivers["energy_screen"]) * (

@@ -49,9 +49,7 @@ def nominal(site: Site) -> dict[str, float]:
     ):
         if screen is not None and reference is not None:
             scale(name, screen.saving, reference.saving)
-    return {
-        name: float(np.clip(value, PARAMETERS[name].low, PARAMETERS[name].high)) for name, value in values.items()
-    }
+    return {name: float(np.clip(value, PARAMETERS[name].low, PARAMETERS[name].high)) for name, value in values.items()}
 
 
 def leaf_area_curve(site: Site, time: NDArray[np.datetime64]) -> Floats:

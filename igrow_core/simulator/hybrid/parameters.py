@@ -166,6 +166,16 @@ _ROWS = (
         "De Jong (1990)",
     ),
     (
+        "vent_curvature",
+        "1",
+        0.5,
+        0.8,
+        -0.95,
+        1.0,
+        "how early the flow past the lee vents saturates: 1 + this is the slope at the first opening over the mean",
+        "De Jong (1990): 0.9 for vents that open to 44 degrees",
+    ),
+    (
         "vent_windward_ratio",
         "1",
         1.5,

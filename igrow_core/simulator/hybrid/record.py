@@ -193,7 +193,7 @@ def free_run(
         steps: rows to run.
         parameters: floats, or arrays of shape (m, 1) for m variants at once.
         effects: the active effects; their values are floats, (m, 1), or functions of time as (n,).
-        added: further fluxes by channel, (n,).
+        added: further fluxes by channel: (n,), or (steps, s) for fluxes that differ from start to start.
 
     Returns:
         What the sensors would show at rows start + 1 ... start + steps, by quantity, (steps, s) or (steps, m, s).
@@ -209,7 +209,7 @@ def free_run(
         row = begin + k
         inputs: dict[str, Array] = dict(zip(names, table[:, row], strict=True))
         active = _at_rows(effects, row, len(record))
-        fluxes = {channel: flux[row] for channel, flux in extra.items()}
+        fluxes = {channel: flux[row] if flux.ndim == 1 else flux[k] for channel, flux in extra.items()}
         for _ in range(substeps):
             drivers_inputs = _corrected(inputs, state, parameters, active, record.lamp_efficacy)
             state = climate.advance(
