@@ -17,7 +17,6 @@ from __future__ import annotations
 import gzip
 import json
 import os
-import sqlite3
 from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from datetime import UTC, datetime
@@ -101,7 +100,7 @@ class FolderExchange:
         assert callable(work)
         try:
             work()
-        except (OSError, sqlite3.Error, IgrowError) as error:
+        except (OSError, IgrowError) as error:
             self._problem = f"exchange {self._root}: {error}"
             self._retry_at = time + 600.0
         else:

@@ -14,16 +14,11 @@ from pathlib import Path
 import numpy as np
 
 from edge.store.ledger import NAMES
-from edge.store.store import TELEMETRY_FILE, read_records, read_telemetry
-from igrow_core.errors import IgrowError
+from edge.store.store import TELEMETRY_FILE, StoreError, read_records, read_telemetry
 from igrow_core.telemetry import write_csv
 
 FILES = (TELEMETRY_FILE, *NAMES)
 _LARGEST = 2**32
-
-
-class StoreError(IgrowError):
-    """A backup, restore or export that cannot be done, and why."""
 
 
 def backup(folder: Path, target: Path) -> Path:

@@ -15,9 +15,14 @@ from edge.store.database import Synchronous, describe
 from edge.store.ledger import NAMES, RESERVE_BYTES, Ledger, Record, read_newest
 from edge.store.packing import Row, pack
 from edge.store.telemetry_file import TelemetryFile, read_file, to_telemetry
+from igrow_core.errors import IgrowError
 from igrow_core.telemetry import Telemetry, concatenate
 
 TELEMETRY_FILE = "telemetry.db"
+
+
+class StoreError(IgrowError):
+    """A store that cannot be read, copied or put back, and why."""
 
 
 @dataclass(frozen=True)
@@ -168,19 +173,24 @@ class SqliteStore:
 def read_telemetry(folder: Path, start: float, end: float) -> Telemetry:
     """Read the committed telemetry of a store that a daemon may be writing, from any thread or process.
 
-    Raises sqlite3.Error where the file cannot be read.
+    Raises StoreError where the file cannot be read.
     """
-    return read_file(folder / TELEMETRY_FILE, round(start * 1000), round(end * 1000))
+    path = folder / TELEMETRY_FILE
+    try:
+        return read_file(path, round(start * 1000), round(end * 1000))
+    except sqlite3.Error as error:
+        raise StoreError(f"{path}: the log cannot be read: {describe(error)}") from None
 
 
 def read_records(folder: Path, category: str) -> list[Record]:
     """Read one category of the ledger of a store that a daemon may be writing, newest first.
 
-    Raises sqlite3.Error where neither file can be read.
+    Raises StoreError where neither file can be read.
     """
-    for name in NAMES[:-1]:
+    problem = ""
+    for name in NAMES:
         try:
             return read_newest(folder / name, category)
-        except sqlite3.Error:
-            continue
-    return read_newest(folder / NAMES[-1], category)
+        except sqlite3.Error as error:
+            problem = f"{folder / name}: the ledger cannot be read: {describe(error)}"
+    raise StoreError(problem)

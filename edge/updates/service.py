@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-import sqlite3
 import threading
 from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -14,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from edge.ports import ActiveBundle
-from edge.store.store import read_telemetry
+from edge.store.store import StoreError, read_telemetry
 from edge.updates.rules import ReportBox, UpdateRules, UpdateStore
 from edge.updates.shadow import Comparison, Predictor, compare, hindcast_errors
 from edge.updates.shelf import Shelf
@@ -339,7 +338,7 @@ class BundleUpdates:
         """Return the log from a day before `since`, as history for the simulator, on the regular grid."""
         try:
             stored = read_telemetry(self._store.folder, since - 24 * HOUR, time)
-        except sqlite3.Error:
+        except StoreError:
             stored = Telemetry(np.empty(0, dtype="datetime64[s]"), {})
         return to_grid(stored, self._rules.step_seconds)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sqlite3
 from pathlib import Path
 
 import numpy as np
@@ -76,7 +75,7 @@ def test_telemetry_is_committed_once_a_minute_and_not_before(tmp_path: Path) -> 
     store = SqliteStore(tmp_path)
     for index in range(12):
         store.append(START + 5 * index, values(20.0))
-    with pytest.raises(sqlite3.Error):
+    with pytest.raises(StoreError):
         read_telemetry(tmp_path, 0.0, 8e9)
     store.append(START + 60, values(20.0))
     assert len(read_telemetry(tmp_path, 0.0, 8e9)) == 13
