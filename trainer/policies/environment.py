@@ -1,19 +1,26 @@
-"""What a policy learns in: a batch of mechanistic greenhouses, each under weather of its own, a day at a time."""
+"""What a policy learns in, a day at a time, each greenhouse under weather of its own.
+
+`DailyGreenhouses` is a batch of mechanistic greenhouses. `SimulatedDays` is a bundle's simulator: some hundred times
+cheaper, and what the paper trains on; whether that carries over to a greenhouse is then to be judged in the other.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from igrow_core.economics import Balance
 from igrow_core.greenhouse import GreenhouseParameters, generate_weather
 from igrow_core.greenhouse.disturbances import QUIET
 from igrow_core.greenhouse.parameters import stack
 from igrow_core.greenhouse.plant import Plant
 from igrow_core.greenhouse.sensors import EXACT
 from igrow_core.greenhouse.weather_table import WeatherTable
-from igrow_core.planner.objective import Objective, Valuation
+from igrow_core.planner.objective import Objective, Simulator, Valuation
 from igrow_core.planner.plant_simulator import run
 from igrow_core.planner.policy import HOURS, PRESENT, observe
 from igrow_core.planner.template import Setpoints, for_site
@@ -37,6 +44,20 @@ class Scenario:
     seed: int
     variation: float = 0.08
     """Relative spread of the greenhouses' parameters."""
+
+
+class World(Protocol):
+    """Greenhouses that live through days, one action each day."""
+
+    @property
+    def done(self) -> bool:
+        """All days are over."""
+
+    def observe(self) -> NDArray[np.float32]:
+        """Return the observations of the day that comes, (N, 76)."""
+
+    def step(self, setpoints: Setpoints) -> Valuation:
+        """Live through a day under setpoints (N, 24, 4), and return what it was worth, arrays (1, N)."""
 
 
 class DailyGreenhouses:
@@ -92,6 +113,75 @@ class DailyGreenhouses:
         time = self.time + np.arange(HOURS) * np.timedelta64(3600, "s")
         self.day += 1
         return Objective(self.site, time).value(run(self._plant, limited))
+
+
+class SimulatedDays:
+    """A simulator under `count // trials` courses of weather, in each of which `trials` actions are tried a day.
+
+    The first of them is followed: the climate at its end begins the next day. Leaf area and fruit load are drawn for
+    each course and stay, as a day changes them little.
+    """
+
+    def __init__(self, site: Site, scenario: Scenario, simulator: Simulator, trials: int = 8) -> None:
+        rng = np.random.default_rng(scenario.seed)
+        self.site, self.scenario, self.trials, self.day = site, scenario, trials, 0
+        self._simulator = simulator
+        courses = max(1, scenario.count // trials)
+        end = scenario.start + (scenario.days + 1) * DAY
+        weather = [generate_weather(scenario.start, end, seed=int(rng.integers(2**31))) for _ in range(courses)]
+        self._forecast = np.stack([hourly_weather(table, scenario.start, 24 * scenario.days) for table in weather])
+        self._state = [
+            {
+                "air_temperature": float(rng.uniform(16.0, 22.0)),
+                "air_humidity": float(rng.uniform(65.0, 90.0)),
+                "air_co2": float(rng.uniform(400.0, 900.0)),
+                "leaf_area_index": float(rng.uniform(2.0, 4.0)),
+                "plant_load": float(rng.uniform(100.0, 500.0)),
+            }
+            for _ in range(courses)
+        ]
+
+    @property
+    def done(self) -> bool:
+        """All days are over."""
+        return self.day >= self.scenario.days
+
+    def observe(self) -> NDArray[np.float32]:
+        """Return the observations of the day that comes, (N, 76), equal for the trials of one course."""
+        day = min(self.day, self.scenario.days - 1)
+        forecast = self._forecast[:, day * HOURS : (day + 1) * HOURS]
+        present = {name: np.array([state[name] for state in self._state]) for name in PRESENT}
+        return observe(self.site, present, forecast, self.scenario.start + day * DAY).repeat(self.trials, axis=0)
+
+    def step(self, setpoints: Setpoints) -> Valuation:
+        """Try a day's setpoints (N, 24, 4), and return what each was worth, arrays (1, N)."""
+        start = self.scenario.start + self.day * DAY
+        objective = Objective(self.site, start + np.arange(HOURS) * np.timedelta64(3600, "s"))
+        template = for_site(self.site, start, HOURS)
+        limited = template.limit(setpoints, np.full(4, np.nan))
+        parts = []
+        for course, state in enumerate(self._state):
+            tried = limited[course * self.trials : (course + 1) * self.trials]
+            forecast = self._forecast[course, self.day * HOURS : (self.day + 1) * HOURS]
+            outcome = self._simulator.simulate(state, forecast, tried, start)
+            parts.append(objective.value(outcome))
+            for name in ("air_temperature", "air_humidity", "air_co2"):
+                state[name] = float(getattr(outcome, name)[0, 0, -1])
+        self.day += 1
+        return join(parts)
+
+
+def join(parts: Sequence[Valuation]) -> Valuation:
+    """Put valuations of candidates side by side."""
+
+    def side(arrays: Sequence[Values]) -> Values:
+        return np.concatenate(arrays, axis=1)
+
+    return Valuation(
+        Balance(**{one.name: side([getattr(part.balance, one.name) for part in parts]) for one in fields(Balance)}),
+        side([part.harm for part in parts]),
+        side([part.outside for part in parts]),
+    )
 
 
 def hourly_weather(weather: Telemetry, start: np.datetime64, hours: int) -> Values:

@@ -15,9 +15,12 @@ from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 from torch import nn
 
+from igrow_core.bundle import read_bundle
+from igrow_core.planner.objective import Simulator
 from igrow_core.planner.policy import ACTIONS, OBSERVATIONS, to_setpoints
+from igrow_core.simulator.plan import BundleSimulator
 from igrow_core.site import Site, load_site
-from trainer.policies.environment import DailyGreenhouses, Scenario
+from trainer.policies.environment import DailyGreenhouses, Scenario, SimulatedDays, World
 from trainer.policies.sac import Actor, SacSettings, SoftActorCritic
 
 TRAINING_SEEDS = 1_000_000
@@ -47,21 +50,27 @@ def train(
     settings: SacSettings,
     seed: int,
     progress: Callable[[str], None] = lambda _: None,
+    simulator: Simulator | None = None,
 ) -> SoftActorCritic:
-    """Return a learner after its episodes; every episode has new weather, greenhouses and dates."""
+    """Return a learner after its episodes; every episode has new weather, greenhouses and dates.
+
+    It learns in a simulator where one is given, else in mechanistic greenhouses.
+    """
     learner = SoftActorCritic(settings, seed)
     rng = np.random.default_rng(seed)
     began = time.monotonic()
     for episode in range(plan.episodes):
         start = FIRST_START + int(rng.integers(LAST_START_DAYS)) * np.timedelta64(1, "D")
         scenario = Scenario(start, plan.days, plan.count, TRAINING_SEEDS + 1000 * seed + episode)
-        world = DailyGreenhouses(site, scenario)
+        world: World = (
+            DailyGreenhouses(site, scenario) if simulator is None else SimulatedDays(site, scenario, simulator)
+        )
         rewards = []
         while not world.done:
             observation = world.observe()
             first = episode == 0
             action = first_actions(rng, len(observation)) if first else learner.act(observation, explore=True)
-            reward = world.step(to_setpoints(site, action)).score[0]
+            reward = world.step(to_setpoints(site, action)).score.mean(axis=0)
             learner.memory.add(observation, action, reward, world.observe(), not world.done)
             rewards.append(reward.mean())
             if len(learner.memory) >= settings.batch:
@@ -116,6 +125,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Define the options of `igrow-trainer policy`."""
     parser.add_argument("--site", type=Path, required=True, help="site file")
     parser.add_argument("--out", type=Path, required=True, help="policy.onnx to write")
+    parser.add_argument("--bundle", type=Path, help="learn in this bundle's simulator, not in mechanistic greenhouses")
     parser.add_argument("--minutes", type=float, default=8.0, help="training ends soon after (default: 8)")
     parser.add_argument("--seed", type=int, default=0, help="of networks, weather and exploration (default: 0)")
 
@@ -124,9 +134,14 @@ def run(arguments: argparse.Namespace) -> None:
     """Train and write the policy."""
     torch.set_num_threads(1)
     plan = TrainingPlan(episodes=1000, seconds=60.0 * arguments.minutes)
-    learner = train(load_site(arguments.site), plan, SacSettings(), arguments.seed, print)
+    simulator = BundleSimulator(read_bundle(arguments.bundle), members=1) if arguments.bundle else None
+    learner = train(load_site(arguments.site), plan, SacSettings(), arguments.seed, _say, simulator)
     arguments.out.write_bytes(export(learner.actor).SerializeToString())
     print(f"{arguments.out} written")
+
+
+def _say(line: str) -> None:
+    print(line, flush=True)
 
 
 if __name__ == "__main__":
