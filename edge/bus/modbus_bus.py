@@ -118,20 +118,20 @@ class ModbusBus:
         if not self.settings.transport.is_rtu:
             self.health.failed(device_id, silent=silent)
             return
-        # An answer may still be on its way on the line, and would look like the answer to the next request.
-        deaf = device_id in self._deaf_to_loop_back
-        self.health.failed(device_id, silent=silent, at_least=self.settings.timeout if deaf else 0.0)
+        # An answer may still be on its way on the line, and would look like the answer to the next request: the
+        # unit rests for one timeout more, at the cost of nobody else, and is asked for a loop back (`_settle`).
+        self.health.failed(device_id, silent=silent, at_least=self.settings.timeout)
         self._loop_back_unanswered.discard(device_id)
-        if not deaf:
+        if device_id not in self._deaf_to_loop_back:
             self._unsure.add(device_id)
         await self._link.drain()
 
     async def _settle(self, device_id: int) -> None:
         """Make sure that no old answer of a unit is still on its way, before it is asked again.
 
-        The unit is asked to echo a marker (function 8); a refusal of that function does as well. If the unit is
-        silent, the line has been quiet for one timeout more, and the next request goes ahead without; a unit
-        that answers it although it ignored the marker will from then on rest for a timeout after each failure.
+        A unit answers its requests in order. So it is asked to echo a marker (function 8); a refusal of that
+        function does as well. If the unit is silent, the line has been quiet for one timeout more, and the next
+        request goes ahead without; a unit that answers it although it ignored the marker is not asked again.
         """
         self._marker = (self._marker + 1) % 0x10000
         marker = self._marker

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from edge.bus.answer_check import MisfitError, TornStreamError, check_pdu, find_rtu_answer, first_tcp_frame
+from edge.registers.codec import decode
+from edge.registers.loading import load_register_map
 from edge.virtual_plc.modbus_server import crc
+
+MAPS = Path(__file__).parents[2] / "config" / "register-maps"
 
 READ_10 = bytes((3, 0, 0, 0, 10))
 READ_COILS_9 = bytes((1, 0, 0, 0, 9))
@@ -137,3 +143,14 @@ def test_an_exception_on_a_line_is_an_answer() -> None:
 def test_the_check_sum_is_the_one_of_the_specification() -> None:
     """A frame worked out in many introductions to Modbus: 01 03 00 00 00 0A ends with C5 CD."""
     assert crc(bytes.fromhex("01030000000a")) == bytes.fromhex("c5cd")
+
+
+def test_the_example_of_a_co2_probes_manual_reads_as_its_manual_says() -> None:
+    """Vaisala GMP252 User Guide M211897EN-D, A.3: 43E8D47A, least significant word first, is 465.65997 ppm."""
+    point = load_register_map(MAPS / "vaisala-gmp252.yaml").points["air_co2"]
+    request = bytes.fromhex("f0 03 0000 0002")
+    assert crc(request) == bytes.fromhex("d12a")
+    answer = find_rtu_answer(request, bytes.fromhex("f0 03 04 d47a 43e8 33ab"), crc)
+    assert answer is not None
+    value = decode(point, (int.from_bytes(answer[2:4], "big"), int.from_bytes(answer[4:6], "big")))
+    assert value == pytest.approx(465.65997)

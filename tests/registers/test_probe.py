@@ -1,0 +1,85 @@
+"""The probe: which unit answers, what its registers hold, and what that may mean."""
+
+from __future__ import annotations
+
+import asyncio
+
+from bus.coded_unit import CodedUnit
+from bus.simulated_loop import run
+
+from edge.probe import decoded, probe, scan
+from edge.registers.codec import encode_raw
+from edge.registers.model import BusSettings, ByteOrder, DataType, Function, Transport
+from edge.virtual_plc.modbus_server import ModbusServer
+
+SETTINGS = BusSettings("probe", Transport.TCP, host="127.0.0.1", port=5020, timeout=1.0)
+
+
+def against(*units: CodedUnit, first: int = 0, count: int = 4) -> list[str]:
+    async def main() -> list[str]:
+        server = ModbusServer({unit.device_id: unit for unit in units})
+        await server.listen("127.0.0.1", 5020)
+        return await probe(SETTINGS, [1, 2], Function.HOLDING, first, count)
+
+    return run(main())
+
+
+def test_a_value_is_shown_in_the_byte_order_in_which_it_was_written() -> None:
+    for order in ByteOrder:
+        words = encode_raw(23.5, DataType.FLOAT32, order)
+        lines = list(decoded(dict(enumerate(words)), Function.HOLDING))
+        assert any(line.strip().startswith("float32") and f"{order.value} 23.5" in line for line in lines)
+
+
+def test_raw_content_comes_with_its_bits_and_both_whole_numbers() -> None:
+    lines = list(decoded({7: 0xFFFE}, Function.HOLDING))
+    assert lines[0].split() == ["7", "0xfffe", "bits", "1111111111111110"]
+    assert "ABCD -2" in lines[1]
+    assert "ABCD 65534" in lines[2]
+
+
+def test_a_silent_unit_and_an_answering_one_are_told_apart() -> None:
+    lines = against(CodedUnit(1))
+    assert lines[0] == "unit 1, holding 0 to 3: answers"
+    assert lines[-1] == "unit 2, holding 0 to 3: no answer within 1 s"
+
+
+def test_a_refused_block_is_asked_for_address_by_address() -> None:
+    lines = against(CodedUnit(1, refused=[1, 2]))
+    assert "asking for each address alone" in lines[0]
+    assert [line.split()[0] for line in lines if "bits" in line] == ["0", "3"]
+
+
+def test_a_unit_that_has_nothing_there_is_told_from_one_that_is_not_there() -> None:
+    lines = against(CodedUnit(1), first=1000)
+    assert lines[1] == "  the unit is there, but holds nothing at these addresses"
+
+
+def test_a_server_that_is_not_there_is_told() -> None:
+    lines = run(probe(SETTINGS, [1]))
+    assert len(lines) == 1
+    assert "nobody listens" in lines[0] or "not connected" in lines[0]
+
+
+def test_a_scan_finds_the_units_that_answer_at_all() -> None:
+    async def main() -> list[str]:
+        refusing = CodedUnit(5, refused=[0])
+        server = ModbusServer({3: CodedUnit(3), 5: refusing})
+        await server.listen("127.0.0.1", 5020)
+        return await scan(SETTINGS, range(1, 10))
+
+    lines = run(main())
+    assert lines[0] == "unit 3: answers"
+    assert lines[1].startswith("unit 5: is there")
+    assert len(lines) == 2
+
+
+def test_a_probe_closes_its_connection() -> None:
+    async def main() -> int:
+        server = ModbusServer({1: CodedUnit(1)})
+        await server.listen("127.0.0.1", 5020)
+        await probe(SETTINGS, [1])
+        await asyncio.sleep(0.1)
+        return len(asyncio.all_tasks())
+
+    assert run(main()) == 1
