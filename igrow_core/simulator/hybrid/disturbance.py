@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from igrow_core.effects.definition import Values
-from igrow_core.simulator.hybrid import climate, record as records
+from igrow_core.simulator.hybrid import climate
+from igrow_core.simulator.hybrid import record as records
 from igrow_core.simulator.hybrid.climate import ActiveEffects
 from igrow_core.simulator.hybrid.record import Record
 
@@ -110,21 +111,32 @@ def expected_fluxes(
         model: how disturbances go on.
     """
     begin = np.asarray(starts, dtype=np.int64)
+    hours = (np.arange(steps) + 0.5) * record.step / 3600.0
     result = {}
     for channel, flux in missing.items():
-        smooth = _smoothed(flux, model, record.step)
-        ahead = begin[None, :] + np.arange(steps)[:, None]
-        expected = model.daily_share[channel] * _daily_course(smooth, ahead, begin, model, record.step)
-        back = max(1, round(model.recent_hours * 3600.0 / record.step))
-        before = begin[None, :] - 1 - np.arange(back)[:, None]
-        course = model.daily_share[channel] * _daily_course(smooth, before, begin - back, model, record.step)
-        departure = np.where(before >= 0, flux[np.maximum(before, 0)], np.nan) - course
-        known = np.isfinite(departure)
-        mean = np.where(known, departure, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-        hours = (np.arange(steps) + 0.5) * record.step / 3600.0
+        course, departure = courses(record, flux, begin, steps, model, model.daily_share[channel])
         fading = model.recent_share[channel] * np.exp(-hours / model.decay_hours[channel])
-        result[channel] = expected + fading[:, None] * mean[None, :]
+        result[channel] = model.daily_share[channel] * course + fading[:, None] * departure[None, :]
     return result
+
+
+def courses(
+    record: Record, flux: Floats, begin: NDArray[np.int64], steps: int, model: DisturbanceModel, share: float
+) -> tuple[Floats, Floats]:
+    """Return the daily course of a missing flux after each start, (steps, s), and the departure before it, (s,).
+
+    The departure is the mean over `recent_hours` of the flux less `share` times its own daily course.
+    """
+    smooth = _smoothed(flux, model, record.step)
+    ahead = begin[None, :] + np.arange(steps)[:, None]
+    course = _daily_course(smooth, ahead, begin, model, record.step)
+    back = max(1, round(model.recent_hours * 3600.0 / record.step))
+    before = begin[None, :] - 1 - np.arange(back)[:, None]
+    usual = share * _daily_course(smooth, before, begin - back, model, record.step)
+    departure = np.where(before >= 0, flux[np.maximum(before, 0)], np.nan) - usual
+    known = np.isfinite(departure)
+    mean: Floats = np.where(known, departure, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    return course, mean
 
 
 def _smoothed(flux: Floats, model: DisturbanceModel, step: float) -> Floats:
