@@ -22,6 +22,8 @@ from igrow_core.quantities import QUANTITIES
 WAITING_ROWS = 20_000
 """Undated rows kept in memory: more than two days at one each 10 s."""
 SHOWN_CLAMPS = 50
+SILENT_CYCLES = 3
+"""Cycles without any answer after which the line counts as down; a start or a hiccup is no alarm."""
 
 log = logging.getLogger("igrow.edge")
 
@@ -34,7 +36,7 @@ class Journal:
         self._waiting: deque[tuple[float, Mapping[str, Value]]] = deque(maxlen=WAITING_ROWS)
         self._standing: dict[str, tuple[str, str, float | None]] = {}
         """By point: the clamp (kind, source, request) that was last written down and still stands."""
-        self._failing: set[str] = set()
+        self._silent_cycles = 0
         self._time: float | None = None
         self._monotonic = 0.0
         self.clamps: deque[WriteRecord] = deque(maxlen=SHOWN_CLAMPS)
@@ -68,7 +70,9 @@ class Journal:
             usable = CONSEQUENCES[value.quality].control
             text = "" if usable or not image.link_ok else f"{name} is {value.quality.value}: {value.why}"
             self.alarm(f"sensor {name}", text)
-        self.alarm("link", "" if image.link_ok else "no point of the PLC can be read: check cable, address and power")
+        self._silent_cycles = 0 if image.link_ok else self._silent_cycles + 1
+        silent = self._silent_cycles >= SILENT_CYCLES
+        self.alarm("link", "no point of the PLC can be read: check cable, address and power" if silent else "")
 
     def findings(self, findings: Sequence[Finding], respect_hand: float) -> None:
         """Write down what the PLC showed of our writes and of other hands."""

@@ -99,11 +99,16 @@ def _take(track: _Track, reading: RawReading, now: float) -> bool:
     rule = track.rule
     if not rule.low <= value <= rule.high:
         track.too_fast = False
-    elif track.accepted is None or abs(value - track.accepted) <= rule.jump + rule.rate * (now - track.accepted_at):
+    elif track.accepted is None or _possible(rule, value - track.accepted, now - track.accepted_at):
         track.accepted, track.accepted_at, track.too_fast = value, now, False
     else:
         track.too_fast = True
     return True
+
+
+def _possible(rule: SensorRule, change: float, seconds: float) -> bool:
+    # Asked in this order, since no time at any speed is not a number.
+    return abs(change) <= rule.jump or abs(change) <= rule.jump + rule.rate * seconds
 
 
 def _judge(track: _Track, now: float) -> Value:

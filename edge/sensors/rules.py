@@ -41,7 +41,7 @@ _MOVEMENT: Mapping[str, tuple[float, float, float, float, float]] = MappingProxy
         "air_temperature": (1.0, 1.5, 3.0, -INFINITE, INFINITE),
         "air_humidity": (5.0, 8.0, 3.0, 1.0, 99.0),
         "air_co2": (150.0, 250.0, 3.0, -INFINITE, INFINITE),
-        "par": (1000.0, 1500.0, 3.0, 5.0, INFINITE),
+        "par": (1000.0, 1500.0, INFINITE, -INFINITE, INFINITE),
         "outdoor_temperature": (1.0, 2.0, 6.0, -INFINITE, INFINITE),
         "outdoor_humidity": (5.0, 10.0, 6.0, 1.0, 97.0),
         "global_radiation": (600.0, 900.0, 2.0, 5.0, INFINITE),
@@ -51,7 +51,8 @@ _MOVEMENT: Mapping[str, tuple[float, float, float, float, float]] = MappingProxy
     }
 )
 """Rates: fastest change seen in greenhouse logs at a 5-minute step, times about two. Standing still: longer than
-any stretch of one unchanging reading at a resolution of 0.1 (1 for CO2 and light) with the sensor's own noise."""
+any stretch of one unchanging reading at a resolution of 0.1 (1 for CO2) with the sensor's own noise. Lamps alone give
+the same light for hours."""
 
 
 def default_rule(name: str, *, poll_period: float, low: float = -INFINITE, high: float = INFINITE) -> SensorRule:

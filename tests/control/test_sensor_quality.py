@@ -102,6 +102,13 @@ def test_a_spike_is_implausible_and_a_change_that_lasts_is_accepted_in_time():
     assert qualities[-1] is Quality.GOOD
 
 
+def test_two_readings_at_one_moment_of_a_stopped_clock_are_not_too_fast():
+    bench = Bench(t=SensorRule(-20.0, 60.0))
+    bench.read(t=20.0)
+    bench.now -= 1e-3
+    assert bench.read(1e-3, t=25.0)["t"].quality is Quality.GOOD
+
+
 def test_light_by_night_is_implausible():
     bench = Bench(global_radiation=SensorRule(-20, 1500), sun=lambda time: -20.0)
     assert bench.read(global_radiation=300.0)["global_radiation"].quality is Quality.IMPLAUSIBLE

@@ -1,0 +1,248 @@
+"""Faults over real sockets: the daemon against the virtual PLC."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+from daemon_bench import Plant, free_port, running, until, write_files
+
+from edge.image import Quality
+from edge.planning import PlanningProcess, ProcessLimits
+from edge.ports import ActiveBundle
+from edge.store import read_records, read_telemetry
+from edge.virtual_plc.pace import Realtime
+
+
+def kinds(folder: Path) -> list[str]:
+    return [str(record.body["kind"]) for record in read_records(folder / "state" / "store", "event")]
+
+
+async def test_the_daemon_controls_in_lockstep_and_leaves_safe_setpoints(tmp_path):
+    port = free_port()
+    path = write_files(tmp_path, port)
+    plant = Plant(tmp_path, port)
+    await plant.up()
+    async with running(path) as daemon:
+        await until(lambda: daemon.cycles >= 50)
+        assert plant.shows("heating_setpoint") == 19.0
+        assert plant.shows("co2_setpoint") == 700.0
+        assert plant.table.setpoints["heating_setpoint"] == 19.0
+    assert plant.shows("heating_setpoint") == 18.0
+    assert plant.shows("co2_setpoint") == 400.0
+    await plant.down()
+    log = read_telemetry(tmp_path / "state" / "store", 0.0, 8e9)
+    assert len(log) >= 50
+    assert {"started", "source", "stopped"} <= set(kinds(tmp_path))
+
+
+async def test_a_server_that_is_down_at_boot_is_found_when_it_comes(tmp_path):
+    port = free_port()
+    path = write_files(tmp_path, port)
+    async with running(path) as daemon:
+        await until(lambda: daemon.cycles >= 1)
+        assert not daemon.last.image.link_ok
+        plant = Plant(tmp_path, port)
+        await plant.up()
+        await until(lambda: plant.shows("heating_setpoint") == 19.0)
+    await plant.down()
+
+
+async def test_a_line_that_is_lost_and_comes_back_is_used_again(tmp_path):
+    port = free_port()
+    path = write_files(tmp_path, port)
+    plant = Plant(tmp_path, port)
+    await plant.up()
+    async with running(path) as daemon:
+        await until(lambda: daemon.cycles >= 20)
+        plant.plc.drop_connections()
+        cycles = daemon.cycles
+        await until(lambda: daemon.cycles > cycles + 20 and daemon.last.image.link_ok)
+        await plant.down()
+        await until(lambda: [alarm.name for alarm in daemon._journal.alarms.active] == ["link"])
+        await plant.up()
+        await until(lambda: daemon.last.image.link_ok and plant.shows("heating_setpoint") == 19.0)
+        assert not daemon._journal.alarms.active
+    await plant.down()
+    assert "changed_by_hand" not in kinds(tmp_path)
+
+
+async def test_a_frozen_thermometer_moves_heating_to_the_safe_setpoint(tmp_path):
+    port = free_port()
+    path = write_files(tmp_path, port)
+    plant = Plant(tmp_path, port)
+    await plant.up()
+    async with running(path) as daemon:
+        await until(lambda: plant.shows("heating_setpoint") == 19.0)
+        plant.table.frozen.add("air_temperature")
+        await until(lambda: plant.shows("heating_setpoint") == 18.0)
+        assert daemon.last.image.value_of("air_temperature").quality is Quality.FROZEN
+        plant.table.frozen.clear()
+        await until(lambda: plant.shows("heating_setpoint") == 19.0)
+    await plant.down()
+
+
+async def test_a_plc_in_1970_is_controlled_by_light_and_nothing_is_dated(tmp_path):
+    port = free_port()
+    path = write_files(tmp_path, port)
+    plant = Plant(tmp_path, port, start="1970-01-01T01:00:00")
+    await plant.up()
+    async with running(path) as daemon:
+        await until(lambda: daemon.cycles >= 30)
+        assert daemon.last.image.true_time is None
+        assert "told by the light" in daemon.last.decision.why
+        assert plant.shows("heating_setpoint") == 19.0
+    await plant.down()
+    assert not (tmp_path / "state" / "store" / "telemetry.db").exists()
+    assert all(record.time is None for record in read_records(tmp_path / "state" / "store", "event"))
+
+
+async def test_a_setpoint_changed_at_the_plc_is_respected_also_across_kill_9(tmp_path):
+    port = free_port()
+    path = write_files(tmp_path, port, clock="system", interval="1 s")
+    plant = Plant(tmp_path, port, pace=Realtime())
+    await plant.up()
+    command = [sys.executable, "-m", "edge.cli", "run", str(path)]
+    process = await asyncio.create_subprocess_exec(*command)
+    await until(lambda: plant.shows("co2_setpoint") > 400.0)
+    await asyncio.sleep(2.5)
+    plant.plc.set_by_hand("co2_setpoint", 555.0)
+    await until(lambda: (tmp_path / "state" / "holds.json").exists())
+    process.send_signal(signal.SIGKILL)
+    await process.wait()
+    process = await asyncio.create_subprocess_exec(*command)
+    beat = plant.shows("heartbeat")
+    await until(lambda: plant.shows("heartbeat") not in (beat, 0.0))
+    beat = plant.shows("heartbeat")
+    await until(lambda: plant.shows("heartbeat") != beat)
+    assert plant.shows("co2_setpoint") == 555.0
+    process.send_signal(signal.SIGTERM)
+    assert await asyncio.wait_for(process.wait(), 10.0) == 0
+    assert plant.shows("co2_setpoint") == 400.0
+    await plant.down()
+    assert "changed_by_hand" in kinds(tmp_path)
+
+
+async def test_a_planner_that_hangs_delays_no_cycle_and_the_recipe_rules(tmp_path):
+    port = free_port()
+    path = write_files(tmp_path, port, clock="system", interval="1 s")
+    plant = Plant(tmp_path, port, pace=Realtime())
+    await plant.up()
+    async with running(path) as daemon:
+        await until(lambda: daemon.cycles >= 2)
+        daemon.services.planning.close()
+        planner = PlanningProcess(
+            daemon.configuration.site, ProcessLimits(timeout_seconds=3.0), planner=("hanging_planner", "make_plan")
+        )
+        daemon.services.planning = daemon._control.schedule._service = planner
+        daemon.services.updates.active = lambda: ActiveBundle("test", tmp_path)
+        # A day of log is asked for before a first plan; this test has no day.
+        daemon._control.schedule._began = -1e6
+        await until(lambda: planner.busy)
+        cycles = daemon.cycles
+        await until(lambda: daemon.cycles >= cycles + 3)
+        assert daemon.last.decision.source == "recipe"
+        await until(lambda: not planner.busy)
+        assert "too long" in planner.health
+        cycles = daemon.cycles
+        await until(lambda: daemon.cycles > cycles)
+    await plant.down()
+
+
+async def test_a_reload_takes_a_good_configuration_and_keeps_the_last_good_one(tmp_path):
+    port = free_port()
+    path = write_files(tmp_path, port)
+    plant = Plant(tmp_path, port)
+    await plant.up()
+    async with running(path) as daemon:
+        await until(lambda: plant.shows("heating_setpoint") == 19.0)
+        write_files(tmp_path, port, heating=20.0)
+        daemon.reload()
+        await until(lambda: plant.shows("heating_setpoint") == 20.0)
+        path.write_text(path.read_text().replace("value: 20.0", "value: 99"))
+        daemon.reload()
+        await until(lambda: "reload_refused" in kinds(tmp_path))
+        cycles = daemon.cycles
+        await until(lambda: daemon.cycles > cycles + 10)
+        assert plant.shows("heating_setpoint") == 20.0
+        assert "99: 5 to 35 degC" in daemon._configuration_problem
+        assert "changed_by_hand" not in kinds(tmp_path)
+    await plant.down()
+
+
+async def test_the_watchdog_is_fed_by_completed_cycles_only(tmp_path):
+    class Recorder:
+        def __init__(self):
+            self.sent = []
+
+        def ready(self):
+            self.sent.append("ready")
+
+        def reloading(self):
+            self.sent.append("reloading")
+
+        def stopping(self):
+            self.sent.append("stopping")
+
+        def cycle_completed(self, status):
+            self.sent.append(status)
+
+        def close(self):
+            return
+
+    port = free_port()
+    path = write_files(tmp_path, port)
+    plant = Plant(tmp_path, port)
+    await plant.up()
+    recorder = Recorder()
+    async with running(path, notifier=recorder) as daemon:
+        await until(lambda: daemon.cycles >= 10)
+        go_on = asyncio.Event()
+        plc = daemon._control.cycle._plc
+        read = plc.read
+
+        async def hanging_read(names=None):
+            await go_on.wait()
+            return await read(names)
+
+        plc.read = hanging_read
+        fed = -1
+        while fed != len(recorder.sent):
+            fed = len(recorder.sent)
+            await asyncio.sleep(0.1)
+        cycles = daemon.cycles
+        await asyncio.sleep(0.3)
+        assert (daemon.cycles, len(recorder.sent)) == (cycles, fed)
+        go_on.set()
+        await until(lambda: len(recorder.sent) > fed)
+    await plant.down()
+
+
+@pytest.mark.soak
+async def test_thirty_days_of_plant_time_grow_neither_memory_nor_files(tmp_path):
+    port = free_port()
+    path = write_files(tmp_path, port)
+    path.write_text(path.read_text() + "exchange: exchange\n")
+    plant = Plant(tmp_path, port)
+    await plant.up()
+    process = await asyncio.create_subprocess_exec(sys.executable, "-m", "edge.cli", "run", str(path))
+
+    def resident() -> int:
+        status = Path(f"/proc/{process.pid}/status").read_text()
+        return next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmRSS"))
+
+    def open_files() -> int:
+        return len(list(Path(f"/proc/{process.pid}/fd").iterdir()))
+
+    await until(lambda: plant.plc.steps >= 10 * 288, 600)
+    memory, files = resident(), open_files()
+    await until(lambda: plant.plc.steps >= 30 * 288, 600)
+    print(f"memory {memory} -> {resident()} kB, open files {files} -> {open_files()}")
+    assert resident() < memory + 4096
+    assert open_files() <= files + 2
+    process.send_signal(signal.SIGTERM)
+    assert await asyncio.wait_for(process.wait(), 30.0) == 0
+    await plant.down()
