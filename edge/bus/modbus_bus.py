@@ -8,7 +8,14 @@ from collections.abc import Awaitable, Callable, Mapping
 from typing import TypeVar
 
 from edge.bus.connect_supervisor import ConnectSupervisor
-from edge.bus.errors import BadAnswerError, NoAnswerError, NotConnectedError, RefusedError, UnitRestingError
+from edge.bus.errors import (
+    BadAnswerError,
+    ConnectionLostError,
+    NoAnswerError,
+    NotConnectedError,
+    RefusedError,
+    UnitRestingError,
+)
 from edge.bus.pacing import Pacer
 from edge.bus.protocol import Priority, ReadRequest, WriteRequest
 from edge.bus.pymodbus_link import QUIET, PymodbusLink
@@ -17,6 +24,10 @@ from edge.bus.unit_health import HealthBook
 from edge.registers.model import BusSettings
 
 T = TypeVar("T")
+
+SILENCES_BEFORE_RECONNECT = 3
+"""Failures in a row, of whatever units, without one answer between, after which the line itself is suspected: a
+connection whose other end was switched off looks open for a quarter of an hour."""
 
 
 class ModbusBus:
@@ -36,7 +47,7 @@ class ModbusBus:
         """`unit_gaps`: seconds of rest after each request, by device id. To be made inside an event loop."""
         self.settings = settings
         self.health = HealthBook(monotonic, rest_step)
-        self._link = PymodbusLink(settings, self._lost, quiet)
+        self._link = PymodbusLink(settings, self._line_lost, quiet)
         self._supervisor = ConnectSupervisor(self._link, settings.name, monotonic=monotonic, first_wait=first_wait)
         self._slot = RequestSlot(longest_queue)
         self._pacer = Pacer(monotonic, settings.gap, unit_gaps or {})
@@ -44,6 +55,7 @@ class ModbusBus:
         self._loop_back_unanswered: set[int] = set()
         self._deaf_to_loop_back: set[int] = set()
         self._marker = 0
+        self._silences = 0
 
     @property
     def connected(self) -> bool:
@@ -72,8 +84,7 @@ class ModbusBus:
         """Return when the unit has confirmed the very values; never repeats by itself. Raises BusError."""
         await self._serve(request.device_id, priority, lambda: self._link.write(request))
 
-    def _lost(self) -> None:
-        self._unsure.clear()  # a new connection brings no answers to old requests
+    def _line_lost(self) -> None:
         self._supervisor.lost()
 
     async def _serve(self, device_id: int, priority: Priority, exchange: Callable[[], Awaitable[T]]) -> T:
@@ -99,8 +110,8 @@ class ModbusBus:
         except (NoAnswerError, BadAnswerError) as error:
             await self._failed(device_id, silent=isinstance(error, NoAnswerError))
             raise
-        except asyncio.CancelledError:
-            if self.settings.transport.is_rtu:
+        except (asyncio.CancelledError, ConnectionLostError):
+            if self.settings.transport.is_rtu:  # a converter hands a late answer to the next connection
                 self._unsure.add(device_id)
             raise
         finally:
@@ -110,11 +121,16 @@ class ModbusBus:
 
     def _answered(self, device_id: int) -> None:
         self.health.answered(device_id)
+        self._silences = 0
         if device_id in self._loop_back_unanswered:
             self._loop_back_unanswered.discard(device_id)
             self._deaf_to_loop_back.add(device_id)
 
     async def _failed(self, device_id: int, *, silent: bool) -> None:
+        self._silences += 1
+        if self._silences >= SILENCES_BEFORE_RECONNECT:
+            self._silences = 0
+            self._link.close()
         if not self.settings.transport.is_rtu:
             self.health.failed(device_id, silent=silent)
             return

@@ -26,6 +26,11 @@ class Reading:
     """Monotonic seconds of the answer."""
 
 
+POLL_SLACK = 0.95
+"""Share of its poll period after which a point counts as due: a cycle that comes some milliseconds early must not
+halve the rate."""
+
+
 class Plc(Protocol):
     """The greenhouse's registers by the names of quantities and system points."""
 
@@ -123,7 +128,7 @@ class RegisterPlc:
             if point.poll > 0:
                 if now < self._due.get(point.name, now):
                     continue
-                self._due[point.name] = now + point.poll
+                self._due[point.name] = now + POLL_SLACK * point.poll
             due.append(point)
         return due
 

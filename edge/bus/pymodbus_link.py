@@ -41,6 +41,9 @@ QUIET = 0.05
 """Seconds of silence after which a serial line counts as quiet; bridges between networks and lines chop frames
 into pieces some 10 to 20 ms apart."""
 
+LONGEST_NOISE = 1024
+"""Bytes without an answer among them after which a line is given up for this request."""
+
 
 async def open_serial_port(
     protocol: Callable[[], asyncio.Protocol], port: str, baudrate: int, parity: Parity, stop_bits: int
@@ -225,6 +228,9 @@ class PymodbusLink(asyncio.Protocol):
         if waiter is None or waiter.done():
             self._received = b""
             return
+        if len(self._received) > LONGEST_NOISE:
+            self._received = b""
+            raise MisfitError("the line does not stop talking")
         answer = find_rtu_answer(self._request[:-2], self._received, _check_sum)
         if answer is not None:
             waiter.set_result(answer)

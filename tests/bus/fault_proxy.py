@@ -99,6 +99,8 @@ class FaultProxy:
         self.storm = 0
         """How many of the next connections are hung up on at once."""
         self.old_answers: list[Frame] = []
+        self.last_sent = 0.0
+        self.newest: asyncio.Transport | None = None
         self._server: asyncio.Server | None = None
 
     async def listen(self) -> int:
@@ -142,7 +144,6 @@ class _Front(asyncio.Protocol):
         self.pending: list[Fault] = []
         self.back: asyncio.Transport | None = None
         self.unsent = b""
-        self.last_sent = 0.0
         self.loop = asyncio.get_running_loop()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -151,6 +152,7 @@ class _Front(asyncio.Protocol):
             self.proxy.storm -= 1
             self.loop.call_soon(self.transport.close)
             return
+        self.proxy.newest = self.transport
         self.connecting = self.loop.create_task(self.connect())
 
     async def connect(self) -> None:
@@ -196,12 +198,15 @@ class _Front(asyncio.Protocol):
         """Deliver `after` seconds from now; on a serial line never before what was sent earlier."""
         at = self.loop.time() + after
         if self.proxy.rtu:
-            at = self.last_sent = max(at, self.last_sent + 1e-6)
+            at = self.proxy.last_sent = max(at, self.proxy.last_sent + 1e-6)
         self.loop.call_at(at, self.deliver, data)
 
     def deliver(self, data: bytes) -> None:
-        if not self.transport.is_closing():
-            self.transport.write(data)
+        transport = self.transport
+        if self.proxy.rtu and self.proxy.newest is not None:
+            transport = self.proxy.newest  # a converter hands what the line says to whoever is connected
+        if not transport.is_closing():
+            transport.write(data)
 
     def answer(self, frame: Frame) -> None:
         fault = self.pending.pop(0) if self.pending else Fault.NONE

@@ -134,6 +134,18 @@ def test_no_value_goes_astray_and_no_write_is_invented_under_faults(start: int) 
     assert values > 100
 
 
+def test_these_sequences_do_find_a_bus_that_trusts_a_late_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without the loop back and the rest after a missing answer, values do go astray: the judge is not asleep."""
+
+    async def careless(self: ModbusBus, device_id: int) -> None:
+        self._unsure.discard(device_id)
+
+    monkeypatch.setattr(ModbusBus, "_settle", careless)
+    monkeypatch.setattr("edge.bus.unit_health.HealthBook.rest_left", lambda self, device_id: 0.0)
+    with pytest.raises(AssertionError, match="wrong values"):
+        play(range(1, 401, 2))
+
+
 @pytest.mark.soak
 @pytest.mark.parametrize("start", range(1000, 11000, 1000))
 def test_ten_thousand_fault_sequences(start: int) -> None:

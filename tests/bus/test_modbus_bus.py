@@ -278,6 +278,56 @@ def test_a_unit_that_ignores_loop_backs_is_still_read() -> None:
     run(main())
 
 
+def test_a_connection_whose_other_end_has_vanished_is_given_up_after_three_silences() -> None:
+    """No error comes when a PLC is switched off or a router forgets: the line just stays silent."""
+
+    async def main() -> int:
+        await serve(CodedUnit(1))
+        proxy = FaultProxy(PORT, rtu=False, seed=1, rate=0.0, timeout=1.0)
+        bus = make_bus(port=await proxy.listen())
+        await read(bus)
+        proxy.next_fault = lambda: Fault.NO_REQUEST if bus.connects == 1 else Fault.NONE  # type: ignore[method-assign]
+        for _ in range(3):
+            with pytest.raises(NoAnswerError):
+                await read(bus)
+            await asyncio.sleep(5.0)
+        assert await read(bus) == coded()
+        return bus.connects
+
+    assert run(main()) == 2
+
+
+def test_units_that_answer_keep_the_line_of_a_dead_one_open() -> None:
+    async def main() -> int:
+        await serve(CodedUnit(1))
+        bus = make_bus()
+        for _ in range(100):
+            with pytest.raises(BusError):
+                await read(bus, unit=9)
+            assert await read(bus) == coded()
+            await asyncio.sleep(30.0)
+        return bus.connects
+
+    assert run(main()) == 1
+
+
+def test_a_line_that_does_not_stop_talking_is_given_up_for_the_request() -> None:
+    class Babbler(asyncio.Protocol):
+        def connection_made(self, transport: Any) -> None:
+            self.transport = transport
+
+        def data_received(self, data: bytes) -> None:
+            self.transport.write(bytes(3000))
+
+    async def main() -> None:
+        await asyncio.get_running_loop().create_server(Babbler, "127.0.0.1", PORT)
+        bus = make_bus(Transport.RTU_OVER_TCP)
+        with pytest.raises(BadAnswerError, match="does not stop talking"):
+            await read(bus)
+
+    run(main())
+
+
 def test_only_one_request_is_on_the_line_at_a_time() -> None:
     async def main() -> None:
         bus, unit = await behind_proxy(*[Fault.SLOW] * 20, transport=Transport.RTU_OVER_TCP)
