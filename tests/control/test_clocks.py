@@ -1,0 +1,81 @@
+"""Clocks: wrong dates, jumps, and a plant's own clock."""
+
+from datetime import UTC, datetime
+
+from edge.clock import PlcClock, SystemClock, TrustedTime
+
+NOW = datetime(2026, 3, 1, tzinfo=UTC).timestamp()
+
+
+class Machine:
+    def __init__(self, wall: float) -> None:
+        self.monotonic, self.wall = 1000.0, wall
+        self.clock = SystemClock(lambda: self.monotonic, lambda: self.wall)
+
+    def run(self, seconds: float) -> float | None:
+        self.monotonic += seconds
+        self.wall += seconds
+        return self.clock.true_time()
+
+
+def test_a_plausible_clock_is_trusted_at_once():
+    assert Machine(NOW).run(1.0) == NOW + 1.0
+
+
+def test_a_clock_of_1970_is_not_trusted_and_its_correction_is_taken_at_once():
+    machine = Machine(0.0)
+    assert machine.run(100.0) is None
+    machine.wall = NOW
+    assert machine.run(1.0) == NOW + 1.0
+
+
+def test_a_jump_costs_trust_until_the_clock_has_run_evenly_again():
+    machine = Machine(NOW)
+    machine.run(10.0)
+    machine.wall += 7200.0
+    assert machine.run(1.0) is None
+    assert machine.run(30.0) is None
+    assert machine.run(30.0) is not None
+
+
+def test_a_jump_never_moves_monotonic_time():
+    machine = Machine(NOW)
+    before = machine.clock.monotonic()
+    machine.wall -= 1e7
+    machine.run(5.0)
+    assert machine.clock.monotonic() == before + 5.0
+
+
+def test_small_corrections_of_a_time_service_cost_no_trust():
+    machine = Machine(NOW)
+    for _ in range(100):
+        machine.wall += 0.5
+        assert machine.run(10.0) is not None
+
+
+def test_a_year_far_in_the_future_is_not_trusted():
+    assert TrustedTime().judge(0.0, 9e9) is None
+
+
+def test_a_followed_clock_counts_the_registers_growth():
+    clock = PlcClock()
+    assert clock.true_time() is None
+    assert clock.follow(NOW)
+    assert not clock.follow(NOW)
+    assert clock.follow(NOW + 300.0)
+    assert (clock.monotonic(), clock.true_time()) == (300.0, NOW + 300.0)
+
+
+def test_a_register_that_goes_back_adds_nothing_and_takes_nothing():
+    clock = PlcClock()
+    clock.follow(NOW)
+    clock.follow(NOW + 300.0)
+    clock.follow(NOW - 1e6)
+    clock.follow(NOW - 1e6 + 300.0)
+    assert clock.monotonic() == 600.0
+
+
+def test_a_register_in_1970_gives_no_date():
+    clock = PlcClock()
+    clock.follow(3600.0)
+    assert clock.true_time() is None

@@ -1,0 +1,32 @@
+"""What systemd hears."""
+
+import socket
+
+from edge.notify import Notifier
+
+
+def test_each_cycle_feeds_the_watchdog_and_a_new_status_is_sent_once(tmp_path):
+    path = str(tmp_path / "notify")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as server:
+        server.bind(path)
+        notifier = Notifier({"NOTIFY_SOCKET": path})
+        notifier.ready()
+        notifier.cycle_completed("plan")
+        notifier.cycle_completed("plan")
+        notifier.stopping()
+        heard = [server.recv(4096).decode() for _ in range(4)]
+        notifier.close()
+    assert heard == ["READY=1", "WATCHDOG=1\nSTATUS=plan", "WATCHDOG=1", "STOPPING=1"]
+
+
+def test_without_systemd_nothing_is_sent():
+    notifier = Notifier({})
+    notifier.ready()
+    notifier.cycle_completed("plan")
+    notifier.close()
+
+
+def test_a_socket_that_is_gone_harms_nothing(tmp_path):
+    notifier = Notifier({"NOTIFY_SOCKET": str(tmp_path / "nobody")})
+    notifier.cycle_completed("plan")
+    notifier.close()
