@@ -14,7 +14,7 @@ from typing import Literal
 from edge.registers.bus_load import estimate
 from edge.registers.codec import NotEncodableError, encode
 from edge.registers.model import (
-    SYSTEM_POINTS,
+    POINT_NAMES,
     BusSettings,
     ByteOrder,
     DataType,
@@ -27,7 +27,6 @@ from edge.registers.model import (
     expected_unit,
     valid_range,
 )
-from igrow_core.quantities import QUANTITIES
 from igrow_core.yaml_schema import SettingError, load, parse, setting
 
 _ZERO = timedelta(0)
@@ -201,7 +200,7 @@ class MapFile:
     source: str = setting(help="manual or program that the addresses come from")
     buses: Mapping[str, TcpBus | RtuBus | RtuOverTcpBus | TlsBus] = setting(help="the lines")
     devices: Mapping[str, DeviceSettings] = setting(help="the Modbus units")
-    points: Mapping[str, PointSettings] = setting(help="the values", keys=(*QUANTITIES, *SYSTEM_POINTS))
+    points: Mapping[str, PointSettings] = setting(help="the values", keys=POINT_NAMES)
     hardware_tested: bool = setting(help="whether it was ever used with the real device", default=False)
 
     def __post_init__(self) -> None:

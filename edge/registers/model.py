@@ -8,7 +8,7 @@ from enum import Enum
 from pathlib import Path
 from types import MappingProxyType
 
-from igrow_core.quantities import QUANTITIES, Kind
+from igrow_core.quantities import QUANTITIES, Kind, Quantity
 
 
 class Transport(Enum):
@@ -229,17 +229,31 @@ class RegisterMap:
         return tuple(p for p in self.points.values() if self.devices[p.device].bus == bus)
 
 
-def expected_unit(name: str) -> str | None:
-    """Return the unit in which a point of this name must come out, or None for an unknown name."""
-    if name in QUANTITIES:
-        return QUANTITIES[name].unit
-    return SYSTEM_POINTS[name].unit if name in SYSTEM_POINTS else None
+TWIN_SUFFIX = "_2"
+"""A second sensor of a quantity has the quantity's name with this suffix."""
+
+POINT_NAMES: tuple[str, ...] = (
+    *QUANTITIES,
+    *SYSTEM_POINTS,
+    *(name + TWIN_SUFFIX for name, quantity in QUANTITIES.items() if quantity.kind in (Kind.WEATHER, Kind.CLIMATE)),
+)
+"""Every name that a map may give to a point."""
+
+
+def _definition(name: str) -> Quantity | SystemPoint:
+    base = name.removesuffix(TWIN_SUFFIX)
+    return SYSTEM_POINTS[name] if name in SYSTEM_POINTS else QUANTITIES[base]
+
+
+def expected_unit(name: str) -> str:
+    """Return the unit in which a point of this name must come out; KeyError for an unknown name."""
+    return _definition(name).unit
 
 
 def valid_range(name: str) -> tuple[float, float]:
-    """Return the registry's range of a known point name, in its unit."""
-    known = QUANTITIES[name] if name in QUANTITIES else SYSTEM_POINTS[name]
-    return known.low, known.high
+    """Return the registry's range of a point name, in its unit; KeyError for an unknown name."""
+    definition = _definition(name)
+    return definition.low, definition.high
 
 
 def needed_for_control(name: str) -> bool:

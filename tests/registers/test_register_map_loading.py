@@ -104,3 +104,12 @@ points:
 def test_the_limit_of_the_load_is_half_of_the_time() -> None:
     assert BusLoad("line", 1.0, 0.5).acceptable
     assert not BusLoad("line", 1.0, 0.51).acceptable
+
+
+def test_a_second_sensor_has_the_quantitys_name_with_a_2_and_its_unit() -> None:
+    text = FULL.replace("  air_co2:", "  air_co2_2:").replace(
+        "address: 0, type: float32, order", "address: 4, type: float32, order"
+    )
+    assert parse_register_map(text).points["air_co2_2"].high == 5000.0
+    with pytest.raises(IgrowError, match="not known"):
+        parse_register_map(FULL.replace("  heating_setpoint:", "  heating_setpoint_2:"))
