@@ -1,12 +1,13 @@
-"""The actuation stage: what the PLC will do with setpoints, so that plans are made in setpoints.
+"""The actuation stage: what a climate computer will do with setpoints, so that plans are made in setpoints.
 
-A climate computer holds its setpoints with what the equipment can give. Lamps, screens and vents follow rules on
-the weather and the measured climate. Heat and CO2 are what the balances of the coming step need to end at the
-setpoint, between nothing and the capacity: so the costs of a plan follow from the energy and the CO2 that the
-greenhouse really loses, and do not depend on how a PLC's controller happens to be tuned.
+Parametric rules of Dutch climate computers (Bakker, Bot, Challa and van de Braak (1995), Greenhouse Climate
+Control, ch. 4): a pipe temperature from the shortage of heat and the weather, vents on a proportional band above
+the heating setpoint with an influence of humidity and a limit by wind, screens by radiation and outdoor
+temperature, lamps on request below a radiation limit, CO2 on a proportional band in the light. The rules are
+fitted to the log of the very greenhouse (`trainer.calibration.actuation`), so they also stand for settings that
+no log holds. Pure, elementwise, traceable: numpy, torch and ONNX graphs run the same code.
 
-Every parameter is fitted to the site's own log. All functions are pure and elementwise, and work in numpy and
-while an ONNX graph is traced (`xp`).
+Positions follow their targets with a lag, so the stage has a memory: the positions themselves.
 """
 
 from __future__ import annotations
@@ -16,14 +17,24 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
-Array = Any
-"""An array of the namespace `xp`, or a float."""
-Values = Mapping[str, Array]
+from igrow_core.effects.definition import Array, Values
+
+POSITIONS = (
+    "rail_pipe_temperature",
+    "grow_pipe_temperature",
+    "vent_lee",
+    "vent_wind",
+    "energy_screen",
+    "blackout_screen",
+)
+"""The memory of the stage: actuators that take time to follow."""
+OUTPUTS = (*POSITIONS, "lamp_power", "co2_dosing", "irrigation")
+"""What `act` returns."""
 
 
 @dataclass(frozen=True)
-class ActuationParameter:
-    """One setting of the PLC or its equipment, as the simulator sees it."""
+class Rule:
+    """One number of the climate computer's settings."""
 
     name: str
     unit: str
@@ -33,147 +44,179 @@ class ActuationParameter:
     meaning: str
 
 
-_ROWS = (
-    ("heating_offset", "K", 0.0, -2.0, 2.0, "air above the heating setpoint while the PLC heats"),
-    ("heating_capacity", "W m-2", 200.0, 10.0, 800.0, "most heat of the pipes"),
-    ("heating_minimum", "W m-2", 0.0, 0.0, 80.0, "heat of the minimum pipe temperature"),
-    ("grow_share", "1", 0.3, 0.0, 1.0, "excess of the grow pipe over that of the rail pipe"),
-    ("ventilation_offset", "K", 2.0, -1.0, 10.0, "ventilation begins so far above the heating setpoint"),
-    ("ventilation_band", "K", 6.0, 0.5, 30.0, "air temperature over which the vents open, at 15 degC outside"),
-    ("ventilation_band_slope", "K K-1", 0.25, 0.0, 2.0, "how much wider it is for each degree colder outside"),
-    ("wind_vent_delay", "1", 0.5, 0.0, 1.0, "opening of the lee vents at which the windward ones begin"),
-    ("humidity_start", "%", 84.0, 60.0, 100.0, "humidity at which the vents open for moisture"),
-    ("humidity_band", "%", 12.0, 2.0, 40.0, "humidity over which they open"),
-    ("humidity_opening", "1", 0.35, 0.0, 1.0, "their largest opening for moisture"),
-    ("wind_limit", "m s-1", 10.0, 4.0, 40.0, "wind at which the windward vents begin to close; 5 more shut them"),
-    ("vent_following", "1", 0.5, 0.05, 1.0, "share of the way to their target that vents go in one step"),
-    ("screen_radiation", "W m-2", 40.0, 0.0, 400.0, "global radiation above which the energy screen opens"),
-    ("screen_outdoor", "degC", 12.0, -20.0, 40.0, "outdoor temperature above which the energy screen stays open"),
-    ("screen_closure", "%", 97.0, 0.0, 100.0, "closure of the closed energy screen"),
-    ("blackout_closure", "%", 0.0, 0.0, 100.0, "closure of the blackout screen while lamps burn in the dark"),
-    ("blackout_night", "%", 0.0, 0.0, 100.0, "its closure in the dark without lamps"),
-    ("lamp_installed", "W m-2", 81.0, 0.0, 500.0, "electric power of the lamps"),
-    ("lamp_radiation_limit", "W m-2", 400.0, 0.0, 1500.0, "global radiation above which the PLC puts the lamps off"),
-    ("co2_capacity", "kg m-2 h-1", 0.015, 0.0, 0.1, "most CO2 dosed"),
-    ("co2_offset", "ppm", -20.0, -300.0, 300.0, "air above the CO2 setpoint while the PLC doses"),
-    ("irrigation_rate", "L m-2 h-1", 1.5, 0.0, 20.0, "irrigation while it is asked for, mean over its pulses"),
-    ("co2_vent_stop", "1", 0.5, 0.02, 2.0, "mean vent opening at which dosing has stopped"),
+def _pipe(name: str, base: float, gain: float, weather: float, highest: float) -> tuple[Rule, ...]:
+    return (
+        Rule(f"{name}_base", "K", base, -60.0, 60.0, "excess of the pipe over the air at the setpoint, mild weather"),
+        Rule(f"{name}_gain", "1", gain, 0.0, 40.0, "more of it for each kelvin below the heating setpoint"),
+        Rule(f"{name}_weather", "1", weather, -1.0, 4.0, "more of it for each kelvin that it is colder outside"),
+        Rule(f"{name}_wind", "K (m s-1)-1", 0.0, -2.0, 3.0, "more of it for each m/s of wind"),
+        Rule(f"{name}_radiation", "K W-1 m2", 0.0, -0.3, 0.1, "change with the radiation outside"),
+        Rule(f"{name}_lamps", "K", 0.0, -40.0, 40.0, "change while the lamps burn"),
+        Rule(f"{name}_humidity", "K per %", 0.0, 0.0, 4.0, "more of it for each % of humidity above 80"),
+        Rule(f"{name}_highest", "K", highest, 5.0, 80.0, "largest excess"),
+        Rule(f"{name}_least", "K", 0.0, 0.0, 40.0, "excess that is never left (minimum pipe)"),
+    )
+
+
+def _vent(name: str, offset: float, band: float) -> tuple[Rule, ...]:
+    return (
+        Rule(f"{name}_offset", "K", offset, -5.0, 15.0, "start of opening above the heating setpoint"),
+        Rule(f"{name}_day", "K", 0.0, -10.0, 10.0, "change of it by day (from 200 W/m2)"),
+        Rule(f"{name}_lamps", "K", 0.0, -10.0, 10.0, "change of it while the lamps burn"),
+        Rule(f"{name}_band", "K", band, 0.3, 40.0, "from start to wide open in mild weather"),
+        Rule(f"{name}_band_cold", "1", 0.2, 0.0, 3.0, "widening of the band for each kelvin below 20 degC outside"),
+        Rule(f"{name}_humidity", "K per %", 0.1, 0.0, 2.0, "earlier start for each % of humidity above 80"),
+        Rule(f"{name}_screened", "1", 0.3, 0.0, 1.5, "opening under a closed screen over that without"),
+        Rule(f"{name}_wind_limit", "1", 0.0, 0.0, 0.2, "share of the opening lost for each m/s of wind above 6"),
+        Rule(f"{name}_least", "%", 0.0, 0.0, 20.0, "opening that is never left"),
+    )
+
+
+def _screen(name: str, radiation: float, outdoor: float) -> tuple[Rule, ...]:
+    return (
+        Rule(f"{name}_radiation", "W m-2", radiation, -20.0, 400.0, "closes below this radiation"),
+        Rule(f"{name}_outdoor", "degC", outdoor, -20.0, 40.0, "closes below this outdoor temperature"),
+        Rule(f"{name}_unlit", "%", 90.0, 0.0, 100.0, "closure in the dark, lamps off"),
+        Rule(f"{name}_lit", "%", 90.0, 0.0, 100.0, "closure in the dark, lamps on"),
+        Rule(f"{name}_open", "%", 0.0, 0.0, 100.0, "closure by day"),
+    )
+
+
+_RULES = (
+    *_pipe("rail", 10.0, 8.0, 0.8, 50.0),
+    *_pipe("grow", 0.0, 4.0, 0.3, 30.0),
+    *_vent("lee", 1.0, 6.0),
+    *_vent("windward", 3.0, 8.0),
+    *_screen("energy_screen", 60.0, 12.0),
+    *_screen("blackout_screen", 5.0, 40.0),
+    Rule("lamp_capacity", "W m-2", 100.0, 0.0, 500.0, "electric power of the lamps when they all burn"),
+    Rule("lamp_radiation", "W m-2", 1500.0, 10.0, 1500.0, "lamps go off above this radiation"),
+    Rule("co2_base", "kg m-2 h-1", 0.002, 0.0, 0.05, "dose at the setpoint, in the light"),
+    Rule("co2_gain", "kg m-2 h-1 per ppm", 3e-5, 0.0, 1e-3, "more for each ppm below it"),
+    Rule("co2_ventilation", "kg m-2 h-1 per %", 0.0, 0.0, 1e-3, "more for each % of vent opening"),
+    Rule("co2_light", "kg m-2 h-1 per umol m-2 s-1", 0.0, 0.0, 5e-5, "more for each unit of light on the crop"),
+    Rule("co2_capacity", "kg m-2 h-1", 0.015, 0.0, 0.1, "most that is dosed"),
+    Rule("irrigation_rate", "L m-2 h-1", 5.0, 0.0, 60.0, "water given while irrigation runs"),
+    Rule("pipe_lag", "min", 15.0, 1.0, 120.0, "time in which a pipe follows while heated"),
+    Rule("pipe_cooling", "min", 90.0, 5.0, 300.0, "time in which it cools with the circuit off"),
+    Rule("vent_lag", "min", 8.0, 1.0, 60.0, "time in which a vent follows"),
+    Rule("screen_lag", "min", 12.0, 1.0, 90.0, "time in which a screen follows"),
 )
 
-PARAMETERS: Mapping[str, ActuationParameter] = MappingProxyType({row[0]: ActuationParameter(*row) for row in _ROWS})
-"""Every parameter of the stage by its name."""
-
-READ_CLIMATE = ("air_temperature", "air_humidity")
-"""What the rules for the vents read, as the sensors show it."""
-MEMORY = ("vent_lee", "vent_wind")
-"""Positions, %, that the stage carries from step to step."""
+RULES: Mapping[str, Rule] = MappingProxyType({rule.name: rule for rule in _RULES})
+"""Every number of the actuation stage by its name."""
 
 
-def set_equipment(
-    xp: Any, setpoints: Values, weather: Values, climate: Values, memory: Values, parameters: Values
+def default_rules() -> dict[str, float]:
+    """Return the values of `RULES` by name."""
+    return {name: rule.value for name, rule in RULES.items()}
+
+
+def act(
+    xp: Any,
+    setpoints: Values,
+    weather: Values,
+    climate: Values,
+    memory: Values,
+    parameters: Values,
+    *,
+    seconds: float,
 ) -> dict[str, Array]:
-    """Return lamps (W m-2), screens and vents (%) of the coming step.
+    """Return the actuators that the climate computer will have `seconds` later.
 
     Args:
         xp: the array namespace.
-        setpoints: `heating_setpoint` (degC) and `lamp_on` (0 to 1).
-        weather: `global_radiation`, `outdoor_temperature`, `wind_speed`.
-        climate: `READ_CLIMATE`, measured.
-        memory: `MEMORY`, the positions now.
-        parameters: by name.
-    """
-    radiation, outdoor = weather["global_radiation"], weather["outdoor_temperature"]
-    lamp = setpoints["lamp_on"] * _below(xp, radiation, parameters["lamp_radiation_limit"], 50.0)
-    dark = _below(xp, radiation, 10.0, 5.0)
-    screen = (
-        parameters["screen_closure"]
-        * _below(xp, radiation, parameters["screen_radiation"], 20.0)
-        * _below(xp, outdoor, parameters["screen_outdoor"], 1.0)
-    )
-    blackout = dark * (lamp * parameters["blackout_closure"] + (1.0 - lamp) * parameters["blackout_night"])
+        setpoints: heating_setpoint (degC), co2_setpoint (ppm), lamp_on and irrigation_on (0 to 1).
+        weather: outdoor_temperature (degC), global_radiation (W m-2), wind_speed (m s-1).
+        climate: air_temperature (degC), air_humidity (%), air_co2 (ppm), par (umol m-2 s-1) as measured now.
+        memory: `POSITIONS` now.
+        parameters: `RULES` by name.
+        seconds: length of the step.
 
-    wind = weather["wind_speed"]
-    calm = _ramp(xp, (parameters["wind_limit"] + 5.0 - wind) / 5.0)
-    start = setpoints["heating_setpoint"] + parameters["ventilation_offset"]
-    cold = xp.maximum(15.0 - outdoor, 0.0 * outdoor)
-    band = parameters["ventilation_band"] + parameters["ventilation_band_slope"] * cold
-    wish = _ramp(xp, (climate["air_temperature"] - start) / band)
-    damp = parameters["humidity_opening"] * _ramp(
-        xp, (climate["air_humidity"] - parameters["humidity_start"]) / parameters["humidity_band"]
+    Returns:
+        `OUTPUTS` by name, in the registry's units.
+    """
+    aims = targets(xp, setpoints, weather, climate, memory, parameters)
+    temperature = climate["air_temperature"]
+    result: dict[str, Array] = {}
+    for name in ("rail_pipe_temperature", "grow_pipe_temperature"):
+        # A circuit that is off cools down by itself, much slower than it heats.
+        off = xp.where(aims[name] > temperature + 1.0, 0.0 * temperature, 1.0 + 0.0 * temperature)
+        minutes = parameters["pipe_lag"] + off * (parameters["pipe_cooling"] - parameters["pipe_lag"])
+        result[name] = _follow(xp, memory[name], aims[name], minutes, seconds)
+    for name in ("vent_lee", "vent_wind"):
+        result[name] = _follow(xp, memory[name], aims[name], parameters["vent_lag"], seconds)
+    for name in ("energy_screen", "blackout_screen"):
+        result[name] = _follow(xp, memory[name], aims[name], parameters["screen_lag"], seconds)
+    return result | {name: aims[name] for name in ("lamp_power", "co2_dosing", "irrigation")}
+
+
+def targets(
+    xp: Any, setpoints: Values, weather: Values, climate: Values, memory: Values, parameters: Values
+) -> dict[str, Array]:
+    """Return where each actuator is going, without lags; arguments as `act`'s."""
+    p = parameters
+    temperature = climate["air_temperature"]
+    zero = 0.0 * temperature
+    one = 1.0 + zero
+    sun = weather["global_radiation"] + zero
+    lamp = setpoints["lamp_on"] * xp.where(sun < p["lamp_radiation"], one, zero)
+    short = setpoints["heating_setpoint"] - temperature
+    moist = xp.maximum(climate["air_humidity"] - 80.0, zero)
+    cold = setpoints["heating_setpoint"] - weather["outdoor_temperature"]
+
+    def pipe(name: str) -> Array:
+        excess = (
+            p[f"{name}_base"]
+            + p[f"{name}_gain"] * short
+            + p[f"{name}_weather"] * (cold - 12.0)
+            + p[f"{name}_wind"] * weather["wind_speed"]
+            + p[f"{name}_radiation"] * sun
+            + p[f"{name}_lamps"] * lamp
+            + p[f"{name}_humidity"] * moist
+        )
+        return temperature + xp.minimum(xp.maximum(excess, p[f"{name}_least"] + zero), p[f"{name}_highest"] + zero)
+
+    screened = 0.01 * xp.maximum(memory["energy_screen"], memory["blackout_screen"])
+    daylight = xp.minimum(sun / 200.0, one)
+
+    def vent(name: str) -> Array:
+        start = p[f"{name}_offset"] + p[f"{name}_day"] * daylight + p[f"{name}_lamps"] * lamp
+        band = p[f"{name}_band"] * (
+            1.0 + p[f"{name}_band_cold"] * xp.maximum(20.0 - weather["outdoor_temperature"], zero)
+        )
+        above = -short - start + p[f"{name}_humidity"] * moist
+        share = xp.minimum(xp.maximum(above / band, zero), one)
+        share = share * (1.0 + (p[f"{name}_screened"] - 1.0) * screened)
+        windy = xp.maximum(1.0 - p[f"{name}_wind_limit"] * xp.maximum(weather["wind_speed"] - 6.0, zero), zero)
+        return xp.minimum(xp.maximum(100.0 * share * windy, p[f"{name}_least"] + zero), 100.0 + zero)
+
+    def screen(name: str) -> Array:
+        dark = xp.minimum(xp.maximum((p[f"{name}_radiation"] - sun) / 10.0 + 0.5, zero), one)
+        cool = xp.minimum(xp.maximum((p[f"{name}_outdoor"] - weather["outdoor_temperature"]) / 2.0 + 0.5, zero), one)
+        closed = p[f"{name}_unlit"] + lamp * (p[f"{name}_lit"] - p[f"{name}_unlit"])
+        return p[f"{name}_open"] + dark * cool * (closed - p[f"{name}_open"])
+
+    lit = xp.where(sun + 1000.0 * lamp > 10.0, one, zero)
+    dose = (
+        p["co2_base"]
+        + p["co2_gain"] * (setpoints["co2_setpoint"] - climate["air_co2"])
+        + p["co2_ventilation"] * (memory["vent_lee"] + memory["vent_wind"])
+        + p["co2_light"] * climate["par"]
     )
-    wish = xp.maximum(wish, damp)
-    delay = parameters["wind_vent_delay"]
-    share = parameters["vent_following"]
-    lee = 100.0 * wish * (0.5 + 0.5 * calm)
-    windward = 100.0 * _ramp(xp, (wish - delay) / (1.001 - delay)) * calm
     return {
-        "lamp_power": lamp * parameters["lamp_installed"],
-        "energy_screen": screen,
-        "blackout_screen": blackout,
-        "vent_lee": memory["vent_lee"] + share * (lee - memory["vent_lee"]),
-        "vent_wind": memory["vent_wind"] + share * (windward - memory["vent_wind"]),
+        "rail_pipe_temperature": pipe("rail"),
+        "grow_pipe_temperature": pipe("grow"),
+        "vent_lee": vent("lee"),
+        "vent_wind": vent("windward"),
+        "energy_screen": screen("energy_screen"),
+        "blackout_screen": screen("blackout_screen"),
+        "lamp_power": p["lamp_capacity"] * lamp,
+        "co2_dosing": lit * xp.minimum(xp.maximum(dose, zero), p["co2_capacity"] + zero),
+        "irrigation": p["irrigation_rate"] * setpoints["irrigation_on"] + zero,
     }
 
 
-def heat_to_hold(
-    xp: Any,
-    heating_setpoint: Array,
-    air_temperature: Array,
-    balance: tuple[Array, Array, Array],
-    parameters: Values,
-    seconds: Array,
-) -> Array:
-    """Return the heat of the pipes in W m-2 that ends the step at the setpoint, between minimum and capacity.
-
-    Args:
-        xp: the array namespace.
-        heating_setpoint: degC.
-        air_temperature: degC as the PLC's sensor shows it.
-        balance: (flux, conductance, capacity) of the air's heat without the pipes (`hybrid.climate.balances`).
-        parameters: by name.
-        seconds: length of the step.
-    """
-    target = heating_setpoint + parameters["heating_offset"]
-    needed = _flux_to_reach(xp, target - air_temperature, balance, seconds)
-    return xp.minimum(xp.maximum(needed, parameters["heating_minimum"]), parameters["heating_capacity"])
-
-
-def co2_to_hold(
-    xp: Any,
-    missing: Array,
-    balance: tuple[Array, Array, Array],
-    vents: Array,
-    parameters: Values,
-    seconds: Array,
-) -> Array:
-    """Return the CO2 dosing in kg m-2 h-1 that ends the step at the setpoint, within the capacity.
-
-    Args:
-        xp: the array namespace.
-        missing: kg m-3 that the air lacks to the setpoint (with its offset).
-        balance: (flux, conductance, capacity) of the air's CO2 without dosing.
-        vents: mean opening of the vents, 0 to 1.
-        parameters: by name.
-        seconds: length of the step.
-    """
-    stop = parameters["co2_vent_stop"]
-    allowed = parameters["co2_capacity"] * _ramp(xp, 1.25 * (stop - vents) / stop)
-    needed = 3600.0 * _flux_to_reach(xp, missing, balance, seconds)
-    return xp.minimum(xp.maximum(needed, 0.0 * needed), allowed)
-
-
-def _flux_to_reach(xp: Any, difference: Array, balance: tuple[Array, Array, Array], seconds: Array) -> Array:
-    """Return the further flux that changes a state by `difference` over the step (see `climate.relax`)."""
-    flux, conductance, capacity = balance
-    return difference * conductance / (1.0 - xp.exp(-seconds * conductance / capacity)) - flux
-
-
-def _ramp(xp: Any, value: Array) -> Array:
-    """Return the value cut to 0 ... 1."""
-    zero = 0.0 * value
-    return xp.minimum(xp.maximum(value, zero), zero + 1.0)
-
-
-def _below(xp: Any, value: Array, limit: Array, width: float) -> Array:
-    """Return 1 well below a limit, 0 well above it, one half at it."""
-    return 0.5 - 0.5 * xp.tanh((value - limit) / width)
+def _follow(xp: Any, position: Array, target: Array, minutes: Array, seconds: float) -> Array:
+    share = 1.0 - xp.exp(-seconds / (60.0 * minutes) + 0.0 * target)
+    return position + (target - position) * share

@@ -81,12 +81,7 @@ def evaluate(
         starts = starts_within(record, allowed, steps, max(1, round(every / record.step)))
         if len(starts) == 0:
             continue
-        fluxes = dict(added or {})
-        if disturbance is not None:
-            expected = expected_fluxes(record, missing, starts, steps, disturbance)
-            rows_ahead = starts + np.arange(steps)[:, None]
-            for channel, flux in expected.items():
-                fluxes[channel] = flux + (fluxes[channel][rows_ahead] if channel in fluxes else 0.0)
+        fluxes = run_fluxes(record, values, effects, starts, steps, added, disturbance, missing)
         shown = records.free_run(record, states, starts, steps, values, effects, fluxes)
         following = starts + 1 + np.arange(steps)[:, None]
         for quantity, predicted in shown.items():
@@ -101,6 +96,29 @@ def evaluate(
                 day = record.time[starts].astype("datetime64[D]")
                 result.setdefault(quantity, {})[horizon] = _summary(error, naive, day, seed)
     return result
+
+
+def run_fluxes(
+    record: Record,
+    parameters: Mapping[str, float],
+    effects: ActiveEffects,
+    starts: NDArray[np.int64],
+    steps: int,
+    added: Mapping[str, Floats] | None,
+    disturbance: DisturbanceModel | None,
+    missing: Mapping[str, Floats] | None = None,
+) -> dict[str, Floats]:
+    """Return all fluxes beside the balances that runs from `starts` take along: known ones and expected ones.
+
+    `missing` are the missing fluxes, where they are at hand. By channel, (n,) or (steps, s).
+    """
+    fluxes = dict(added or {})
+    if disturbance is not None:
+        seen = missing or missing_fluxes(record, parameters, effects, added)
+        ahead = starts + np.arange(steps)[:, None]
+        for channel, flux in expected_fluxes(record, seen, starts, steps, disturbance).items():
+            fluxes[channel] = flux + (fluxes[channel][ahead] if channel in fluxes else 0.0)
+    return fluxes
 
 
 def horizon_steps(record: Record, horizon: str) -> int:
