@@ -1,0 +1,45 @@
+#!/bin/sh
+# Installs the gateway on Debian 12 or later, from a source folder: `sudo sh systemd/install.sh`.
+# May be run again for an update: configuration and log are left alone. Explained in docs/installation.md.
+set -eu
+
+SOURCE=$(cd "$(dirname "$0")/.." && pwd)
+TARGET=/opt/igrow
+PYTHON=${PYTHON:-python3}
+
+"$PYTHON" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || {
+    echo "error: $PYTHON is older than 3.11; Debian 12 or later has it" >&2
+    exit 2
+}
+
+echo "1. program into $TARGET/venv"
+mkdir -p "$TARGET/docs"
+[ -x "$TARGET/venv/bin/python" ] || "$PYTHON" -m venv "$TARGET/venv"
+"$TARGET/venv/bin/pip" install --quiet --no-compile --upgrade "$SOURCE[edge]"
+# Compiled once here: the daemon may not write there.
+"$TARGET/venv/bin/python" -m compileall -q "$TARGET/venv/lib" || true
+cp "$SOURCE"/docs/*.md "$TARGET/docs/"
+ln -sf "$TARGET/venv/bin/igrow-edge" /usr/local/bin/igrow-edge
+
+echo "2. user, folders, service"
+install -m 644 "$SOURCE/systemd/igrow-edge.sysusers.conf" /usr/lib/sysusers.d/igrow-edge.conf
+install -m 644 "$SOURCE/systemd/igrow-edge.tmpfiles.conf" /usr/lib/tmpfiles.d/igrow-edge.conf
+install -m 644 "$SOURCE/systemd/igrow-edge.service" /etc/systemd/system/igrow-edge.service
+systemd-sysusers igrow-edge.conf
+systemd-tmpfiles --create igrow-edge.conf
+
+echo "3. configuration into /etc/igrow (what is there stays)"
+for file in "$SOURCE"/config/daemon.yaml "$SOURCE"/config/site.yaml "$SOURCE"/config/register-maps/*.yaml; do
+    [ -f "$file" ] || continue
+    goal="/etc/igrow/${file#"$SOURCE"/config/}"
+    [ -e "$goal" ] && continue
+    mkdir -p "$(dirname "$goal")"
+    install -m 640 -o root -g igrow "$file" "$goal"
+done
+chgrp -R igrow /etc/igrow
+chmod -R g+rX /etc/igrow
+
+[ ! -d /run/systemd/system ] || systemctl daemon-reload || true
+echo "done. Next: edit /etc/igrow, then"
+echo "  igrow-edge check-config /etc/igrow/daemon.yaml"
+echo "  systemctl enable --now igrow-edge"
