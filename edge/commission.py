@@ -14,11 +14,14 @@ from edge.bus.plc import Reading, RegisterPlc
 from edge.configuration import Configuration
 from edge.guard import GuardedWriter, GuardRules, GuardState, Request, guard
 from edge.image import Image
-from edge.registers.model import SYSTEM_POINTS
-from igrow_core.quantities import QUANTITIES
+from edge.registers.model import expected_unit
 
 READ_AGAIN = 2.0
 """Seconds after a write until it is read again."""
+LINE_SECONDS = 10.0
+"""Seconds that the line may take to come up."""
+PATIENCE = 10.0
+"""Seconds beyond the PLC's heartbeat timeout until a fallback that did not come is a failure."""
 
 
 class Dialogue(Protocol):
@@ -59,19 +62,19 @@ class Commissioning:
         *,
         fallback_after: float = 900.0,
         only_read: bool = False,
-        plc: RegisterPlc | None = None,
+        settle: float = READ_AGAIN,
     ) -> None:
-        """`fallback_after` in seconds of the PLC's clock. `plc` replaces the real one in tests."""
+        """`fallback_after` is the PLC's heartbeat timeout, `settle` the wait after a write, both in seconds."""
         self._configuration = configuration
         self._dialogue = dialogue
         self._fallback_after = fallback_after
         self._only_read = only_read
-        self._given_plc = plc
+        self._settle = settle
         self._wrong: list[str] = []
 
     async def run(self) -> bool:
         """Walk through all checks; tell whether every one was passed."""
-        plc = self._given_plc or RegisterPlc(self._configuration.register_map)
+        plc = RegisterPlc(self._configuration.register_map)
         plc.start()
         writer = GuardedWriter(plc, has_heartbeat="heartbeat" in self._configuration.register_map.points)
         tell = self._dialogue.tell
@@ -93,7 +96,7 @@ class Commissioning:
 
     async def _line_is_up(self, plc: RegisterPlc) -> bool:
         """Wait a little for the line; without it nothing can be checked."""
-        ends = time.monotonic() + 10.0
+        ends = time.monotonic() + LINE_SECONDS
         while True:
             readings = await plc.read(list(self._configuration.register_map.points))
             errors = [reading.error for reading in readings.values()]
@@ -143,7 +146,7 @@ class Commissioning:
         image = Image(time.monotonic(), None)
         verdict = guard({name: Request(value, "commission")}, {}, {}, image, GuardState(), GuardRules({name: free}))
         outcomes = await writer.carry_out(verdict.writes)
-        await asyncio.sleep(READ_AGAIN if self._given_plc is None else 0.0)
+        await asyncio.sleep(self._settle)
         shown = (await plc.read([name]))[name].value
         for outcome in outcomes:
             if outcome.error is not None:
@@ -178,14 +181,14 @@ class Commissioning:
             return
         await self._watch_fallback(plc)
         await writer.heartbeat()
-        await asyncio.sleep(READ_AGAIN if self._given_plc is None else 0.0)
+        await asyncio.sleep(self._settle)
         if _is_set((await plc.read(["plc_fallback"]))["plc_fallback"]):
             self._wrong.append("the PLC stays in its fallback although the heartbeat is back")
 
     async def _watch_fallback(self, plc: RegisterPlc) -> None:
         began = time.monotonic()
         while not _is_set((await plc.read(["plc_fallback"]))["plc_fallback"]):
-            if time.monotonic() - began > 1.2 * self._fallback_after + 10.0:
+            if time.monotonic() - began > 1.2 * self._fallback_after + PATIENCE:
                 self._wrong.append("the PLC did not fall back when the heartbeat stopped")
                 return
             await asyncio.sleep(min(5.0, self._fallback_after / 20.0))
@@ -196,7 +199,7 @@ class Commissioning:
 
 
 def _shown(name: str, reading: Reading) -> str:
-    unit = QUANTITIES[name].unit if name in QUANTITIES else SYSTEM_POINTS[name].unit
+    unit = expected_unit(name)
     value = "nothing" if reading.value is None else f"{reading.value:.6g}"
     return f"{name} = {value}" + ("" if unit == "1" else f" {unit}")
 

@@ -62,6 +62,7 @@ def _representable(point: Point, bound: float, *, upward: bool) -> float:
             break
         if shown >= bound if upward else shown <= bound:
             return shown
-        step = _resolution(point) if point.type not in _FLOATS else max(abs(bound), 1e-30) * 2.0**-22
+        # Half a step: from half-way between two values, which may be rounded either way, a whole one skips a value.
+        step = 0.5 * _resolution(point) if point.type not in _FLOATS else max(abs(bound), 1e-30) * 2.0**-23
         value = value + step if upward else value - step
     return value

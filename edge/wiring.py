@@ -21,6 +21,7 @@ from edge.pace import FollowedPlant, Pace, TickPace
 from edge.planning import PlanningProcess, ProcessLimits
 from edge.planning_schedule import PlanningRules, PlanningSchedule
 from edge.ports import Exchange, Plan, PlanningService, StatusService, Store, UpdateService
+from edge.registers.model import TWIN_SUFFIX
 from edge.sensors import ImageBuilder, TwinSensors
 from edge.sources import FreshPlan, GrowerOverride, HandsOff, LastValidPlan, PlanKeeper, RecipeSource
 from edge.status import StatusServer
@@ -32,9 +33,15 @@ from igrow_core.sun import position
 OVERRIDE_FILE = "override.json"
 HOLD_FILE = "holds.json"
 STATUS_FILE = "status.json"
-TWIN_SUFFIX = "_2"
-"""A point named after a quantity with this suffix is a second sensor of it."""
-TWIN_TOLERANCE = {"air_temperature": 1.5, "air_humidity": 8.0, "air_co2": 100.0}
+TWIN_TOLERANCE = {
+    "air_temperature": 1.5,
+    "air_humidity": 8.0,
+    "air_co2": 100.0,
+    "outdoor_temperature": 2.0,
+    "outdoor_humidity": 10.0,
+    "wind_speed": 5.0,
+}
+"""Largest difference of two working sensors of one quantity, in its unit."""
 
 
 @dataclass

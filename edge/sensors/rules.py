@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
+from edge.registers.model import TWIN_SUFFIX
 from igrow_core.quantities import QUANTITIES, Kind
 
 INFINITE = float("inf")
@@ -59,8 +60,10 @@ def default_rule(name: str, *, poll_period: float, low: float = -INFINITE, high:
     """Return the rule of a point: its quantity's row of the table, its range cut to `low` and `high`.
 
     `poll_period` (seconds) is how often a new value can be expected: three periods make it stale, and twenty, but
-    at least 15 minutes, missing. A name that is no quantity has no movement rule.
+    at least 15 minutes, missing. A second sensor moves like the first; a name that is no quantity has
+    no movement rule.
     """
+    name = name.removesuffix(TWIN_SUFFIX)
     rate, jump, frozen, still_low, still_high = _MOVEMENT.get(name, (INFINITE, INFINITE, INFINITE, -INFINITE, INFINITE))
     quantity = QUANTITIES.get(name)
     if quantity is not None and quantity.kind is not Kind.SETPOINT:

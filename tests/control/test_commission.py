@@ -1,0 +1,122 @@
+"""The walk through a new PLC: nothing without asking, everything through the guard, and the pulled plug."""
+
+from __future__ import annotations
+
+import pytest
+from daemon_bench import Plant, free_port, write_files
+
+from edge.commission import Commissioning
+from edge.configuration import load_configuration
+from edge.virtual_plc.pace import Lockstep, Realtime
+
+
+class Script:
+    """A person who answers yes, apart from questions with one of these words."""
+
+    def __init__(self, *no: str) -> None:
+        self._no = no
+        self.lines: list[str] = []
+        self.questions: list[str] = []
+
+    def tell(self, line: str) -> None:
+        self.lines.append(line)
+
+    def ask(self, question: str) -> bool:
+        self.questions.append(question)
+        return not any(word in question for word in self._no)
+
+
+class Watched(Plant):
+    """A plant that keeps what was written to its setpoints."""
+
+    async def up(self) -> None:
+        await super().up()
+        write = self.plc.write
+        self.written: list[tuple[int, list[int]]] = []
+
+        def watched(function, address, values):
+            self.written.append((address, list(values)))
+            write(function, address, values)
+
+        self.plc.write = watched
+
+
+async def walk(tmp_path, person, *, pace=None, only_read=False, prepare=lambda plant: None):
+    port = free_port()
+    path = write_files(tmp_path, port)
+    # Fifteen minutes of plant time pass in a second or so.
+    plant = Watched(tmp_path, port, pace=pace or Realtime(900.0))
+    await plant.up()
+    prepare(plant)
+    commissioning = Commissioning(
+        load_configuration(path), person, fallback_after=2.0, only_read=only_read, settle=0.01
+    )
+    passed = await commissioning.run()
+    await plant.down()
+    return passed, plant
+
+
+async def test_a_plc_that_does_everything_right_passes(tmp_path):
+    person = Script()
+    passed, _ = await walk(tmp_path, person)
+    assert passed, person.lines
+    assert any("fell back after" in line for line in person.lines)
+    assert any("its own heating_setpoint = 17 degC" in line for line in person.lines)
+
+
+async def test_nothing_is_written_by_a_walk_that_only_reads(tmp_path):
+    passed, plant = await walk(tmp_path, Script(), only_read=True)
+    assert passed
+    assert plant.written == []
+
+
+async def test_nothing_is_written_to_what_the_person_keeps_back(tmp_path):
+    person = Script("May heating_setpoint", "Now the heartbeat")
+    passed, plant = await walk(tmp_path, person)
+    assert not passed
+    assert {address for address, _ in plant.written} == {2}
+    assert "NOT PASSED  heating_setpoint was not tried" in person.lines
+    assert "NOT PASSED  the fallback was not tried" in person.lines
+
+
+async def test_a_value_that_the_plc_shows_otherwise_is_a_failure(tmp_path):
+    person = Script("air_temperature =")
+    passed, _ = await walk(tmp_path, person, only_read=True)
+    assert not passed
+    assert any("but the PLC shows something else" in line for line in person.lines)
+
+
+async def test_a_value_far_off_points_to_scale_and_byte_order(tmp_path):
+    person = Script()
+    passed, _ = await walk(
+        tmp_path, person, only_read=True, prepare=lambda plant: plant.plc.set_by_hand("air_temperature", 4e8)
+    )
+    assert not passed
+    assert any("look at scale and byte order" in line for line in person.lines)
+
+
+async def test_a_plc_that_never_falls_back_does_not_pass(tmp_path, monkeypatch):
+    monkeypatch.setattr("edge.commission.PATIENCE", 0.1)
+    person = Script()
+    # In lock-step no plant time passes without a heartbeat, so this PLC never notices that it has stopped.
+    passed, _ = await walk(tmp_path, person, pace=Lockstep(1.0))
+    assert not passed
+    assert "NOT PASSED  the PLC did not fall back when the heartbeat stopped" in person.lines
+
+
+async def test_a_dead_line_ends_the_walk_with_its_reason(tmp_path, monkeypatch):
+    monkeypatch.setattr("edge.commission.LINE_SECONDS", 0.5)
+    person = Script()
+    configuration = load_configuration(write_files(tmp_path, free_port()))
+    assert not await Commissioning(configuration, person).run()
+    assert "no point can be read" in person.lines[0]
+    assert person.questions == []
+
+
+@pytest.mark.parametrize("answer", ["y", "n"])
+def test_a_person_is_asked_until_the_answer_is_clear(monkeypatch, answer):
+    from edge.commission import Console
+
+    answers = iter(["", "perhaps", answer])
+    monkeypatch.setattr("builtins.input", lambda prompt: next(answers))
+    assert Console().ask("well?") is (answer == "y")
