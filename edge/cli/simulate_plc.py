@@ -15,15 +15,15 @@ from edge.registers.loading import load_register_map
 from edge.registers.model import Parity, RegisterMap
 from edge.virtual_plc.pace import parse_pace
 from edge.virtual_plc.virtual_plc import VirtualPlc
-from igrow_core.errors import IgrowError
 from igrow_core.greenhouse import GreenhouseParameters, HiddenEffect, VirtualGreenhouse, generate_weather
+from igrow_core.greenhouse.described import parameters_of, parse_effect
 from igrow_core.greenhouse.weather import WeatherClimate
 from igrow_core.site import Site, load_site
 from igrow_core.telemetry import Telemetry, read_csv
 
 EXAMPLE = (
     "igrow-edge simulate-plc --site config/site.yaml --map config/register-maps/virtual-plc.yaml \\\n"
-    "      --pace speed=60 --effect wind_infiltration=0.0005@2020-03-14"
+    "      --pace speed=60 --effect wind_infiltration=0.1@2020-03-14"
 )
 
 
@@ -90,38 +90,6 @@ def make_plant(
         GreenhouseParameters() if site is None else parameters_of(site), weather, begin,
         effects=effects, seed=seed, crop="young" if young else "mature",
     )  # fmt: skip
-
-
-def parameters_of(site: Site) -> GreenhouseParameters:
-    """Return the plant's parameters for what a site says of its greenhouse; the rest keeps its default.
-
-    A site's cover figures describe what a calibrated model sees, not the plant's own cover, and stay out of it.
-    """
-    house = site.greenhouse
-    return GreenhouseParameters(
-        latitude=site.latitude,
-        longitude=site.longitude,
-        air_height=house.mean_height,
-        lamp_capacity=house.lamps.power if house.lamps else 0.0,
-        lamp_photons=house.lamps.efficacy if house.lamps else 1.24,
-        leakage=house.leakage,
-        rail_exchange=house.rail_pipe_heat_transfer,
-        grow_exchange=house.grow_pipe_heat_transfer,
-        boiler_capacity=house.heating_capacity,
-        stem_density=site.crop.stem_density,
-    )
-
-
-def parse_effect(text: str) -> HiddenEffect:
-    """Return the effect written as NAME, NAME=SIZE, NAME@START or NAME=SIZE@START; raises IgrowError."""
-    head, _, start = text.partition("@")
-    name, separator, number = head.partition("=")
-    try:
-        size = float(number) if separator else None
-    except ValueError:
-        right = "NAME[=SIZE][@START] is right, such as co2_valve_leak=2e-7@2020-03-01"
-        raise IgrowError(f"--effect {text!r}: {right}") from None
-    return HiddenEffect(name, size, np.datetime64(int(parse_time(start)), "s") if start else None)
 
 
 async def _serve(options: argparse.Namespace, plant: VirtualGreenhouse, register_map: RegisterMap) -> None:
