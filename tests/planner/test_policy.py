@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from toy_greenhouse import START
+from toy_greenhouse import START, ToySimulator
 
 from igrow_core.errors import IgrowError
 from igrow_core.planner.policy import ACTIONS, OBSERVATIONS, OnnxPolicy, observe, to_setpoints
@@ -110,3 +110,24 @@ def test_greenhouses_of_an_environment_are_the_same_for_the_same_seed(site) -> N
     np.testing.assert_array_equal(worth[0][0], worth[1][0])
     np.testing.assert_array_equal(worth[0][1], worth[1][1])
     assert (worth[0][1] != worth[2][1]).all()
+
+
+def test_trials_of_one_course_share_what_they_see_and_the_first_is_followed(site) -> None:
+    from trainer.policies.environment import Scenario, SimulatedDays
+
+    world = SimulatedDays(site, Scenario(START, 2, 6, seed=1), ToySimulator(), trials=3)
+    seen = world.observe()
+    assert seen.shape == (6, OBSERVATIONS)
+    np.testing.assert_array_equal(seen[0], seen[2])
+    assert (seen[0] != seen[3]).any()
+    actions = np.zeros((6, ACTIONS), dtype=np.float32)
+    actions[0] = 0.5
+    setpoints = to_setpoints(site, actions)
+    score = world.step(setpoints).score
+    assert score.shape == (1, 6)
+    assert score[0, 0] != score[0, 1]
+    assert score[0, 1] == score[0, 2]
+    # The toy's air is as warm as its setpoint, so the next day begins with that of the first trial.
+    expected = (setpoints[0, -1, 0] - 20.0) / 5.0
+    np.testing.assert_allclose(world.observe()[:3, 72], expected, rtol=1e-6)
+    assert not world.done
