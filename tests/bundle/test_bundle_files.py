@@ -58,9 +58,7 @@ def test_the_self_test_passes_on_the_machine_that_wrote_the_golden_values(tmp_pa
 
 def test_a_graph_that_computes_something_else_fails_the_self_test(tmp_path: Path) -> None:
     bundle = write_tiny_bundle(tmp_path / "bundle", offset=5.0, golden_offset=5.2)
-    with pytest.raises(
-        BundleError, match=r"self-test failed: simulator.onnx, output air_temperature is off by"
-    ):
+    with pytest.raises(BundleError, match=r"self-test failed: simulator.onnx, output air_temperature is off by"):
         self_test(bundle)
 
 
@@ -121,9 +119,7 @@ def _change(path: list, value: object):
         (_change(["golden_tolerance"], True), "golden_tolerance: expected a number"),
     ],
 )
-def test_a_faulty_manifest_is_refused_with_the_path_to_the_fault(
-    tmp_path: Path, change, message: str
-) -> None:
+def test_a_faulty_manifest_is_refused_with_the_path_to_the_fault(tmp_path: Path, change, message: str) -> None:
     bundle = write_tiny_bundle(tmp_path / "bundle")
     document = json.loads((bundle.folder / "manifest.json").read_text())
     change(document)
