@@ -68,6 +68,16 @@ def first_tcp_frame(stream: bytes) -> int:
     return length + 6 if len(stream) >= length + 6 else 0
 
 
+def only_whole_frames(piece: bytes) -> bool:
+    """Tell whether `piece` is nothing but sound frames, so that it is hardly the second half of one."""
+    try:
+        while piece and (size := first_tcp_frame(piece)):
+            piece = piece[size:]
+    except TornStreamError:
+        return False
+    return not piece
+
+
 def find_rtu_answer(request: bytes, line: bytes, crc: Callable[[bytes], bytes]) -> bytes | None:
     """Look for the answer to `request` in what came over the line since it was sent.
 

@@ -25,7 +25,14 @@ from pymodbus.pdu.register_message import (
 )
 from pymodbus.transport.serialtransport import create_serial_connection
 
-from edge.bus.answer_check import MisfitError, TornStreamError, check_pdu, find_rtu_answer, first_tcp_frame
+from edge.bus.answer_check import (
+    MisfitError,
+    TornStreamError,
+    check_pdu,
+    find_rtu_answer,
+    first_tcp_frame,
+    only_whole_frames,
+)
 from edge.bus.errors import BadAnswerError, BusError, ConnectionLostError, NoAnswerError, NotConnectedError, refusal
 from edge.bus.protocol import ReadRequest, WriteRequest
 from edge.registers.model import BusSettings, Function, Parity, Transport
@@ -178,7 +185,10 @@ class PymodbusLink(asyncio.Protocol):
             self._waiter = None
         if answer[0] & 0x80:
             raise refusal(str(what), answer[1])
-        return cast(ModbusPDU, self._decoder.decode(answer))
+        decoded = self._decoder.decode(answer)
+        if decoded is None:
+            raise BadAnswerError(f"{what}: pymodbus cannot read the answer {answer.hex()}")
+        return decoded
 
     def _time_out(self) -> None:
         if self._received:
@@ -211,23 +221,22 @@ class PymodbusLink(asyncio.Protocol):
     def data_received(self, data: bytes) -> None:
         """Gather bytes until they are the answer, or cannot become it."""
         self._last_byte = self._loop.time()
-        self._received += data
         try:
             if self._rtu:
-                self._take_from_line()
+                self._take_from_line(data)
             else:
-                self._take_from_stream()
+                self._take_from_stream(data)
         except TornStreamError as error:
             self._fail(BadAnswerError(str(error)))
             self.close()
         except MisfitError as error:
             self._fail(BadAnswerError(str(error)))
 
-    def _take_from_line(self) -> None:
+    def _take_from_line(self, data: bytes) -> None:
         waiter = self._waiter
         if waiter is None or waiter.done():
-            self._received = b""
             return
+        self._received += data
         if len(self._received) > LONGEST_NOISE:
             self._received = b""
             raise MisfitError("the line does not stop talking")
@@ -235,19 +244,24 @@ class PymodbusLink(asyncio.Protocol):
         if answer is not None:
             waiter.set_result(answer)
 
-    def _take_from_stream(self) -> None:
+    def _take_from_stream(self, data: bytes) -> None:
+        # A cut answer and the head of a stale frame would join to a frame that looks sound: the three refusals here.
+        if self._received and only_whole_frames(data):
+            raise TornStreamError("a whole frame where the second half of one was due")
+        self._received += data
         frames: list[bytes] = []
         while size := first_tcp_frame(self._received):
             frames.append(self._received[:size])
             self._received = self._received[size:]
         if self._received and self._owed > 1:
-            # The end of a cut answer and the beginning of a late one would join to a frame that looks sound.
             raise TornStreamError("half a frame while older answers are still to come")
         for frame in frames:
             self._owed = max(0, self._owed - 1)
             waiter = self._waiter
             if waiter is None or waiter.done() or frame[:2] != self._request[:2]:
                 continue  # the late answer to a request that was given up
+            if self._received:
+                raise TornStreamError("an answer with half a frame behind it")
             if frame[6] != self._request[6]:
                 raise MisfitError(f"unit {frame[6]} answered instead of {self._request[6]}")
             check_pdu(self._request[7:], frame[7:])

@@ -6,7 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from edge.bus.answer_check import MisfitError, TornStreamError, check_pdu, find_rtu_answer, first_tcp_frame
+from edge.bus.answer_check import (
+    MisfitError,
+    TornStreamError,
+    check_pdu,
+    find_rtu_answer,
+    first_tcp_frame,
+    only_whole_frames,
+)
 from edge.registers.codec import decode
 from edge.registers.loading import load_register_map
 from edge.virtual_plc.modbus_server import crc
@@ -95,6 +102,14 @@ def test_a_tcp_stream_is_cut_into_frames(stream: bytes, size: int) -> None:
 def test_a_stream_without_a_header_is_torn(stream: str) -> None:
     with pytest.raises(TornStreamError):
         first_tcp_frame(bytes.fromhex(stream))
+
+
+def test_a_piece_of_whole_frames_is_told_from_half_a_frame() -> None:
+    frame = bytes.fromhex("0001 0000 0005 01 03 02 0007")
+    assert only_whole_frames(frame)
+    assert only_whole_frames(frame + frame)
+    assert not any(only_whole_frames(frame[start:]) for start in range(1, len(frame)))
+    assert not any(only_whole_frames(frame[:end]) for end in range(1, len(frame)))
 
 
 def framed(body: bytes) -> bytes:

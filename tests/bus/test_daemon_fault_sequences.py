@@ -177,6 +177,7 @@ def test_no_write_leaves_the_limits_and_no_value_goes_astray_between_daemon_and_
 
 
 @pytest.mark.soak
+@pytest.mark.usefixtures("quiet")
 @pytest.mark.parametrize("start", range(1000, 11000, 1000))
 def test_ten_thousand_fault_sequences_between_daemon_and_plc(start: int) -> None:
     results = [run(play(seed)) for seed in range(start, start + 1000)]

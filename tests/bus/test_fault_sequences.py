@@ -22,6 +22,9 @@ from edge.registers.model import BusSettings, Function, Transport
 from edge.virtual_plc.modbus_server import ModbusServer
 
 TIMEOUT = 0.5
+PATIENCE = 30.0
+"""Seconds that a unit has, four times, to come back when the faults have ended."""
+REST_STEPS = (0.0, 2.0)
 UNITS = (1, 2)
 REQUESTS = 12
 
@@ -49,8 +52,8 @@ class Sequence:
         transport = Transport.RTU_OVER_TCP if self.rtu else Transport.TCP
         gap = 0.03 if self.rtu else 0.0
         settings = BusSettings("line", transport, host="127.0.0.1", port=port, timeout=TIMEOUT, gap=gap)
-        rest_step = self.random.choice([0.0, 2.0])
-        bus = ModbusBus(settings, monotonic=loop.time, rest_step=rest_step)
+        rest_step = self.random.choice(REST_STEPS)
+        bus = ModbusBus(settings, monotonic=loop.time, rest_step=rest_step, first_wait=PATIENCE / 60)
         bus.start()
         for _ in range(REQUESTS):
             together = self.random.choice([1, 1, 1, 3])
@@ -61,7 +64,7 @@ class Sequence:
             for result in await asyncio.gather(*jobs, return_exceptions=True):
                 if isinstance(result, BaseException) and not isinstance(result, (BusError, asyncio.CancelledError)):
                     raise result
-            await asyncio.sleep(self.random.choice([0.0, 0.0, 0.1, 3.0]))
+            await asyncio.sleep(self.random.choice([0.0, 0.0, 0.1, 0.1 * PATIENCE]))
         proxy.rate = 0.0
         proxy.storm = 0
         await self.all_units_answer_again(bus)
@@ -100,7 +103,7 @@ class Sequence:
         self.confirmed[key] += 1
 
     async def all_units_answer_again(self, bus: ModbusBus) -> None:
-        await asyncio.sleep(60.0)
+        await asyncio.sleep(2 * PATIENCE)
         for device_id in UNITS:
             for attempt in range(4):
                 try:
@@ -108,7 +111,7 @@ class Sequence:
                     break
                 except BusError:
                     assert attempt < 3, f"seed {self.seed}: unit {device_id} does not come back"
-                    await asyncio.sleep(30.0)
+                    await asyncio.sleep(PATIENCE)
 
     def judge_writes(self) -> None:
         done = Counter(
@@ -147,6 +150,7 @@ def test_these_sequences_do_find_a_bus_that_trusts_a_late_answer(monkeypatch: py
 
 
 @pytest.mark.soak
+@pytest.mark.usefixtures("quiet")
 @pytest.mark.parametrize("start", range(1000, 11000, 1000))
 def test_ten_thousand_fault_sequences(start: int) -> None:
     faults, values = play(range(start, start + 1000))

@@ -237,6 +237,35 @@ def test_a_late_answer_is_not_taken_for_the_next_one(transport: Transport) -> No
     run(main())
 
 
+@pytest.mark.parametrize("cut", range(1, 13))
+def test_a_cut_answer_and_a_stale_frame_do_not_join_to_a_value(cut: int) -> None:
+    """Found by the random sequences: 13 bytes of an answer, cut, and filled up by the repetition of an older one."""
+
+    class Cutter(asyncio.Protocol):
+        def connection_made(self, transport: Any) -> None:
+            self.transport = transport
+            self.last = b""
+
+        def data_received(self, data: bytes) -> None:
+            registers = b"".join(word.to_bytes(2, "big") for word in (7, 8))
+            frame = data[:2] + bytes((0, 0, 0, 7, data[6], 3, 4)) + registers
+            if self.last:
+                self.transport.write(frame[:cut])
+                asyncio.get_running_loop().call_later(0.1, self.transport.write, self.last)
+            else:
+                self.transport.write(frame)
+            self.last = frame
+
+    async def main() -> None:
+        await asyncio.get_running_loop().create_server(Cutter, "127.0.0.1", PORT)
+        bus = make_bus()
+        assert await read(bus) == (7, 8)
+        with pytest.raises(BadAnswerError):
+            await read(bus)
+
+    run(main())
+
+
 @TRANSPORTS
 @pytest.mark.parametrize("fault", [Fault.NO_ANSWER, Fault.LATE, Fault.WRONG_ECHO, Fault.HANG_UP, Fault.TRUNCATED])
 def test_a_write_that_failed_is_never_repeated_by_the_bus(transport: Transport, fault: Fault) -> None:
