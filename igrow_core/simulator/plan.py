@@ -21,8 +21,8 @@ STEPS_PER_HOUR = 2
 """Steps of the climate and the actuation stage in an hour."""
 CLOCK = ("sun_elevation", "sun_azimuth", "hour")
 """What the graph's input `clock` holds at the middle of each hour."""
-EQUIPMENT = ("vent_lee", "vent_wind", "rail_pipe_excess", "co2_dosing")
-"""Where the equipment stands when the plan begins: %, %, K and kg m-2 h-1."""
+EQUIPMENT = ("vent_lee", "vent_wind", "energy_screen", "blackout_screen", "rail_pipe_excess", "co2_dosing")
+"""Where the equipment stands when the plan begins: %, K and kg m-2 h-1."""
 CLIMATE_OUT = (*PREDICTED, "par")
 """What the graph's output `climate` holds at the end of each hour (par: its mean)."""
 RESOURCES = ("heat", "electricity", "co2")
@@ -86,8 +86,8 @@ class BundleSimulator:
         batch = members * candidates
         time = start.astype("datetime64[s]") + np.arange(hours) * np.timedelta64(3600, "s")
         given = {name: _known(initial, name) for name in (*PREDICTED, *GROWTH, "fruit_fresh_weight")}
-        positions = [initial.get(name, 0.0) for name in ("vent_lee", "vent_wind", "co2_dosing")]
         excess = max(initial.get("rail_pipe_temperature", 0.0) - given["air_temperature"], 0.0)
+        standing = dict(initial) | {"rail_pipe_excess": excess}
 
         def spread(values: list[float]) -> Floats:
             return np.tile(np.nan_to_num(np.array(values))[:, None], (1, batch))
@@ -96,7 +96,7 @@ class BundleSimulator:
             "climate": spread([given[name] for name in PREDICTED]),
             "growth": spread([given[name] for name in GROWTH]),
             "harvest": spread([given["fruit_fresh_weight"]]),
-            "equipment": spread([*positions[:2], excess, positions[2]]),
+            "equipment": spread([standing.get(name, 0.0) for name in EQUIPMENT]),
             "weather": self._columns(weather)[:, :, None],
             "clock": self._clock(time)[:, :, None],
             "day": self.settings.day(time)[:, None],

@@ -12,8 +12,9 @@ from typing import Any
 
 import ndonnx as ndx
 import numpy as np
+import onnxruntime
 from numpy.typing import NDArray
-from onnx import FunctionProto, NodeProto, TensorProto, helper, numpy_helper
+from onnx import FunctionProto, ModelProto, NodeProto, TensorProto, helper, numpy_helper
 
 DOMAIN = "igrow"
 OPSET = 21
@@ -60,6 +61,14 @@ def trace(name: str, formula: Formula, inputs: Sequence[str]) -> Block:
         [helper.make_opsetid("", OPSET)],
     )
     return Block(name, tuple(kept), tuple(results), function)
+
+
+def open_model(model: ModelProto) -> Any:
+    """Open a finished model in onnxruntime, on one thread."""
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    options.log_severity_level = 3
+    return onnxruntime.InferenceSession(model.SerializeToString(), options, providers=["CPUExecutionProvider"])
 
 
 def grouped(arrays: Mapping[str, Any]) -> dict[str, dict[str, Any]]:

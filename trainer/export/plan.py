@@ -15,7 +15,7 @@ from onnx import GraphProto, ModelProto, helper
 
 from igrow_core import air
 from igrow_core.quantities import GROWTH, SETPOINTS, WEATHER, YIELD
-from igrow_core.simulator import actuation, network
+from igrow_core.simulator import actuation, holding, network
 from igrow_core.simulator.crop import GROWTH_DRIVERS, HARVEST_DRIVERS, CropStages
 from igrow_core.simulator.hybrid import climate
 from igrow_core.simulator.hybrid.measurement import PREDICTED
@@ -32,6 +32,8 @@ OUTPUTS: Mapping[str, tuple[str | int, ...]] = {
     "harvest_out": ("days", len(YIELD), "batch"),
     "outside": ("hours", "batch"),
 }
+CARRIED = ("vent_lee", "vent_wind", "energy_screen", "blackout_screen")
+"""Positions of the equipment that an hour hands to the next."""
 RANGED = ("air_temperature", "air_humidity", "air_co2", "outdoor_temperature", "global_radiation")
 """Quantities whose distance from the range of the training data is reported."""
 
@@ -68,7 +70,10 @@ def plan_blocks(stage: ClimateBlocks, crop: CropStages, known: Mapping[str, tupl
         known: smallest and largest value of quantities in the training data.
     """
     weather = tuple(name for name in WEATHER if name in stage.inputs)
-    settings = [f"actuation:{name}" for name in actuation.PARAMETERS]
+    settings = [
+        *(f"actuation:{name}" for name in actuation.RULES),
+        *(f"holding:{name}" for name in holding.PARAMETERS),
+    ]
     setpoints = [f"setpoint:{name}" for name in SETPOINTS]
     drivers = [*stage.inputs, *stage.derive.outputs, "mean_height"]
     return PlanBlocks(
@@ -81,8 +86,8 @@ def plan_blocks(stage: ClimateBlocks, crop: CropStages, known: Mapping[str, tupl
             [
                 *setpoints,
                 *(f"weather:{name}" for name in weather),
-                *(f"climate:{name}" for name in PREDICTED),
-                *(f"memory:{name}" for name in actuation.MEMORY),
+                *(f"climate:{name}" for name in (*PREDICTED, "par")),
+                *(f"memory:{name}" for name in CARRIED),
                 *settings,
             ],
         ),
@@ -176,23 +181,22 @@ def _hour_graph(blocks: PlanBlocks, parameters: Mapping[str, str]) -> GraphProto
     seconds = wiring.constant("seconds", [_SECONDS])
     zero = wiring.constant("zero", [0.0])
     growth = {name: carried[name] for name in GROWTH}
-    (irrigation,) = wiring.add("Mul", [setpoints["setpoint:irrigation_on"], parameters["actuation:irrigation_rate"]])
-    base = _climate_inputs(blocks, weather, clock, growth["leaf_area_index"], zero) | {"irrigation": irrigation}
+    base = _climate_inputs(blocks, weather, clock, growth["leaf_area_index"], zero)
 
     state = {name: carried[name] for name in blocks.climate.states}
     equipment = {name: carried[name] for name in EQUIPMENT}
     used: dict[str, list[str]] = {name: [] for name in RESOURCES}
     means: dict[str, list[str]] = {name: [] for name in GROWTH_DRIVERS}
     for _ in range(STEPS_PER_HOUR):
-        inputs = base | {name: equipment[name] for name in actuation.MEMORY}
+        inputs = base | {name: equipment[name] for name in CARRIED}
         before = wire_derived(wiring, blocks.climate, state, inputs, parameters)
         shown = wire_measured(wiring, blocks.climate, before, state, parameters, "hour_day")
         set_ = wiring.call(
             blocks.equipment,
             setpoints
             | {f"weather:{name}": tensor for name, tensor in weather.items()}
-            | {f"climate:{name}": tensor for name, tensor in shown.items()}
-            | {f"memory:{name}": equipment[name] for name in actuation.MEMORY}
+            | {f"climate:{name}": tensor for name, tensor in (shown | {"par": before["par"]}).items()}
+            | {f"memory:{name}": equipment[name] for name in CARRIED}
             | dict(parameters),
         )
         inputs = base | set_
@@ -212,7 +216,7 @@ def _hour_graph(blocks: PlanBlocks, parameters: Mapping[str, str]) -> GraphProto
             | {"shown_temperature": shown["air_temperature"], "shown_co2": shown["air_co2"]},
         )
         state = memories | {name: step[name] for name in climate.STATES}
-        equipment = {name: set_[name] for name in actuation.MEMORY} | {
+        equipment = {name: set_[name] for name in CARRIED} | {
             "rail_pipe_excess": step["rail_pipe_excess"],
             "co2_dosing": step["co2"],
         }
@@ -222,9 +226,7 @@ def _hour_graph(blocks: PlanBlocks, parameters: Mapping[str, str]) -> GraphProto
         for name in GROWTH_DRIVERS:
             means[name].append(drivers[name])
 
-    end = wire_derived(
-        wiring, blocks.climate, state, base | {name: equipment[name] for name in actuation.MEMORY}, parameters
-    )
+    end = wire_derived(wiring, blocks.climate, state, base | {name: equipment[name] for name in CARRIED}, parameters)
     shown = wire_measured(wiring, blocks.climate, end, state, parameters, "hour_day")
     share = wiring.constant("share", [1.0 / STEPS_PER_HOUR])
     mean = {name: wiring.add("Mul", [wiring.total(parts), share])[0] for name, parts in means.items()}
@@ -311,28 +313,32 @@ def _climate_inputs(
 
 
 def _equipment(xp: Any, arrays: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Lamps, screens, vents and irrigation by the fitted rules; the vents no faster than a step can bear."""
     named = grouped(arrays)
-    return actuation.set_equipment(
-        xp, named["setpoint"], named["weather"], named["climate"], named["memory"], named["actuation"]
-    )
+    slow = named["actuation"] | {"vent_lag": xp.maximum(named["actuation"]["vent_lag"], _SECONDS / 60.0)}
+    climate_now = named["climate"]
+    pipes = dict.fromkeys(("rail_pipe_temperature", "grow_pipe_temperature"), 0.0 * climate_now["air_temperature"])
+    memory = named["memory"] | pipes
+    result = actuation.act(xp, named["setpoint"], named["weather"], climate_now, memory, slow, seconds=_SECONDS)
+    return {name: result[name] for name in (*CARRIED, "lamp_power", "irrigation")}
 
 
 def _control(xp: Any, arrays: Mapping[str, Any]) -> Mapping[str, Any]:
     """Heat and CO2 that hold the setpoints, and the state at the end of the step."""
     named = grouped(arrays)
-    state, drivers, settings = named["state"], named["driver"], named["actuation"]
+    state, drivers, settings = named["state"], named["driver"], named["holding"]
     parameters, setpoints = named["parameter"], named["setpoint"]
     temperature = state["air_temperature"]
     zero = 0.0 * temperature
     idle = drivers | {"rail_pipe_excess": zero, "grow_pipe_excess": zero, "co2_dosing": zero}
     parts = climate.balances(xp, state, idle, parameters, named.get("added", {}))
-    heat = actuation.heat_to_hold(
+    heat = holding.heat_to_hold(
         xp, setpoints["heating_setpoint"], arrays["shown_temperature"], parts["air_temperature"], settings, _SECONDS
     )
     wanted = setpoints["co2_setpoint"] + settings["co2_offset"]
     missing = air.co2_concentration(temperature, wanted) - air.co2_concentration(temperature, arrays["shown_co2"])
     vents = 0.005 * (drivers["vent_lee"] + drivers["vent_wind"])
-    dose = actuation.co2_to_hold(xp, missing, parts["co2_concentration"], vents, settings, _SECONDS)
+    dose = holding.co2_to_hold(xp, missing, parts["co2_concentration"], vents, settings, _SECONDS)
     given = {"air_temperature": heat, "co2_concentration": parameters["dosing_share"] * dose / 3600.0}
     following = {}
     for name, (flux, conductance, capacity) in parts.items():

@@ -1,0 +1,47 @@
+"""The mechanistic greenhouse that a site file describes, and hidden effects as a command line writes them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from igrow_core.errors import IgrowError
+from igrow_core.greenhouse.hidden import HiddenEffect
+from igrow_core.greenhouse.parameters import GreenhouseParameters
+from igrow_core.site import Site
+
+
+def parameters_of(site: Site) -> GreenhouseParameters:
+    """Return the plant's parameters for what a site says of its greenhouse; the rest keeps its default.
+
+    A site's cover figures describe what a calibrated model sees, not the plant's own cover, and stay out of it.
+    """
+    house = site.greenhouse
+    return GreenhouseParameters(
+        latitude=site.latitude,
+        longitude=site.longitude,
+        air_height=house.mean_height,
+        lamp_capacity=house.lamps.power if house.lamps else 0.0,
+        lamp_photons=house.lamps.efficacy if house.lamps else 1.24,
+        leakage=house.leakage,
+        rail_exchange=house.rail_pipe_heat_transfer,
+        grow_exchange=house.grow_pipe_heat_transfer,
+        boiler_capacity=house.heating_capacity,
+        stem_density=site.crop.stem_density,
+    )
+
+
+def parse_effect(text: str) -> HiddenEffect:
+    """Return the effect written as NAME, NAME=SIZE, NAME@START or NAME=SIZE@START.
+
+    Raises:
+        IgrowError: it is written in another way, or there is no such effect.
+    """
+    head, _, start = text.partition("@")
+    name, separator, number = head.partition("=")
+    try:
+        size = float(number) if separator else None
+        begins = np.datetime64(start.removesuffix("Z"), "s") if start else None
+    except ValueError:
+        right = "NAME[=SIZE][@START] is right, such as co2_valve_leak=0.5@2020-03-01"
+        raise IgrowError(f"effect {text!r}: {right}") from None
+    return HiddenEffect(name, size, begins)

@@ -1,0 +1,33 @@
+"""`igrow-trainer bundle`: build the default bundle from the mechanistic greenhouse."""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+from pathlib import Path
+
+from igrow_core.site import Site, load_site
+from trainer.default_bundle import CREATED, default_model
+from trainer.export.bundle import write_hybrid_bundle
+
+EXAMPLE = "igrow-trainer bundle --out igrow_core/default_bundle"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's options."""
+    parser.add_argument("--site", type=Path, help="site file; without one, the defaults of a site")
+    parser.add_argument("--out", type=Path, required=True, help="folder of the bundle; replaced if it is there")
+    parser.add_argument("--seed", type=int, default=0, help="of the virtual seasons (default 0)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Build the bundle."""
+    site = load_site(arguments.site) if arguments.site else Site(name="default", latitude=52.0, longitude=4.5)
+    model = default_model(site, seed=arguments.seed)
+    fresh = arguments.out.with_name(f"{arguments.out.name}.new")
+    shutil.rmtree(fresh, ignore_errors=True)
+    bundle = write_hybrid_bundle(fresh, model, created=CREATED, seed=arguments.seed)
+    shutil.rmtree(arguments.out, ignore_errors=True)
+    bundle.folder.rename(arguments.out)
+    print(f"wrote {arguments.out} ({bundle.label})")
+    return 0

@@ -1,0 +1,36 @@
+"""`igrow-trainer export`: write the bundle of a site from another bundle's simulator."""
+
+from __future__ import annotations
+
+import argparse
+from datetime import UTC, datetime
+from pathlib import Path
+
+from igrow_core.bundle import read_bundle, self_test
+from igrow_core.errors import IgrowError
+from igrow_core.site import load_site
+from trainer.default_bundle import default_bundle_folder, default_control
+from trainer.export.bundle import read_hybrid_model, write_hybrid_bundle
+
+EXAMPLE = "igrow-trainer export --site config/site.yaml --out out/first-bundle"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's options."""
+    parser.add_argument("--site", type=Path, required=True, help="site file that the bundle is for")
+    parser.add_argument("--bundle", type=Path, help="bundle that brings the simulator (default: the built-in one)")
+    parser.add_argument("--out", type=Path, required=True, help="folder for the new bundle; must not exist yet")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Export and test."""
+    if arguments.out.exists():
+        raise IgrowError(f"{arguments.out} exists already; name a new folder")
+    site = load_site(arguments.site)
+    model = read_hybrid_model(read_bundle(arguments.bundle or default_bundle_folder()), site)
+    if arguments.bundle is None:
+        model = model.controlled(*default_control(site))
+    bundle = write_hybrid_bundle(arguments.out, model, created=datetime.now(UTC))
+    worst = max(self_test(bundle), key=lambda deviation: deviation.relative)
+    print(f"wrote {bundle.folder} ({bundle.label}); self-test: {worst.graph} {worst.output} {worst.relative:.1e}")
+    return 0

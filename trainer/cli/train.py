@@ -1,0 +1,40 @@
+"""`igrow-trainer train`: train the growth and yield stages on seasons, and put them into a bundle."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+from igrow_core.bundle import read_bundle
+from igrow_core.errors import IgrowError
+from igrow_core.site import load_site
+from trainer.default_bundle import default_bundle_folder
+from trainer.export.bundle import read_hybrid_model, write_hybrid_bundle
+from trainer.readers.open_log import open_log
+from trainer.training.crop import train_crop
+
+EXAMPLE = "igrow-trainer train out/virtual/*.csv.gz --site config/site.yaml --out out/trained"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's options."""
+    parser.add_argument("seasons", type=Path, nargs="+", help="telemetry files, one a season, equally long")
+    parser.add_argument("--site", type=Path, required=True, help="site file")
+    parser.add_argument("--bundle", type=Path, help="bundle that brings the climate stage (default: the built-in one)")
+    parser.add_argument("--out", type=Path, required=True, help="folder for the new bundle; must not exist yet")
+    parser.add_argument("--seed", type=int, default=0, help="of weights and windows (default 0)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Train and write the bundle."""
+    if arguments.out.exists():
+        raise IgrowError(f"{arguments.out} exists already; name a new folder")
+    site = load_site(arguments.site)
+    model = read_hybrid_model(read_bundle(arguments.bundle or default_bundle_folder()), site)
+    seasons = [open_log(path).telemetry for path in arguments.seasons]
+    crop = train_crop(seasons, seed=arguments.seed, report=lambda line: print(line, flush=True))
+    bundle = write_hybrid_bundle(arguments.out, replace(model, crop=crop), created=datetime.now(UTC))
+    print(f"wrote {bundle.folder} ({bundle.label})")
+    return 0

@@ -1,0 +1,149 @@
+"""The default bundle: the hybrid simulator of a greenhouse that nobody has measured yet.
+
+Virtual seasons of the mechanistic greenhouse, under varied weather and setpoints, stand in for its log. Their
+parameters are varied too, so that the fitted means describe such greenhouses and not one of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from datetime import UTC, datetime
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+
+from igrow_core.bundle import Span
+from igrow_core.greenhouse import GreenhouseParameters, Season, generate_weather, recipe, simulate_many
+from igrow_core.quantities import SETPOINTS
+from igrow_core.simulator import actuation, holding
+from igrow_core.simulator.hybrid.nominal import nominal, site_record
+from igrow_core.site import Site
+from igrow_core.telemetry import Telemetry
+from trainer.calibration.actuation import fit_actuation, setpoint_columns
+from trainer.calibration.fit import calibrate
+from trainer.calibration.holding import fit_holding
+from trainer.calibration.posterior import Posterior, prior
+from trainer.model import HybridModel, known_range
+from trainer.training.crop import train_crop
+
+START = np.datetime64("2020-01-20T00:00:00")
+CREATED = datetime(2020, 6, 1, tzinfo=UTC)
+"""Fixed, so that the same sources give the same bundle."""
+_RANGED = ("air_temperature", "air_humidity", "air_co2", "outdoor_temperature", "global_radiation", *SETPOINTS)
+HOUSES, DAYS = 12, 42
+SPREAD = 0.08
+"""How far one greenhouse of this kind lies from the next, relative standard deviation of its parameters."""
+
+Report = Callable[[str], None]
+
+
+def default_bundle_folder() -> Path:
+    """Return the folder of the default bundle that is installed with igrow."""
+    return Path(str(files("igrow_core"))) / "default_bundle"
+
+
+def virtual_seasons(count: int, days: int, seed: int) -> list[Season]:
+    """Simulate greenhouses that differ, under weather that differs, with setpoints around the recipe.
+
+    Args:
+        count: of greenhouses.
+        days: of each.
+        seed: of everything.
+    """
+    random = np.random.default_rng(seed)
+    end = START + np.timedelta64(days, "D")
+    weathers = [generate_weather(START, end, seed=seed * 1000 + number) for number in range(count)]
+    houses = [GreenhouseParameters().varied(random, SPREAD / 2) for _ in range(count)]
+    return simulate_many(
+        houses,
+        weathers,
+        [varied_recipe(START, end, random) for _ in range(count)],
+        START,
+        end,
+        count=count,
+        seed=seed,
+    )
+
+
+def varied_recipe(start: np.datetime64, end: np.datetime64, random: np.random.Generator) -> Telemetry:
+    """Return the recipe hour by hour with each day's levels shifted, so that the data hold what planning may try."""
+    hours = np.arange(start, end + np.timedelta64(1, "h"), np.timedelta64(1, "h"))
+    rows = np.array([[recipe(hour)[name] for name in SETPOINTS] for hour in hours])
+    day = ((hours - start) // np.timedelta64(1, "D")).astype(int)
+    shift = random.normal(0.0, 1.5, day.max() + 1)[day]
+    carbon = random.uniform(0.6, 1.25, day.max() + 1)[day]
+    lamps = random.random(day.max() + 1)[day] < 0.75
+    rows[:, 0] = np.clip(rows[:, 0] + shift, 12.0, 26.0)
+    rows[:, 1] = np.clip(rows[:, 1] * carbon, 400.0, 1000.0)
+    rows[:, 2] *= lamps
+    return Telemetry(hours, {name: rows[:, column] for column, name in enumerate(SETPOINTS)})
+
+
+def default_model(site: Site, *, seed: int = 0, report: Report = print) -> HybridModel:
+    """Build the simulator of an unmeasured site from virtual seasons.
+
+    Args:
+        site: describes the greenhouse.
+        seed: of the virtual seasons and the training.
+        report: is told of the progress in lines.
+    """
+    report(f"simulating {HOUSES} virtual greenhouses for {DAYS} days")
+    seasons = virtual_seasons(HOUSES, DAYS, seed)
+    posterior = _fitted(site, seasons, report)
+    rules, held = _fitted_control(site, seasons, posterior.values)
+    crop = train_crop([season.true for season in seasons], seed=seed, report=report)
+    tables = [season.measured for season in seasons]
+    end = START + np.timedelta64(DAYS, "D")
+    return HybridModel(
+        site=site,
+        posterior=posterior,
+        actuation=rules,
+        holding=held,
+        crop=crop,
+        training_span=Span(_utc(START), _utc(end)),
+        training_range=known_range({name: concatenate_column(tables, name) for name in _RANGED}),
+    )
+
+
+def default_control(site: Site) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the rules of the PLC and how it holds setpoints, from the site's equipment alone."""
+    house = site.greenhouse
+    rules = actuation.default_rules()
+    rules["lamp_capacity"] = house.lamps.power if house.lamps else 0.0
+    rules["co2_capacity"] = house.co2_dosing_capacity
+    for name, screen in (("energy_screen", house.energy_screen), ("blackout_screen", house.blackout_screen)):
+        if screen is None:
+            rules |= {f"{name}_unlit": 0.0, f"{name}_lit": 0.0, f"{name}_open": 0.0}
+    held = {name: parameter.value for name, parameter in holding.PARAMETERS.items()}
+    return rules, held | {"heating_capacity": house.heating_capacity, "co2_capacity": house.co2_dosing_capacity}
+
+
+def _fitted_control(
+    site: Site, seasons: Sequence[Season], physical: Mapping[str, float]
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Fit both to the virtual seasons."""
+    parts = []
+    for season in seasons:
+        record = site_record(season.measured, site, 300.0)
+        parts.append((record, setpoint_columns(season.measured, record)[0], None))
+    _, held = default_control(site)
+    record, setpoints, _ = parts[0]
+    return fit_actuation(parts, physical), fit_holding(record, setpoints, physical, held)
+
+
+def concatenate_column(tables: Sequence[Telemetry], name: str) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """Return all values of one column, one table after the other."""
+    return np.concatenate([table[name] for table in tables])
+
+
+def _fitted(site: Site, seasons: Sequence[Season], report: Report) -> Posterior:
+    """Fit one set of parameters to all virtual greenhouses; its spread is that between greenhouses."""
+    parts = [(site_record(season.measured, site, 300.0), None) for season in seasons]
+    fitted = calibrate(parts, prior(nominal(site)), {}, every_hours=24.0, progress=report)
+    spread = {name: max(SPREAD * abs(value), 1e-6) for name, value in fitted.values.items()}
+    return prior(fitted.values, spread)
+
+
+def _utc(time: np.datetime64) -> datetime:
+    return datetime.fromisoformat(str(time.astype("datetime64[s]"))).replace(tzinfo=UTC)
