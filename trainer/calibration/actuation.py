@@ -167,9 +167,8 @@ def _usual_course(measured: Floats, step: float) -> Floats:
     """Return the median over the two weeks around at the same time of the day, smoothed over an hour, (n,)."""
     day = round(86_400.0 / step)
     count = -(-len(measured) // day)
-    table = np.full(count * day, np.nan)
-    table[: len(measured)] = measured
-    table = table.reshape(count, day)
+    padding = np.full(count * day - len(measured), np.nan)
+    table = np.concatenate([measured, padding]).reshape(count, day)
     width = max(1, round(3600.0 / step))
     courses = np.empty_like(table)
     for position in range(count):
@@ -244,7 +243,8 @@ def refine_actuation(
     following = starts + 1 + np.arange(whole)[:, None]
 
     def half_hours(values: Floats) -> Floats:
-        return values[:whole].reshape(whole // width, width, *values.shape[1:]).mean(axis=1)
+        mean: Floats = values[:whole].reshape(whole // width, width, *values.shape[1:]).mean(axis=1)
+        return mean
 
     wanted = {name: half_hours(values[following]) for name, values in targets.items() if name in _CLOSED_SCALES}
 

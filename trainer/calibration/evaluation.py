@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,32 +69,97 @@ def evaluate(
     Raises:
         IgrowError: a horizon is not known.
     """
+    runs = run_errors(record, parameters, effects, horizons, rows, added=added, disturbance=disturbance, every=every)
+    return summarise([runs], seed)
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Errors of runs of one quantity over one horizon."""
+
+    error: Floats
+    """Predicted minus measured, (steps, s); the horizon's last step alone for distances."""
+    naive: Floats
+    """The same of persistence."""
+    day: NDArray[np.datetime64]
+    """On which each run starts, (s,)."""
+
+
+def run_errors(
+    record: Record,
+    parameters: Posterior | Mapping[str, float],
+    effects: ActiveEffects,
+    horizons: Sequence[str] = HORIZONS,
+    rows: NDArray[np.bool_] | None = None,
+    *,
+    begin: NDArray[np.bool_] | None = None,
+    added: Mapping[str, Floats] | None = None,
+    disturbance: DisturbanceModel | None = None,
+    every: float = 11_100.0,
+) -> dict[tuple[str, str], Errors]:
+    """Return the errors of free runs by (quantity, horizon); arguments as `evaluate`'s.
+
+    `begin` are the rows at which runs may start, (n,); None: all.
+    """
     values = parameters.values if isinstance(parameters, Posterior) else parameters
     states = records.observe(record, values, effects)
+    missing = missing_fluxes(record, values, effects, added) if disturbance is not None else None
+
+    def predict(starts: NDArray[np.int64], steps: int) -> Mapping[str, Floats]:
+        fluxes = run_fluxes(record, values, effects, starts, steps, added, disturbance, missing)
+        return records.free_run(record, states, starts, steps, values, effects, fluxes)
+
+    return errors_of(record, predict, horizons, rows, begin=begin, every=every)
+
+
+def errors_of(
+    record: Record,
+    predict: Callable[[NDArray[np.int64], int], Mapping[str, Floats]],
+    horizons: Sequence[str],
+    rows: NDArray[np.bool_] | None,
+    *,
+    begin: NDArray[np.bool_] | None = None,
+    every: float = 11_100.0,
+) -> dict[tuple[str, str], Errors]:
+    """Return the errors of any predictor: `predict(starts, steps)` gives (steps, s) by quantity."""
     allowed = np.ones(len(record), dtype=bool) if rows is None else rows
-    missing = missing_fluxes(record, values, effects, added) if disturbance is not None else {}
-    result: dict[str, dict[str, ErrorSummary]] = {}
+    result: dict[tuple[str, str], Errors] = {}
     for horizon in horizons:
         if horizon not in HORIZONS:
             raise IgrowError(f"horizon {horizon!r} is not known: {', '.join(HORIZONS)}")
         steps = horizon_steps(record, horizon)
         starts = starts_within(record, allowed, steps, max(1, round(every / record.step)))
+        if begin is not None:
+            starts = starts[begin[starts]]
         if len(starts) == 0:
             continue
-        fluxes = run_fluxes(record, values, effects, starts, steps, added, disturbance, missing)
-        shown = records.free_run(record, states, starts, steps, values, effects, fluxes)
         following = starts + 1 + np.arange(steps)[:, None]
-        for quantity, predicted in shown.items():
+        for quantity, predicted in predict(starts, steps).items():
+            if quantity not in record.measured:
+                continue
             measured = record.measured[quantity]
             error = predicted - measured[following]
             if horizon in _RUNS:
                 earlier = following - steps
                 naive = np.where(earlier >= 0, measured[np.maximum(earlier, 0)], np.nan) - measured[following]
             else:
-                error, naive = error[-1:], measured[starts] - measured[following[-1:]]
+                error, naive = error[-1:], (measured[starts] - measured[following[-1]])[None]
             if np.isfinite(error).any():
-                day = record.time[starts].astype("datetime64[D]")
-                result.setdefault(quantity, {})[horizon] = _summary(error, naive, day, seed)
+                result[quantity, horizon] = Errors(error, naive, record.time[starts].astype("datetime64[D]"))
+    return result
+
+
+def summarise(parts: Sequence[Mapping[tuple[str, str], Errors]], seed: int = 0) -> Evaluation:
+    """Return the summary of errors from one model or several (say, one for each week), pooled."""
+    result: dict[str, dict[str, ErrorSummary]] = {}
+    for quantity, horizon in dict.fromkeys(key for part in parts for key in part):
+        found = [part[quantity, horizon] for part in parts if (quantity, horizon) in part]
+        result.setdefault(quantity, {})[horizon] = _summary(
+            np.concatenate([one.error for one in found], axis=1),
+            np.concatenate([one.naive for one in found], axis=1),
+            np.concatenate([one.day for one in found]),
+            seed,
+        )
     return result
 
 

@@ -58,7 +58,7 @@ def minimise(
         progress: is called after each with its number and residuals.
     """
     deviation = np.sqrt(np.diag(problem.covariance))
-    precision = np.linalg.inv(problem.covariance)
+    precision: Floats = np.linalg.inv(problem.covariance).astype(np.float64)
     point = np.clip(start, problem.low, problem.high)
     previous = problem.residuals(point[None])
     damping = 1e-2

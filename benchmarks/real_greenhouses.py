@@ -1,0 +1,279 @@
+"""Tables of the hybrid simulator on measured greenhouses.
+
+later     fitted on the first weeks, tested on all later ones
+weekly    refitted before each test week, as a site in operation is (K2 = 7 days)
+across    fitted on the other compartments, tested on this one; and with its first 7 days for calibration
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.ensemble import HistGradientBoostingRegressor
+
+from igrow_core.errors import IgrowError
+from igrow_core.simulator.hybrid.nominal import nominal, site_record
+from igrow_core.simulator.hybrid.record import Record
+from trainer.calibration.actuation import setpoint_columns
+from trainer.calibration.evaluation import Errors, errors_of, summarise
+from trainer.calibration.posterior import prior
+from trainer.calibration.site_model import SiteModel, fit_site
+from trainer.calibration.split import weeks
+from trainer.calibration.totals import coverage, daily_totals
+from trainer.readers import challenge
+from trainer.readers.log import Log
+from trainer.readers.open_log import open_log
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+STEP = 300.0
+HORIZONS = ("1_h", "24_h", "7_d")
+UNITS = {"air_temperature": "K", "air_humidity": "%", "air_co2": "ppm"}
+
+
+class Greenhouse:
+    """A log, its record and setpoints."""
+
+    def __init__(self, log: Log) -> None:
+        if log.site is None:
+            raise IgrowError(f"{log.name}: the log does not tell its site")
+        self.log, self.site = log, log.site
+        self.record: Record = site_record(log.telemetry, log.site, STEP)
+        self.setpoints, self.inferred = setpoint_columns(log.telemetry, self.record)
+        self.week = weeks(self.record.time)
+
+    def fit(self, fit: Mask, selection: Mask, **options: object) -> SiteModel:
+        return fit_site([(self.record, self.setpoints, fit, selection)], prior(nominal(self.site)), {}, **options)  # type: ignore[arg-type]
+
+
+def test_errors(
+    house: Greenhouse, model: SiteModel, rows: Mask, begin: Mask | None, every: float
+) -> dict[str, dict[tuple[str, str], Errors]]:
+    """Errors of both ways to drive a model."""
+    found = {
+        "hybrid, actuators": errors_of(
+            house.record, model.predictor(house.record), HORIZONS, rows, begin=begin, every=every
+        )
+    }
+    if model.rules:
+        found["hybrid, setpoints"] = errors_of(
+            house.record,
+            model.closed_predictor(house.record, house.setpoints),
+            HORIZONS,
+            rows,
+            begin=begin,
+            every=every,
+        )
+    return found
+
+
+def boosted(
+    house: Greenhouse, fit: Mask, rows: Mask, begin: Mask | None, every: float
+) -> dict[tuple[str, str], Errors]:
+    """A plain gradient-boosted regression: drivers now and an hour ago, the measured start, and the lead time."""
+    record = house.record
+    generator = np.random.default_rng(0)
+    columns = [*record.inputs, *house.setpoints]
+    table = np.stack([*record.inputs.values(), *house.setpoints.values()], axis=1)
+    lag = round(3600.0 / STEP)
+    quantities = list(record.measured)
+    measured = np.stack([record.measured[name] for name in quantities], axis=1)
+
+    def features(starts: NDArray[np.int64], target: NDArray[np.int64]) -> Floats:
+        lead = (target - starts)[:, None] * STEP / 3600.0
+        return np.concatenate(
+            [table[target - 1], table[np.maximum(target - 1 - lag, starts)], measured[starts], np.minimum(lead, 24.0)],
+            axis=1,
+        )
+
+    assert len(columns) == table.shape[1]
+    usable = np.flatnonzero(fit[:-300])
+    starts = generator.choice(usable, 40_000)
+    target = starts + 1 + np.floor(287 * generator.random(len(starts)) ** 2).astype(np.int64)
+    keep = fit[target]
+    starts, target = starts[keep], target[keep]
+    models = {}
+    for position, name in enumerate(quantities):
+        good = np.isfinite(measured[target, position]) & np.isfinite(measured[starts]).all(axis=1)
+        models[name] = HistGradientBoostingRegressor(max_iter=200, learning_rate=0.08, random_state=0).fit(
+            features(starts[good], target[good]), measured[target[good], position]
+        )
+
+    def predict(begin_rows: NDArray[np.int64], steps: int) -> Mapping[str, Floats]:
+        stride = 1 if steps <= 300 else 6
+        leads = np.arange(0, steps, stride)
+        result = {name: np.full((steps, len(begin_rows)), np.nan) for name in quantities}
+        ahead = np.broadcast_to(begin_rows, (len(leads), len(begin_rows)))
+        rows_ahead = ahead + 1 + leads[:, None]
+        inputs = features(ahead.ravel(), rows_ahead.ravel())
+        for name, one in models.items():
+            result[name][leads] = one.predict(inputs).reshape(len(leads), -1)
+        return result
+
+    return errors_of(record, predict, HORIZONS, rows, begin=begin, every=every)
+
+
+def show(title: str, found: Mapping[str, Sequence[Mapping[tuple[str, str], Errors]]]) -> dict[str, object]:
+    """Print one table and return it for JSON."""
+    print(f"\n{title}")
+    print(f"{'':24s}" + "".join(f"{horizon:>31s}" for horizon in HORIZONS))
+    result: dict[str, object] = {}
+    summaries = {name: summarise(parts) for name, parts in found.items()}
+    for quantity, unit in UNITS.items():
+        naive = next(iter(summaries.values())).get(quantity, {})
+        line = "".join(f"{naive[h].persistence:12.3g}{'':19s}" if h in naive else " " * 31 for h in HORIZONS)
+        print(f"{quantity} ({unit})\n  {'persistence':22s}{line}")
+        for name, summary in summaries.items():
+            cells = "".join(
+                f"{one.mae:12.3g} [{one.mae_low:.3g}, {one.mae_high:.3g}]".ljust(31) if one else " " * 31
+                for one in (summary.get(quantity, {}).get(h) for h in HORIZONS)
+            )
+            print(f"  {name:22s}{cells}")
+    for name, summary in summaries.items():
+        result[name] = {q: {h: asdict(one) for h, one in by.items()} for q, by in summary.items()}
+    return result
+
+
+def show_extras(house: Greenhouse, model: SiteModel, rows: Mask, begin: Mask | None = None) -> tuple[object, object]:
+    """Coverage of the intervals and daily totals of one model on rows it has not seen."""
+    return (
+        coverage(house.record, house.setpoints, model, rows, begin),
+        daily_totals(house.record, house.setpoints, model, rows, begin),
+    )
+
+
+def later(house: Greenhouse, every: float) -> dict[str, object]:
+    count = int(house.week[-1]) + 1
+    fit_weeks, selection_weeks = round(0.6 * count), max(2, round(0.15 * count))
+    fit = house.week < fit_weeks
+    selection = (house.week >= fit_weeks) & (house.week < fit_weeks + selection_weeks)
+    rows = house.week >= fit_weeks + selection_weeks
+    began = time.monotonic()
+    model = house.fit(fit, selection)
+    print(f"{house.log.name}: fitted in {time.monotonic() - began:.0f} s")
+    found = {name: [errors] for name, errors in test_errors(house, model, rows, None, every).items()}
+    found["gradient boosting"] = [boosted(house, fit | selection, rows, None, every)]
+    title = (
+        f"{house.log.name}, later: weeks 1-{fit_weeks} fit, {selection_weeks} selection, "
+        f"{count - fit_weeks - selection_weeks} test"
+    )
+    table = show(title, found)
+    covered, totals = show_extras(house, model, rows)
+    print_coverage([covered])
+    print_totals([totals])
+    return table
+
+
+def weekly(house: Greenhouse, every: float, first: int = 8) -> dict[str, object]:
+    found: dict[str, list[Mapping[tuple[str, str], Errors]]] = {}
+    covered, totals = [], []
+    count = int(house.week[-1]) + 1
+    for test in range(first, count):
+        fit = (house.week >= test - 6) & (house.week < test)
+        selection = (house.week >= test - 8) & (house.week < test - 6)
+        model = house.fit(fit, selection)
+        begin, rows = house.week == test, house.week >= test
+        for name, errors in test_errors(house, model, rows, begin, every).items():
+            found.setdefault(name, []).append(errors)
+        found.setdefault("gradient boosting", []).append(boosted(house, fit | selection, rows, begin, every))
+        extras = show_extras(house, model, rows, begin)
+        covered.append(extras[0])
+        totals.append(extras[1])
+        print(f"week {test + 1} of {count} done", file=sys.stderr)
+    table = show(f"{house.log.name}, weekly: refitted before each of weeks {first + 1}-{count}", found)
+    print_coverage(covered)
+    print_totals(totals)
+    return table
+
+
+def across(houses: Sequence[Greenhouse], every: float) -> dict[str, object]:
+    tables: dict[str, object] = {}
+    for house in houses:
+        others = [one for one in houses if one is not house]
+        parts = [(one.record, one.setpoints, one.week % 4 != 3, one.week % 4 == 3) for one in others]
+        model = fit_site(parts, prior(nominal(house.site)), {}, actuation=False)
+        rows, later_rows = np.ones(len(house.record), dtype=bool), house.week >= 1
+        found = {
+            "fitted on others": [errors_of(house.record, model.predictor(house.record), HORIZONS, rows, every=every)]
+        }
+        first = house.week < 1
+        adapted = fit_site(
+            [(house.record, house.setpoints, first, first)], model.posterior.widened(3.0), {}, actuation=False
+        )
+        found["and first 7 days"] = [
+            errors_of(house.record, adapted.predictor(house.record), HORIZONS, later_rows, every=every)
+        ]
+        alone = fit_site(
+            [(house.record, house.setpoints, first, first)], prior(nominal(house.site)), {}, actuation=False
+        )
+        found["first 7 days alone"] = [
+            errors_of(house.record, alone.predictor(house.record), HORIZONS, later_rows, every=every)
+        ]
+        tables[house.log.name] = show(f"{house.log.name}, across", found)
+    return tables
+
+
+def print_coverage(parts: Sequence[object]) -> None:
+    print("\ncoverage of 90 % intervals")
+    pooled: dict[tuple[str, str], list[tuple[float, float]]] = {}
+    for part in parts:
+        for key, value in part.items():  # type: ignore[attr-defined]
+            pooled.setdefault(key, []).append(value)
+    for (driven, key), values in pooled.items():
+        inside, number = np.sum(np.array(values), axis=0)
+        print(f"  {driven:10s} {key:28s} {inside / max(number, 1):.3f}")
+
+
+def print_totals(parts: Sequence[object]) -> None:
+    print("\ndaily totals from setpoints: predicted, measured, difference of the sums, median day's difference")
+    names = list(dict.fromkeys(name for part in parts for name in part))  # type: ignore[attr-defined]
+    for name in names:
+        pairs = np.concatenate([part[name] for part in parts if name in part], axis=1)  # type: ignore[index]
+        predicted, measured = pairs
+        if measured.sum() <= 0:
+            continue
+        worth = measured > 0.05 * measured.mean()
+        median = np.median(np.abs(predicted - measured)[worth] / measured[worth])
+        print(
+            f"  {name:24s} {predicted.mean():10.4g} {measured.mean():10.4g} "
+            f"{100 * (predicted.sum() / measured.sum() - 1):+7.1f} % {100 * median:7.1f} %"
+        )
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("data", type=Path, help="folder of the data set")
+    parser.add_argument("compartments", nargs="*", help="names; none: all that have a climate file")
+    parser.add_argument("--tables", nargs="+", choices=("later", "weekly", "across"), default=["later"])
+    parser.add_argument("--every", type=float, default=11_100.0, help="seconds between starts of test runs")
+    parser.add_argument("--json", type=Path, help="file for the tables")
+    given = parser.parse_args()
+    try:
+        names = given.compartments or challenge.compartments(given.data, "GreenhouseClimate", "Greenhouse_climate")
+        houses = [Greenhouse(open_log(given.data, name)) for name in names] or [Greenhouse(open_log(given.data))]
+    except IgrowError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    result: dict[str, object] = {}
+    for table in given.tables:
+        if table == "across":
+            result["across"] = across(houses, given.every)
+        else:
+            run = later if table == "later" else weekly
+            result[table] = {house.log.name: run(house, given.every) for house in houses}
+    if given.json is not None:
+        given.json.write_text(json.dumps(result, indent=1))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,205 @@
+"""All that one log teaches about a site, in one go: parameters, remainder, disturbance, rules, doubt and range."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow_core.simulator.closed_loop import closed_run
+from igrow_core.simulator.hybrid import record as records
+from igrow_core.simulator.hybrid.climate import ActiveEffects
+from igrow_core.simulator.hybrid.disturbance import DisturbanceModel, missing_fluxes
+from igrow_core.simulator.hybrid.record import Record
+from igrow_core.simulator.uncertainty import ErrorGrowth, TrainingRange, error_growth, training_range
+from trainer.calibration.actuation import fit_actuation, refine_actuation
+from trainer.calibration.disturbance import fit_disturbance
+from trainer.calibration.evaluation import evaluate, run_fluxes, starts_within
+from trainer.calibration.fit import calibrate
+from trainer.calibration.posterior import Posterior
+from trainer.calibration.remainder import Remainder, fit_remainder
+
+Floats = NDArray[np.float64]
+
+RANGE_DRIVERS = (
+    "outdoor_temperature",
+    "global_radiation",
+    "wind_speed",
+    "air_temperature",
+    "air_humidity",
+    "air_co2",
+    "heating_setpoint",
+    "co2_setpoint",
+    "lamp_on",
+)
+"""What the training range watches: weather, climate and setpoints of a plan."""
+_PENALTIES = (0.03, 0.1, 0.3, 1.0)
+
+
+@dataclass(frozen=True)
+class SiteModel:
+    """The fitted hybrid simulator of a site."""
+
+    posterior: Posterior
+    effects: ActiveEffects
+    remainder: Remainder | None
+    disturbance: DisturbanceModel
+    rules: Mapping[str, float]
+    """Of the actuation stage."""
+    growth: Mapping[str, ErrorGrowth]
+    """By quantity, of runs driven by measured actuators."""
+    closed_growth: Mapping[str, ErrorGrowth]
+    """By quantity, of runs driven by setpoints."""
+    range: TrainingRange
+
+    def added(self, record: Record) -> dict[str, Floats]:
+        """Return the remainder's fluxes along a record, (n,) by channel."""
+        return self.remainder.fluxes(record) if self.remainder is not None else {}
+
+    def predictor(self, record: Record) -> Callable[[NDArray[np.int64], int], dict[str, Floats]]:
+        """Return `predict(starts, steps)`: runs driven by the measured actuators."""
+        values, added = self.posterior.values, self.added(record)
+        states = records.observe(record, values, self.effects)
+        missing = missing_fluxes(record, values, self.effects, added)
+
+        def predict(starts: NDArray[np.int64], steps: int) -> dict[str, Floats]:
+            fluxes = run_fluxes(record, values, self.effects, starts, steps, added, self.disturbance, missing)
+            return records.free_run(record, states, starts, steps, values, self.effects, fluxes)
+
+        return predict
+
+    def closed_predictor(
+        self, record: Record, setpoints: Mapping[str, Floats]
+    ) -> Callable[[NDArray[np.int64], int], dict[str, Floats]]:
+        """Return `predict(starts, steps)`: runs driven by setpoints and weather through the actuation stage."""
+        values, added = self.posterior.values, self.added(record)
+        states = records.observe(record, values, self.effects)
+        missing = missing_fluxes(record, values, self.effects, added)
+
+        def predict(starts: NDArray[np.int64], steps: int) -> dict[str, Floats]:
+            fluxes = run_fluxes(record, values, self.effects, starts, steps, added, self.disturbance, missing)
+            return closed_run(record, states, setpoints, starts, steps, values, self.effects, dict(self.rules), fluxes)
+
+        return predict
+
+
+def fit_site(
+    parts: Sequence[tuple[Record, Mapping[str, Floats], NDArray[np.bool_], NDArray[np.bool_]]],
+    knowledge: Posterior,
+    effects: ActiveEffects,
+    *,
+    actuation: bool = True,
+    progress: Callable[[str], None] | None = None,
+) -> SiteModel:
+    """Fit all stages to logs of one kind of greenhouse.
+
+    Args:
+        parts: records with their setpoints by name, (n,), the rows to fit on, and the rows to choose and to measure
+            the doubt on (selection), which no fit sees.
+        knowledge: the prior of the parameters.
+        effects: the active effects.
+        actuation: fit the rules too.
+        progress: is told what is being done.
+    """
+    say = progress or (lambda _line: None)
+    posterior = calibrate([(record, fit) for record, _, fit, _ in parts], knowledge, effects, progress=progress)
+    values = posterior.values
+    lacking = [(record, fit, missing_fluxes(record, values, effects)) for record, _, fit, _ in parts]
+    remainder = _choose_remainder(parts, lacking, posterior, effects)
+    say("remainder on weather and clock: " + ("kept" if remainder is not None else "of no use on selection weeks"))
+    known = [remainder.fluxes(record) if remainder is not None else {} for record, _, _, _ in parts]
+    disturbance = fit_disturbance(
+        [
+            (record, fit, missing_fluxes(record, values, effects, added))
+            for (record, _, fit, _), added in zip(parts, known, strict=True)
+        ]
+    )
+    rules: dict[str, float] = {}
+    if actuation:
+        rules = fit_actuation([(record, setpoints, fit) for record, setpoints, fit, _ in parts], values)
+        record, setpoints, fit, _ = parts[0]
+        rules = refine_actuation(record, setpoints, fit, values, rules, remainder=known[0], disturbance=disturbance)
+        say("actuation stage fitted in closed loop")
+    table = {
+        name: np.concatenate([_driver(part[0], part[1], name)[part[2]] for part in parts]) for name in RANGE_DRIVERS
+    }
+    model = SiteModel(posterior, effects, remainder, disturbance, rules, {}, {}, training_range(_complete(table)))
+    growth = _growth([(part[0], part[3], model.predictor(part[0])) for part in parts])
+    closed = (
+        _growth([(part[0], part[3], model.closed_predictor(part[0], part[1])) for part in parts]) if actuation else {}
+    )
+    return SiteModel(posterior, effects, remainder, disturbance, rules, growth, closed, model.range)
+
+
+def _choose_remainder(
+    parts: Sequence[tuple[Record, Mapping[str, Floats], NDArray[np.bool_], NDArray[np.bool_]]],
+    lacking: Sequence[tuple[Record, NDArray[np.bool_] | None, Mapping[str, Floats]]],
+    posterior: Posterior,
+    effects: ActiveEffects,
+) -> Remainder | None:
+    """Return the remainder that helps most on the selection weeks, or None where none helps."""
+    usual = DisturbanceModel()
+
+    def score(remainder: Remainder | None) -> float:
+        total = 0.0
+        for record, _, _, selection in parts:
+            added = remainder.fluxes(record) if remainder is not None else None
+            errors = evaluate(
+                record, posterior, effects, ("24_h",), selection, added=added, disturbance=usual, every=18_900.0
+            )
+            total += sum(
+                by_horizon["24_h"].mae / {"air_temperature": 0.5, "air_humidity": 3.0}.get(quantity, 35.0)
+                for quantity, by_horizon in errors.items()
+                if not (quantity == "air_co2" and "co2_dosing" in record.unknown)
+            )
+        return total
+
+    candidates: list[Remainder | None] = [None, *(fit_remainder(lacking, penalty) for penalty in _PENALTIES)]
+    return min(candidates, key=score)
+
+
+def _growth(
+    parts: Sequence[tuple[Record, NDArray[np.bool_], Callable[[NDArray[np.int64], int], Mapping[str, Floats]]]],
+) -> dict[str, ErrorGrowth]:
+    """Return the growth of errors on selection rows: a day from runs of a day, a week from runs as long as fit in."""
+    pooled: dict[str, list[tuple[Floats, Floats, Floats]]] = {}
+    for record, rows, predict in parts:
+        for hours, every in ((24.0, 7500.0), (168.0, 29_700.0)):
+            steps = round(hours * 3600.0 / record.step)
+            starts = starts_within(record, rows, steps, max(1, round(every / record.step)))
+            if len(starts) == 0:
+                continue
+            following = starts + 1 + np.arange(steps)[:, None]
+            lead: Floats = np.arange(1.0, steps + 1.0) * (record.step / 3600.0)
+            keep = lead > 24.0 if hours > 24.0 else lead > 0.0
+            for quantity, predicted in predict(starts, steps).items():
+                if quantity in record.measured:
+                    error = record.measured[quantity][following] - predicted
+                    sun = record.inputs["global_radiation"][following]
+                    pooled.setdefault(quantity, []).append((lead[keep], error[keep], sun[keep]))
+    growth = {}
+    for quantity, pieces in pooled.items():
+        parts_of_growth = [error_growth(error, lead, sun) for lead, error, sun in pieces]
+        first = parts_of_growth[0]
+        later = [one for one in parts_of_growth[1:] if one.hours[0] > first.hours[-1]]
+        growth[quantity] = ErrorGrowth(
+            np.concatenate([first.hours, *(one.hours for one in later)]),
+            np.concatenate([first.low, *(one.low for one in later)], axis=1),
+            np.concatenate([first.high, *(one.high for one in later)], axis=1),
+        )
+    return growth
+
+
+def _driver(record: Record, setpoints: Mapping[str, Floats], name: str) -> Floats:
+    for source in (record.inputs, record.measured, setpoints):
+        if name in source:
+            return source[name]
+    return np.full(len(record), np.nan)
+
+
+def _complete(table: Mapping[str, Floats]) -> dict[str, Floats]:
+    known = {name: values for name, values in table.items() if np.isfinite(values).any()}
+    rows = np.all([np.isfinite(values) for values in known.values()], axis=0)
+    return {name: values[rows] for name, values in known.items()}

@@ -1,0 +1,93 @@
+"""What a fitted site promises about energy and doubt, against what was measured: daily totals and coverage."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow_core.simulator.closed_loop import pipe_heat
+from igrow_core.simulator.hybrid import climate
+from igrow_core.simulator.hybrid import record as records
+from igrow_core.simulator.hybrid.record import Record
+from trainer.calibration.evaluation import starts_within
+from trainer.calibration.site_model import SiteModel
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+TOTALS = {
+    "heat (MJ m-2)": ("heat", 0.0864),
+    "ventilation (m3 m-2)": ("ventilation", 86_400.0),
+    "lamp electricity (kWh m-2)": ("lamp_power", 0.024),
+    "CO2 (kg m-2)": ("co2_dosing", 24.0),
+}
+"""Daily total -> what it is the mean of over a run, and the factor to its unit."""
+
+
+def daily_totals(
+    record: Record, setpoints: Mapping[str, Floats], model: SiteModel, rows: Mask, begin: Mask | None = None
+) -> dict[str, Floats]:
+    """Return daily totals predicted from setpoints and measured, by name, (2, days).
+
+    Days begin at each 24 h that lies whole within `rows` (and starts within `begin`). Heat and ventilation are
+    measured through pipes and vents, with the same coefficients as the prediction: there is no meter for them.
+    """
+    steps = round(86_400.0 / record.step)
+    starts = starts_within(record, rows, steps, steps)
+    if begin is not None:
+        starts = starts[begin[starts]]
+    if len(starts) == 0 or not model.rules:
+        return {}
+    predicted = model.closed_predictor(record, setpoints)(starts, steps)
+    values = model.posterior.values
+    states = records.observe(record, values, model.effects)
+    drivers = climate.derive(np, states, record.inputs, values, record.lamp_efficacy)
+    measured = {
+        "heat": pipe_heat(drivers, values),
+        "ventilation": drivers["ventilation"],
+        "lamp_power": record.inputs["lamp_power"],
+        "co2_dosing": record.inputs["co2_dosing"],
+    }
+    ahead = starts + np.arange(steps)[:, None]
+    return {
+        name: factor * np.stack([predicted[source].mean(axis=0), measured[source][ahead].mean(axis=0)])
+        for name, (source, factor) in TOTALS.items()
+        if source not in record.unknown
+    }
+
+
+def coverage(
+    record: Record, setpoints: Mapping[str, Floats], model: SiteModel, rows: Mask, begin: Mask | None = None
+) -> dict[tuple[str, str], tuple[float, float]]:
+    """Return how many measurements lay within the 90 % intervals, and how many there were.
+
+    By (what drove the run, "quantity horizon"): at 1 h, over 24 h, over 7 days.
+    """
+    found: dict[tuple[str, str], tuple[float, float]] = {}
+    driven = [("actuators", model.predictor(record), model.growth)]
+    if model.rules:
+        driven.append(("setpoints", model.closed_predictor(record, setpoints), model.closed_growth))
+    for how, predict, growth in driven:
+        for horizon, hours, every in (("1_h", 1.0, 7500.0), ("24_h", 24.0, 18_900.0), ("7_d", 168.0, 40_500.0)):
+            steps = round(hours * 3600.0 / record.step)
+            starts = starts_within(record, rows, steps, max(1, round(every / record.step)))
+            if begin is not None:
+                starts = starts[begin[starts]]
+            if len(starts) == 0:
+                continue
+            following = starts + 1 + np.arange(steps)[:, None]
+            lead = ((np.arange(steps) + 1.0) * (record.step / 3600.0))[:, None]
+            sun = record.inputs["global_radiation"][following]
+            for quantity, predicted in predict(starts, steps).items():
+                if quantity not in growth or quantity not in record.measured:
+                    continue
+                low, high = growth[quantity].interval(predicted, lead, sun)
+                measured = record.measured[quantity][following]
+                if horizon == "1_h":
+                    low, high, measured = low[-1:], high[-1:], measured[-1:]
+                known = np.isfinite(measured)
+                inside = (measured >= low) & (measured <= high)
+                found[how, f"{quantity} {horizon}"] = (float(inside[known].sum()), float(known.sum()))
+    return found
