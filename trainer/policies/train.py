@@ -23,6 +23,7 @@ from igrow_core.site import Site, load_site
 from trainer.policies.environment import DailyGreenhouses, Scenario, SimulatedDays, World
 from trainer.policies.sac import Actor, SacSettings, SoftActorCritic
 
+EXAMPLE = "igrow-trainer policy --site config/site.yaml --bundle igrow_core/default_bundle --out policy.onnx"
 TRAINING_SEEDS = 1_000_000
 """Seeds of training weather begin here; tests use smaller ones, so that no season is in both."""
 FIRST_START = np.datetime64("2020-01-04T23:00:00", "s")
@@ -130,21 +131,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=0, help="of networks, weather and exploration (default: 0)")
 
 
-def run(arguments: argparse.Namespace) -> None:
-    """Train and write the policy."""
+def run(arguments: argparse.Namespace) -> int:
+    """Train and write the policy; returns the exit code."""
     torch.set_num_threads(1)
     plan = TrainingPlan(episodes=1000, seconds=60.0 * arguments.minutes)
     simulator = BundleSimulator(read_bundle(arguments.bundle), members=1) if arguments.bundle else None
     learner = train(load_site(arguments.site), plan, SacSettings(), arguments.seed, _say, simulator)
     arguments.out.write_bytes(export(learner.actor).SerializeToString())
     print(f"{arguments.out} written")
+    return 0
 
 
 def _say(line: str) -> None:
     print(line, flush=True)
-
-
-if __name__ == "__main__":
-    _parser = argparse.ArgumentParser(description=__doc__)
-    add_arguments(_parser)
-    run(_parser.parse_args())
