@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import logging
 import signal
+from collections.abc import Coroutine
 from pathlib import Path
 
 from edge.configuration import Configuration, load_configuration
@@ -18,8 +19,8 @@ from igrow_core.errors import IgrowError
 
 STOP_SECONDS = 5.0
 """Longest time that the safe setpoints may take on the way out."""
-LOCKSTEP_PLAN_SECONDS = 900.0
-LOCKSTEP_UPDATE_SECONDS = 900.0
+LOCKSTEP_WAIT = 900.0
+"""Longest time, by the wall clock, that a lock-step plant is kept waiting for a plan or an update."""
 
 log = logging.getLogger("igrow.edge")
 
@@ -72,19 +73,23 @@ class Daemon:
     async def _due(self) -> bool:
         """Wait for the next cycle; tell whether there is one."""
         assert self._control is not None
-        pace = asyncio.ensure_future(self._control.pace.wait())
+        return await self._unless_stopped(self._control.pace.wait())
+
+    async def _unless_stopped(self, work: Coroutine[None, None, None]) -> bool:
+        """Await `work`, but not beyond a stop; tell whether it was awaited to its end."""
+        task = asyncio.ensure_future(work)
         stop = asyncio.ensure_future(self._stopping.wait())
         try:
-            await asyncio.wait((pace, stop), return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait((task, stop), return_when=asyncio.FIRST_COMPLETED)
         finally:
-            for task in (pace, stop):
-                if not task.done():
-                    task.cancel()
+            for one in (task, stop):
+                if not one.done():
+                    one.cancel()
                     with contextlib.suppress(asyncio.CancelledError):
-                        await task
+                        await one
         if self._stopping.is_set():
             return False
-        pace.result()
+        task.result()
         return True
 
     async def _cycle(self) -> None:
@@ -100,7 +105,7 @@ class Daemon:
             self.services.exchange.tick(image.true_time)
         await self._plan_ahead(control, result)
         if control.lockstep and self.services.updates.busy:
-            await self.services.updates.wait(LOCKSTEP_UPDATE_SECONDS)
+            await self._unless_stopped(self.services.updates.wait(LOCKSTEP_WAIT))
         self.services.status.publish(self._snapshot(control, result))
         self._notifier.cycle_completed(f"{result.decision.source}: {result.decision.why}")
 
@@ -110,7 +115,7 @@ class Daemon:
             return
         asked = await schedule.tick(result.image, self.services.updates.active())
         if asked and control.lockstep:
-            await planning.wait(LOCKSTEP_PLAN_SECONDS)
+            await self._unless_stopped(planning.wait(LOCKSTEP_WAIT))
         if planning.health and not planning.busy:
             schedule.retry_soon(result.image.monotonic)
         plan = planning.latest()
@@ -133,8 +138,10 @@ class Daemon:
             self._journal,
             clock=before.clock if before else None,
             state=before.cycle.state if before else None,
+            plc=before.plc if before and _same_registers(before.configuration, self.configuration) else None,
         )
-        control.plc.start()
+        if before is None or control.plc is not before.plc:
+            control.plc.start()
         return control
 
     async def _reload_now(self) -> None:
@@ -151,8 +158,9 @@ class Daemon:
         else:
             self.configuration = configuration
             self._configuration_problem = ""
-            await before.plc.close()
             self._control = self._begin(before)
+            if self._control.plc is not before.plc:
+                await before.plc.close()
             remember(self._control, self.services.store, budgets=False)
             self._journal.event("reloaded", path=str(configuration.path))
         self._notifier.ready()
@@ -205,6 +213,10 @@ class Daemon:
                 if rule.daily_budget is not None and name in points
             },
         )
+
+
+def _same_registers(old: Configuration, new: Configuration) -> bool:
+    return old.register_map == new.register_map
 
 
 def _refuse_what_needs_a_restart(old: Configuration, new: Configuration) -> None:

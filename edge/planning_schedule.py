@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from zoneinfo import ZoneInfo
@@ -19,7 +18,7 @@ from igrow_core.telemetry import Telemetry, read_csv
 log = logging.getLogger("igrow.edge")
 
 ESSENTIAL = ("air_temperature", "air_humidity", "air_co2")
-"""Where a plan starts from. Without one of them no new plan is made."""
+"""Where a plan starts from. While one that the plant measures cannot be believed, no new plan is made."""
 LEAST_HISTORY = 24 * 3600.0
 """Seconds of log that a plan needs: its weather is that of the last days."""
 RETRY = 900.0
@@ -84,19 +83,14 @@ class PlanningSchedule:
     def _obstacle(self, image: Image, bundle: ActiveBundle | None) -> str:
         if bundle is None:
             return "no plans without a bundle"
-        for name in self.unusable(image, ESSENTIAL):
-            value = image.value_of(name)
-            return f"no new plan while {name} is {value.quality.value}"
+        for name in ESSENTIAL:
+            if name in image.values and usable_for_planning(image.values[name]) is None:
+                return f"no new plan while {name} is {image.values[name].quality.value}"
         assert self._began is not None
         history = image.monotonic - self._began
         if history < LEAST_HISTORY:
             return f"the first plan needs a day of log: {(LEAST_HISTORY - history) / 3600:.0f} h more"
         return ""
-
-    @staticmethod
-    def unusable(image: Image, names: Collection[str]) -> list[str]:
-        """Return the names that no plan may start from."""
-        return [name for name in names if usable_for_planning(image.value_of(name)) is None]
 
     async def _beginning(self, image: Image) -> float:
         """Return the monotonic time at which the log of the last days begins."""

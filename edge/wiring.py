@@ -123,12 +123,16 @@ def build_control(
     *,
     clock: Clock | None = None,
     state: GuardState | None = None,
+    plc: RegisterPlc | None = None,
 ) -> Control:
-    """Build what runs the cycles; connects nothing yet. `state` is the guard's memory from before a reload."""
+    """Build what runs the cycles; connects nothing yet.
+
+    `clock`, `state` (the guard's memory) and, where the registers are the same, `plc` come from before a reload.
+    """
     file, site, rules = configuration.file, configuration.site, configuration.guard_rules
     interval = file.cycle.interval.total_seconds()
     respect_hand = file.cycle.respect_hand.total_seconds()
-    plc = RegisterPlc(configuration.register_map)
+    plc = plc or RegisterPlc(configuration.register_map)
     readable: RegisterPlc | FollowedPlant = plc
     pace: Pace
     if file.cycle.clock is ClockSource.SYSTEM:

@@ -172,6 +172,42 @@ async def test_a_reload_takes_a_good_configuration_and_keeps_the_last_good_one(t
     await plant.down()
 
 
+async def test_a_plant_that_runs_faster_than_time_is_followed_at_the_cycles_interval(tmp_path):
+    port = free_port()
+    path = write_files(tmp_path, port, clock="plc")
+    plant = Plant(tmp_path, port, pace=Realtime(1500.0))
+    await plant.up()
+    async with running(path) as daemon:
+        await until(lambda: daemon.cycles >= 8)
+        assert daemon.last.image.link_ok
+        spent = daemon.last.image.monotonic
+        assert spent / (daemon.cycles - 1) >= 300.0
+    await plant.down()
+    times = read_telemetry(tmp_path / "state" / "store", 0.0, 8e9).time
+    assert all(step >= 300 for step in (times[1:] - times[:-1]).astype(int))
+
+
+async def test_a_reload_of_the_same_registers_keeps_the_line(tmp_path):
+    port = free_port()
+    path = write_files(tmp_path, port)
+    plant = Plant(tmp_path, port)
+    await plant.up()
+    async with running(path) as daemon:
+        await until(lambda: daemon.cycles >= 5)
+        control = daemon._control
+        daemon.reload()
+        await until(lambda: daemon._control is not control)
+        assert daemon._control.plc is control.plc
+        control = daemon._control
+        (tmp_path / "map.yaml").write_text((tmp_path / "map.yaml").read_text().replace("0.5 s", "0.6 s"))
+        daemon.reload()
+        await until(lambda: daemon._control is not control)
+        assert daemon._control.plc is not control.plc
+        cycles = daemon.cycles
+        await until(lambda: daemon.cycles > cycles + 5 and daemon.last.image.link_ok)
+    await plant.down()
+
+
 async def test_the_watchdog_is_fed_by_completed_cycles_only(tmp_path):
     class Recorder:
         def __init__(self):
