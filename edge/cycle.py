@@ -86,10 +86,14 @@ class ControlCycle:
         statuses = self._statuses(decision.choices, image)
         return CycleResult(image, decision, verdict, statuses, time.perf_counter() - began)
 
-    async def stop(self) -> None:
-        """Write the safe setpoints, through the guard; the heartbeat then ends and the PLC falls back by itself."""
+    async def stop(self) -> bool:
+        """Write the safe setpoints, through the guard; tell whether the PLC could be reached.
+
+        The heartbeat then ends, and the PLC falls back by itself.
+        """
         image = await self._read(None)
         await self._guard_and_write({}, image, stopping=True)
+        return image.link_ok
 
     async def _read(self, names: Collection[str] | None) -> Image:
         readings = await self._plc.read(names)

@@ -7,6 +7,7 @@ import contextlib
 import logging
 import signal
 from collections.abc import Coroutine
+from datetime import UTC, datetime
 from pathlib import Path
 
 from edge.configuration import Configuration, load_configuration
@@ -123,7 +124,7 @@ class Daemon:
             self._plan = plan
             self._journal.event(
                 "plan",
-                start=plan.start,
+                start=datetime.fromtimestamp(plan.start, UTC).isoformat(),
                 bundle=plan.bundle,
                 expected_profit=plan.expected_profit,
                 recipe_profit=plan.recipe_profit,
@@ -170,10 +171,12 @@ class Daemon:
         control = self._control
         assert control is not None
         try:
-            await asyncio.wait_for(control.cycle.stop(), STOP_SECONDS)
-            self._journal.event("stopped", setpoints="safe values written")
+            reached = await asyncio.wait_for(control.cycle.stop(), STOP_SECONDS)
         except TimeoutError:
-            self._journal.event("stopped", setpoints="the PLC did not answer; its own fallback rules")
+            reached = False
+        try:
+            setpoints = "the safe ones were written" if reached else "the PLC does not answer, its own fallback rules"
+            self._journal.event("stopped", setpoints=setpoints)
         finally:
             await control.plc.close()
             await self.services.status.close()

@@ -43,6 +43,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--start", default=None, help="UTC time (default: the weather file's first, or 2020-01-15)")
     parser.add_argument("--days", type=float, default=365.0, help="how much weather to generate")
     parser.add_argument("--seed", type=int, default=1, help="of weather, disturbances and sensor noise")
+    parser.add_argument(
+        "--spread", type=float, default=0.0, help="how far the plant's parameters lie from the site's, relative"
+    )
     parser.add_argument("--fallback-after", type=float, default=900.0, help="plant seconds without heartbeat")
     parser.add_argument("--young", action="store_true", help="begin with a young crop")
     parser.add_argument(
@@ -62,6 +65,7 @@ def run(options: argparse.Namespace) -> int:
         seed=options.seed,
         effects=[parse_effect(text) for text in options.effect],
         young=options.young,
+        spread=options.spread,
     )
     asyncio.run(_serve(options, plant, register_map))
     return 0
@@ -76,6 +80,7 @@ def make_plant(
     seed: int,
     effects: list[HiddenEffect],
     young: bool = False,
+    spread: float = 0.0,
 ) -> VirtualGreenhouse:
     """Return the greenhouse that a site describes, under measured or generated weather. Raises IgrowError."""
     if start is not None:
@@ -86,8 +91,9 @@ def make_plant(
         place = WeatherClimate() if site is None else WeatherClimate(site.latitude, site.longitude)
         end = begin + np.timedelta64(int(days * 86_400), "s")
         weather = generate_weather(begin, end, seed=seed, climate=place)
+    parameters = GreenhouseParameters() if site is None else parameters_of(site)
     return VirtualGreenhouse(
-        GreenhouseParameters() if site is None else parameters_of(site), weather, begin,
+        parameters.varied(np.random.default_rng(seed), spread) if spread else parameters, weather, begin,
         effects=effects, seed=seed, crop="young" if young else "mature",
     )  # fmt: skip
 

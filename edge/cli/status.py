@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 import urllib.error
 import urllib.request
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 
 from edge.cli.common import add_configuration, configuration_of
+from edge.state_file import read_state
+from edge.wiring import STATUS_FILE
 from igrow_core.errors import IgrowError
 from igrow_core.quantities import QUANTITIES
 
@@ -26,8 +30,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Ask the daemon and print."""
-    port = options.port or configuration_of(options).file.status.port
-    state = fetch(port)
+    if options.port:
+        state = fetch(options.port)
+    else:
+        configuration = configuration_of(options)
+        try:
+            state = fetch(configuration.file.status.port)
+        except IgrowError as error:
+            state = last_state(configuration.state_folder / STATUS_FILE, error)
     if options.json:
         print(json.dumps(state, indent=1))
     else:
@@ -44,6 +54,15 @@ def fetch(port: int) -> dict[str, Any]:
         raise IgrowError(f"the daemon on port {port} says: {error.read().decode().strip()}") from None
     except (OSError, ValueError):
         raise IgrowError(f"no daemon answers on port {port} of this machine; is igrow-edge running?") from None
+
+
+def last_state(path: Path, reason: IgrowError) -> dict[str, Any]:
+    """Return the state that a daemon has left in its file, and warn that it is old; raises `reason` without one."""
+    left = read_state(path).get("state")
+    if not isinstance(left, dict):
+        raise reason
+    print(f"{reason}\nthe last state that it left:", file=sys.stderr)
+    return left
 
 
 def lines(state: Mapping[str, Any]) -> Iterator[str]:

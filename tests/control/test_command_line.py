@@ -101,6 +101,22 @@ def test_status_without_a_daemon_says_so(tmp_path, capsys):
     assert "is igrow-edge running?" in err
 
 
+async def test_status_of_a_stopped_daemon_is_the_last_state_it_left(tmp_path, capsys):
+    port = free_port()
+    path = write_files(tmp_path, port)
+    path.write_text(path.read_text().replace("port: 0", f"port: {free_port()}"))
+    plant = Plant(tmp_path, port)
+    await plant.up()
+    async with running(path) as daemon:
+        await until(lambda: daemon.cycles >= 5)
+    await plant.down()
+    capsys.readouterr()
+    code, out, err = call(capsys, "status", path)
+    assert code == 0
+    assert out.startswith("test-house: ")
+    assert "the last state that it left" in err
+
+
 async def test_backup_export_and_restore_go_round(tmp_path, capsys):
     port = free_port()
     path = write_files(tmp_path, port)
