@@ -13,8 +13,11 @@ from edge.registers.read_planner import Block, plan_reads, split
 _log = logging.getLogger(__name__)
 
 Content = tuple[int, ...]
-Results = dict[Point, tuple[Content | None, BusError | None, float]]
-"""What became of each point: its registers or bits, or the error, and when (monotonic seconds)."""
+Results = dict[str, tuple[Content | None, BusError | None, float]]
+"""What became of each point, by name: its registers or bits, or the error, and when (monotonic seconds)."""
+
+MOST_PLANS = 256
+"""Plans kept: one for each set of points that were ever due together."""
 
 ASK_REFUSED_AGAIN = 600.0
 """Seconds after which a point whose address was refused is asked for again: a PLC program may have been loaded."""
@@ -33,10 +36,10 @@ class BlockReader:
         self._monotonic = monotonic
         self._plans: dict[frozenset[str], tuple[Block, ...]] = {}
         self._pieces: dict[Block, tuple[Block, Block]] = {}
-        self._refused: dict[Point, tuple[float, AddressRefusedError]] = {}
+        self._refused: dict[str, tuple[float, AddressRefusedError]] = {}
 
     async def read(self, points: Iterable[Point]) -> Results:
-        """Return for every point its registers or bits, or the error, and the monotonic time of the answer."""
+        """Return for every point, by name, its registers or bits or the error, and the monotonic time of it."""
         results: Results = {}
         for block in self._plan(tuple(points)):
             await self._read_block(block, results)
@@ -45,6 +48,9 @@ class BlockReader:
     def _plan(self, points: tuple[Point, ...]) -> tuple[Block, ...]:
         key = frozenset(point.name for point in points)
         if key not in self._plans:
+            if len(self._plans) >= MOST_PLANS:
+                self._plans.clear()
+                self._pieces.clear()
             self._plans[key] = tuple(sorted(plan_reads(points, self._devices), key=_priority))
         return self._plans[key]
 
@@ -54,9 +60,9 @@ class BlockReader:
             for piece in known:
                 await self._read_block(piece, results)
             return
-        refused = self._refused.get(block.points[0])
+        refused = self._refused.get(block.points[0].name)
         if refused is not None and self._monotonic() < refused[0]:
-            results.update(dict.fromkeys(block.points, (None, refused[1], self._monotonic())))
+            results.update(dict.fromkeys(block.names, (None, refused[1], self._monotonic())))
             return
         device = self._devices[block.device]
         request = ReadRequest(device.device_id, block.function, block.address, block.count)
@@ -65,11 +71,11 @@ class BlockReader:
         except AddressRefusedError as error:
             await self._split_and_read(block, error, results)
         except BusError as error:
-            results.update(dict.fromkeys(block.points, (None, error, self._monotonic())))
+            results.update(dict.fromkeys(block.names, (None, error, self._monotonic())))
         else:
             at = self._monotonic()
             for point in block.points:
-                results[point] = (block.content_of(point, content), None, at)
+                results[point.name] = (block.content_of(point, content), None, at)
 
     async def _split_and_read(self, block: Block, error: AddressRefusedError, results: Results) -> None:
         try:
@@ -77,10 +83,10 @@ class BlockReader:
         except ValueError:
             again = self._monotonic() + ASK_REFUSED_AGAIN
             for point in block.points:
-                if point not in self._refused:
+                if point.name not in self._refused:
                     _log.warning("%s cannot be read: %s", point.name, error)
-                self._refused[point] = (again, error)
-                results[point] = (None, error, self._monotonic())
+                self._refused[point.name] = (again, error)
+                results[point.name] = (None, error, self._monotonic())
             return
         self._pieces[block] = pieces
         _log.info("%s: reading %s and %s apart from now on", error, *(piece.points[0].name for piece in pieces))

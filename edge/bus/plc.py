@@ -85,11 +85,14 @@ class RegisterPlc:
 
     async def read(self, names: Collection[str] | None = None) -> Mapping[str, Reading]:
         """Read the named points, or all whose poll period has passed, with as few requests as possible."""
-        points = self._due_points() if names is None else [self._point(name) for name in names]
-        shares: dict[str, list[Point]] = {}
-        for point in points:
-            shares.setdefault(self._bus_of[point.name], []).append(point)
         readings: dict[str, Reading] = {}
+        shares: dict[str, list[Point]] = {}
+        for name in self._due_names() if names is None else names:
+            point = self.register_map.points.get(name)
+            if point is None:
+                readings[name] = Reading(None, _unknown(name), self._monotonic())
+            else:
+                shares.setdefault(self._bus_of[name], []).append(point)
         jobs = [self._read_share(bus, share, readings) for bus, share in shares.items()]
         if len(jobs) == 1:
             await jobs[0]
@@ -103,7 +106,9 @@ class RegisterPlc:
         Raises UnknownPointError, ValueDoesNotFitError (nothing sent), or another BusError; its `sent` tells whether
         the write may have been done all the same. Range and pace are the guard's affair.
         """
-        point = self._point(name)
+        point = self.register_map.points.get(name)
+        if point is None:
+            raise _unknown(name)
         if not point.writable:
             raise UnknownPointError(f"{name}: the register map does not let it be written; `writable: true` would")
         device = self.register_map.devices[point.device]
@@ -115,30 +120,28 @@ class RegisterPlc:
         priority = Priority.HEARTBEAT if name == "heartbeat" else Priority.WRITE
         await self.buses[device.bus].write(request, priority)
 
-    def _point(self, name: str) -> Point:
-        try:
-            return self.register_map.points[name]
-        except KeyError:
-            raise UnknownPointError(f"{name}: the register map has no such point") from None
-
-    def _due_points(self) -> list[Point]:
+    def _due_names(self) -> list[str]:
         now = self._monotonic()
-        due = []
+        due: list[str] = []
         for point in self.register_map.points.values():
             if point.poll > 0:
                 if now < self._due.get(point.name, now):
                     continue
                 self._due[point.name] = now + POLL_SLACK * point.poll
-            due.append(point)
+            due.append(point.name)
         return due
 
     async def _read_share(self, bus: str, points: list[Point], readings: dict[str, Reading]) -> None:
         contents = await self._readers[bus].read(points)
         for point in points:
-            content, error, at = contents[point]
+            content, error, at = contents[point.name]
             value = None
             if content is not None:
                 value = decode(point, content)
                 if value is None:
                     error = NoValueError(f"{point.name}: the device says that it has no value")
             readings[point.name] = Reading(value, error, at)
+
+
+def _unknown(name: str) -> UnknownPointError:
+    return UnknownPointError(f"{name}: the register map has no such point")

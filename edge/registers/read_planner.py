@@ -9,9 +9,9 @@ from itertools import groupby
 from edge.registers.model import Device, Function, Point
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Block:
-    """One read request and the points that its answer serves."""
+    """One read request and the points that its answer serves. Two blocks are the same if they are one object."""
 
     device: str
     function: Function
@@ -19,6 +19,11 @@ class Block:
     count: int
     points: tuple[Point, ...]
     """In the order of their addresses; never empty."""
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the points."""
+        return [point.name for point in self.points]
 
     def content_of(self, point: Point, content: tuple[int, ...]) -> tuple[int, ...]:
         """Cut one point's registers or bits out of the whole block's answer."""

@@ -162,6 +162,13 @@ def test_a_device_that_has_no_value_says_so() -> None:
     assert isinstance(reading.error, NoValueError)
 
 
+def test_a_name_that_the_map_does_not_have_costs_the_others_nothing() -> None:
+    plc, _, _, _ = make()
+    readings = run(plc.read(["air_temperature", "sky_temperature"]))
+    assert readings["air_temperature"].value == 0.0
+    assert isinstance(readings["sky_temperature"].error, UnknownPointError)
+
+
 def test_a_write_is_encoded_and_goes_before_reads_and_the_heartbeat_after_writes() -> None:
     plc, net, _, _ = make()
     run(plc.write("heating_setpoint", 21.5))

@@ -206,9 +206,7 @@ async def test_libmodbus_is_read_and_written(transport: Transport, tmp_path: Pat
 
 
 @LINES
-async def test_libmodbus_misbehaviour_is_seen_and_the_next_answer_is_right(
-    transport: Transport, tmp_path: Path
-) -> None:
+async def test_libmodbus_misbehaviour_is_seen_and_costs_one_answer(transport: Transport, tmp_path: Path) -> None:
     async with libmodbus_bus(transport, tmp_path) as bus:
         await bus.write(WriteRequest(17, Function.HOLDING, 0x160, (1, 2, 3)), Priority.WRITE)
         bad: list[tuple[int, int, type[BusError] | tuple[type[BusError], ...]]] = [
