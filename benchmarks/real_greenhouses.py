@@ -73,6 +73,15 @@ def test_errors(
             begin=begin,
             every=every,
         )
+    if model.combinations:
+        found["hybrid, combined"] = errors_of(
+            house.record,
+            model.combined_predictor(house.record, house.setpoints),
+            HORIZONS,
+            rows,
+            begin=begin,
+            every=every,
+        )
     return found
 
 
@@ -178,8 +187,8 @@ def weekly(house: Greenhouse, every: float, first: int = 8) -> dict[str, object]
     covered, totals = [], []
     count = int(house.week[-1]) + 1
     for test in range(first, count):
-        fit = (house.week >= test - 6) & (house.week < test)
-        selection = (house.week >= test - 8) & (house.week < test - 6)
+        fit = (house.week >= test - 8) & (house.week < test - 2)
+        selection = (house.week >= test - 2) & (house.week < test)
         model = house.fit(fit, selection)
         begin, rows = house.week == test, house.week >= test
         for name, errors in test_errors(house, model, rows, begin, every).items():

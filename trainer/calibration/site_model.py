@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from trainer.calibration.actuation import fit_actuation, refine_actuation
 from trainer.calibration.disturbance import fit_disturbance
 from trainer.calibration.evaluation import evaluate, run_fluxes, starts_within
 from trainer.calibration.fit import calibrate
+from trainer.calibration.forecast import Combination, combined, fit_combination
 from trainer.calibration.posterior import Posterior
 from trainer.calibration.remainder import Remainder, fit_remainder
 
@@ -52,6 +53,10 @@ class SiteModel:
     """By quantity, of runs driven by measured actuators."""
     closed_growth: Mapping[str, ErrorGrowth]
     """By quantity, of runs driven by setpoints."""
+    combinations: Mapping[str, Combination]
+    """By quantity, how forecasts combine both ways to run."""
+    combined_growth: Mapping[str, ErrorGrowth]
+    """By quantity, of combined forecasts."""
     range: TrainingRange
 
     def added(self, record: Record) -> dict[str, Floats]:
@@ -83,6 +88,12 @@ class SiteModel:
             return closed_run(record, states, setpoints, starts, steps, values, self.effects, dict(self.rules), fluxes)
 
         return predict
+
+    def combined_predictor(
+        self, record: Record, setpoints: Mapping[str, Floats]
+    ) -> Callable[[NDArray[np.int64], int], Mapping[str, Floats]]:
+        """Return `predict(starts, steps)`: both ways to run combined, their usual errors taken off."""
+        return combined(record, self.predictor(record), self.closed_predictor(record, setpoints), self.combinations)
 
 
 def fit_site(
@@ -125,12 +136,22 @@ def fit_site(
     table = {
         name: np.concatenate([_driver(part[0], part[1], name)[part[2]] for part in parts]) for name in RANGE_DRIVERS
     }
-    model = SiteModel(posterior, effects, remainder, disturbance, rules, {}, {}, training_range(_complete(table)))
-    growth = _growth([(part[0], part[3], model.predictor(part[0])) for part in parts])
-    closed = (
-        _growth([(part[0], part[3], model.closed_predictor(part[0], part[1])) for part in parts]) if actuation else {}
+    model = SiteModel(
+        posterior, effects, remainder, disturbance, rules, {}, {}, {}, {}, training_range(_complete(table))
     )
-    return SiteModel(posterior, effects, remainder, disturbance, rules, growth, closed, model.range)
+    model = replace(model, growth=_growth([(part[0], part[3], model.predictor(part[0])) for part in parts]))
+    if not actuation:
+        return model
+    closed = [(part[0], part[3], model.closed_predictor(part[0], part[1])) for part in parts]
+    record, selection, by_setpoints = closed[0]
+    steps = round(86_400.0 / record.step)
+    starts = starts_within(record, selection, steps, round(10_500.0 / record.step))
+    model = replace(model, closed_growth=_growth(closed))
+    if len(starts) == 0:
+        return model
+    by_actuators = model.predictor(record)
+    model = replace(model, combinations=fit_combination(record, by_actuators, by_setpoints, starts, steps))
+    return replace(model, combined_growth=_growth([(record, selection, model.combined_predictor(record, parts[0][1]))]))
 
 
 def _choose_remainder(

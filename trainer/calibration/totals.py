@@ -11,7 +11,9 @@ from igrow_core.simulator.closed_loop import pipe_heat
 from igrow_core.simulator.hybrid import climate
 from igrow_core.simulator.hybrid import record as records
 from igrow_core.simulator.hybrid.record import Record
+from igrow_core.simulator.uncertainty import ErrorGrowth
 from trainer.calibration.evaluation import starts_within
+from trainer.calibration.forecast import Predictor
 from trainer.calibration.site_model import SiteModel
 
 Floats = NDArray[np.float64]
@@ -66,9 +68,13 @@ def coverage(
     By (what drove the run, "quantity horizon"): at 1 h, over 24 h, over 7 days.
     """
     found: dict[tuple[str, str], tuple[float, float]] = {}
-    driven = [("actuators", model.predictor(record), model.growth)]
+    driven: list[tuple[str, Predictor, Mapping[str, ErrorGrowth]]] = [
+        ("actuators", model.predictor(record), model.growth)
+    ]
     if model.rules:
         driven.append(("setpoints", model.closed_predictor(record, setpoints), model.closed_growth))
+    if model.combinations:
+        driven.append(("combined", model.combined_predictor(record, setpoints), model.combined_growth))
     for how, predict, growth in driven:
         for horizon, hours, every in (("1_h", 1.0, 7500.0), ("24_h", 24.0, 18_900.0), ("7_d", 168.0, 40_500.0)):
             steps = round(hours * 3600.0 / record.step)
@@ -78,7 +84,7 @@ def coverage(
             if len(starts) == 0:
                 continue
             following = starts + 1 + np.arange(steps)[:, None]
-            lead = ((np.arange(steps) + 1.0) * (record.step / 3600.0))[:, None]
+            lead: Floats = np.arange(1.0, steps + 1.0)[:, None] * (record.step / 3600.0)
             sun = record.inputs["global_radiation"][following]
             for quantity, predicted in predict(starts, steps).items():
                 if quantity not in growth or quantity not in record.measured:

@@ -1,0 +1,111 @@
+"""Forecasts made of the simulator's runs: the usual error of the hour taken off, and two ways to run it combined.
+
+Model output statistics (Glahn and Lowry (1972), J. Appl. Meteor. 11, 1203-1211): what runs of the last days
+missed at the same hour is expected again in part. Combined forecasts (Bates and Granger (1969), Operational
+Research Quarterly 20, 451-468): the run driven by measured actuators knows what the PLC did, the run driven by
+setpoints knows what it wants; their errors differ. Shares and weights are fitted on selection days.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow_core.simulator.hybrid.record import Record
+
+Floats = NDArray[np.float64]
+Predictor = Callable[[NDArray[np.int64], int], Mapping[str, Floats]]
+"""`predict(starts, steps)` -> by quantity, (steps, s)."""
+
+_DAYS = 6
+"""Days that are looked back for the usual error."""
+_MEMORY = 3.0
+"""Days after which a past day has lost 63 % of its weight."""
+
+
+@dataclass(frozen=True)
+class Combination:
+    """How the forecasts of one quantity are made from runs by measured actuators and by setpoints."""
+
+    actuators_share: float
+    """Part of the usual error of runs by actuators that is expected again."""
+    setpoints_share: float
+    """The same of runs by setpoints."""
+    setpoints_weight: float
+    """Weight of the corrected run by setpoints; the other has the rest."""
+
+
+def usual_error(record: Record, predict: Predictor, starts: NDArray[np.int64], steps: int) -> dict[str, Floats]:
+    """Return what runs one to `_DAYS` days before each start missed at the same hour, by quantity, (steps, s).
+
+    Measured minus predicted, a weighted mean; 0 where there was no run. Only rows up to the start are used.
+    """
+    day = round(86_400.0 / record.step)
+    length = min(steps, day)
+    following = 1 + np.arange(length)[:, None]
+    total = {name: np.zeros((length, len(starts))) for name in record.measured}
+    weights = {name: np.zeros((length, len(starts))) for name in record.measured}
+    for back in range(1, _DAYS + 1):
+        there = starts - back * day >= 0
+        past = np.where(there, starts - back * day, 0)
+        weight = float(np.exp(-(back - 1) / _MEMORY))
+        for name, predicted in predict(past, length).items():
+            if name in total:
+                error = record.measured[name][past + following] - predicted
+                known = np.isfinite(error) & there
+                total[name] += weight * np.where(known, error, 0.0)
+                weights[name] += weight * known
+    repeat = np.arange(steps) % day
+    return {name: (total[name] / np.maximum(weights[name], 1e-9))[repeat] for name in total}
+
+
+def fit_combination(
+    record: Record, by_actuators: Predictor, by_setpoints: Predictor, starts: NDArray[np.int64], steps: int
+) -> dict[str, Combination]:
+    """Return the combinations that had the smallest errors from `starts` (on selection days)."""
+    following = starts + 1 + np.arange(steps)[:, None]
+    one, other = by_actuators(starts, steps), by_setpoints(starts, steps)
+    usual_one = usual_error(record, by_actuators, starts, steps)
+    usual_other = usual_error(record, by_setpoints, starts, steps)
+    result = {}
+    for name, values in record.measured.items():
+        measured = values[following]
+        known = np.isfinite(measured)
+        if not known.any():
+            continue
+        first, second = (
+            _share((measured - run[name])[known], usual[name][known])
+            for run, usual in ((one, usual_one), (other, usual_other))
+        )
+        error_one = (measured - one[name] - first * usual_one[name])[known]
+        error_other = (measured - other[name] - second * usual_other[name])[known]
+        # measured = one + weight (other - one): a regression of error_one on error_one - error_other.
+        result[name] = Combination(first, second, _share(error_one, error_one - error_other))
+    return result
+
+
+def combined(
+    record: Record, by_actuators: Predictor, by_setpoints: Predictor, combinations: Mapping[str, Combination]
+) -> Predictor:
+    """Return the combined predictor."""
+
+    def predict(starts: NDArray[np.int64], steps: int) -> dict[str, Floats]:
+        one, other = by_actuators(starts, steps), by_setpoints(starts, steps)
+        usual_one = usual_error(record, by_actuators, starts, steps)
+        usual_other = usual_error(record, by_setpoints, starts, steps)
+        return {
+            name: (1.0 - how.setpoints_weight) * (one[name] + how.actuators_share * usual_one[name])
+            + how.setpoints_weight * (other[name] + how.setpoints_share * usual_other[name])
+            for name, how in combinations.items()
+        }
+
+    return predict
+
+
+def _share(target: Floats, regressor: Floats) -> float:
+    """Return the least-squares factor of `regressor`, within 0 to 1."""
+    power = float(np.sum(regressor**2))
+    return float(np.clip(np.sum(target * regressor) / power, 0.0, 1.0)) if power > 0.0 else 0.0
