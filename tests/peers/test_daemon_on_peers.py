@@ -99,7 +99,7 @@ async def test_the_control_cycle_runs_on(peer: str, tmp_path: Path) -> None:
             respect_hand=0.0,
         )
         images = [(await cycle.run()).image for _ in range(3)]
-    assert images[-1].value_of("air_temperature").value == pytest.approx(TEMPERATURE[peer.split()[0]])
+    assert images[-1].value_of("air_temperature").value == pytest.approx(TEMPERATURE[peer.split(maxsplit=1)[0]])
     assert images[-1].value_of("heating_setpoint").value == pytest.approx(28.0)  # asked for 99, held to the limit
     beats = [image.value_of("heartbeat").value for image in images]
     assert len(set(beats)) == 3
