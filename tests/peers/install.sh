@@ -10,10 +10,8 @@ missing=""
 for package in mbpoll socat libmodbus-dev gcc pkg-config; do
     dpkg -s "$package" >/dev/null 2>&1 || missing="$missing $package"
 done
-for tool in node npm; do
-    command -v "$tool" >/dev/null 2>&1 || missing="$missing ${tool}js"
-done
-missing=$(echo "$missing" | sed 's/npmjs/npm/')
+command -v node >/dev/null 2>&1 || missing="$missing nodejs"
+command -v npm >/dev/null 2>&1 || missing="$missing npm"
 if [ -n "$missing" ]; then
     $as_root apt-get update -qq
     # shellcheck disable=SC2086 - a list of names
