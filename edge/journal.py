@@ -49,7 +49,8 @@ class Journal:
     def event(self, kind: str, **detail: object) -> None:
         """Write down an event."""
         self._store.record_event(self._time, kind, detail)
-        log.info("%s: %s", kind, ", ".join(f"{key} {value}" for key, value in detail.items()))
+        told = (f"{key.replace('_', ' ')} {_told(value)}" for key, value in detail.items() if value not in ("", None))
+        log.info("%s: %s", kind.replace("_", " "), ", ".join(told))
 
     def telemetry(self, image: Image) -> None:
         """Write down the values of one image, and those that waited for a date."""
@@ -135,6 +136,10 @@ class Journal:
         record = WriteRecord(self._time, self._monotonic, point, requested, applied, source, reason, outcome)
         self._store.record_write(record)
         return record
+
+
+def _told(value: object) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _number(value: float | None) -> str:
