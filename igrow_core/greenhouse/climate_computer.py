@@ -3,7 +3,7 @@
 Heating: a pipe temperature from the difference to the setpoint (proportional and integral) and from the outdoor
 temperature, reached by a mixing valve. Ventilation: lee vents before wind vents, by a proportional band above
 the ventilation temperature (heating setpoint plus an offset) and by humidity, closed in frost and storm. Energy
-screen by outdoor temperature and radiation, with a gap for moisture; blackout screen while lamps burn at night.
+screen by heat demand and radiation, with a gap for moisture; blackout screen while lamps burn at night.
 Lamps by request below a radiation limit. CO2 by a proportional band, stopped by wide vents. Irrigation pulses by
 radiation sum. The rules are those of climate computers as De Zwart (1996, chapter 3) describes them.
 """
@@ -46,17 +46,19 @@ class ClimateComputer:
     """Excess of the grow pipe over that of the rail, 1."""
     valve_time: float = 400.0
     """Time in which a mixing valve brings its pipe to the asked temperature, s."""
-    ventilation_offset: float = 2.0
+    ventilation_offset: float = 1.0
     """Ventilation begins so far above the heating setpoint, K."""
-    ventilation_band: float = 6.0
+    ventilation_band: float = 8.0
     """Proportional band of the lee vents at 15 degC outdoors, K; 0.25 K wider for each degree below."""
     wind_vent_delay: float = 0.5
     """Opening of the lee vents, 0 to 1, at which the wind vents begin."""
-    humidity_start: float = 84.0
+    ventilation_minimum: float = 0.0
+    """Opening that the lee vents never go below, 0 to 1."""
+    humidity_start: float = 86.0
     """Relative humidity at which vents open for moisture, %."""
     humidity_band: float = 12.0
     """Band over which they open to `humidity_opening`, %."""
-    humidity_opening: float = 0.35
+    humidity_opening: float = 0.25
     """Largest opening for moisture, 0 to 1."""
     frost_limit: float = 0.0
     """Below this outdoor temperature the vents keep to a tenth, degC."""
@@ -68,8 +70,10 @@ class ClimateComputer:
     """Seconds for the full travel of a screen."""
     screen_radiation: float = 40.0
     """Global radiation above which the energy screen opens, W m-2 (20 more or less is its hysteresis)."""
-    screen_outdoor: float = 12.0
-    """Outdoor temperature above which the energy screen stays open, degC (1 K hysteresis)."""
+    screen_difference: float = 10.0
+    """The energy screen closes where the heating setpoint is so far above outdoors, K (1 K hysteresis)."""
+    screen_under_lamps: float = 1.0
+    """1: the energy screen may be closed while lamps burn; 0: it may not."""
     screen_moisture_gap: float = 0.04
     """Gap of a closed screen at high humidity, 0 to 1."""
     blackout_radiation: float = 5.0
@@ -82,6 +86,8 @@ class ClimateComputer:
     """Proportional band of CO2 dosing, ppm."""
     co2_vent_stop: float = 0.5
     """Mean vent opening at which dosing has stopped, 0 to 1; it begins to fall at a fifth of it."""
+    co2_needs_light: float = 1.0
+    """1: CO2 is dosed while sun or lamps shine; 0: in the dark too."""
     pulse_radiation: float = 0.8e6
     """Radiation sum, lamps included, between two irrigation pulses, J m-2."""
     pulse_rest: float = 3.0
@@ -198,7 +204,7 @@ def control(
     band = s.ventilation_band + 0.25 * xp.maximum(15.0 - outdoor, 0.0)
     by_temperature = clip(xp, (air - setpoint - s.ventilation_offset) / band, 0.0, 2.0)
     by_humidity = s.humidity_opening * clip(xp, (humidity - s.humidity_start) / s.humidity_band, 0.0, 1.0)
-    demand = xp.maximum(by_temperature, by_humidity)
+    demand = xp.maximum(xp.maximum(by_temperature, by_humidity), s.ventilation_minimum)
     frost = ramp(xp, outdoor, s.frost_limit - 2.0, s.frost_limit)
     storm = ramp(xp, seen.wind_speed, s.wind_limit + 5.0, s.wind_limit)
     largest_lee = (0.1 + 0.9 * frost) * (0.5 + 0.5 * storm)
@@ -213,8 +219,8 @@ def control(
     lamp_allowed = (radiation < limit) * 1.0
     lamp = lamp_allowed * clip(xp, setpoints.get("lamp_on", SAFE_SETPOINTS["lamp_on"]), 0.0, 1.0)
     dark = radiation < s.screen_radiation + 40.0 * (before.screen_wanted - 0.5)
-    cold = outdoor < s.screen_outdoor + 2.0 * (before.screen_wanted - 0.5)
-    screen_wanted = dark * cold * 1.0
+    cold = setpoint - outdoor > s.screen_difference - 2.0 * (before.screen_wanted - 0.5)
+    screen_wanted = dark * cold * (1.0 - (1.0 - s.screen_under_lamps) * (lamp > 0.0))
     moisture = s.screen_moisture_gap * ramp(xp, humidity, 82.0, 92.0)
     # Vents that work for temperature need a screen that lets the air through.
     warmth = ramp(xp, air - setpoint, s.ventilation_offset + 1.0, s.ventilation_offset + 3.0)
@@ -228,7 +234,7 @@ def control(
     missing = setpoints.get("co2_setpoint", SAFE_SETPOINTS["co2_setpoint"]) - seen.air_co2
     opening = 0.5 * (vent_lee + vent_wind)
     light = clip(xp, (radiation - 5.0) / 15.0, 0.0, 1.0)
-    lit = xp.maximum(light, (lamp > 0.0) * 1.0)
+    lit = xp.maximum(xp.maximum(light, (lamp > 0.0) * 1.0), 1.0 - s.co2_needs_light)
     dosing = (
         p.co2_capacity
         * clip(xp, missing / s.co2_band, 0.0, 1.0)

@@ -34,7 +34,7 @@ class GreenhouseParameters:
     """Height of the air below the screens, m [C]."""
     top_height: Number = 0.8
     """Height of the air above the screens, m [C]."""
-    cover_area: Number = 1.35
+    cover_area: Number = 1.15
     """Area of cover and outer walls per floor area, 1 [C]: a compartment between others, with glass roof."""
 
     # Light
@@ -116,7 +116,7 @@ class GreenhouseParameters:
     """Temperature of the soil below 1.5 m, degC [V]."""
 
     # Ventilation
-    leakage: Number = 1.2e-4
+    leakage: Number = 1.0e-4
     """Leakage for each m s-1 of wind, m3 m-2 s-1 [V] 1e-4."""
     vent_area: Number = 0.12
     """Area of the vents of one side per floor area, 1 [C]."""
@@ -156,8 +156,8 @@ class GreenhouseParameters:
     """Upper limit of the stomatal resistance, s m-1 [C] after [S]."""
     floor_wetness: Number = 0.03
     """Fraction of a wet surface's evaporation that floor and substrate give off, 1 [C]."""
-    electron_transport: Number = 185.0
-    """Largest electron transport at 25 degC, umol s-1 per m2 of leaf [V] 210."""
+    electron_transport: Number = 90.0
+    """Largest electron transport at 25 degC, umol s-1 per m2 of leaf [V] 210, which is for a young leaf [C]."""
 
     # Crop
     stem_density: Number = 3.9
@@ -170,8 +170,8 @@ class GreenhouseParameters:
     """Leaf area index to which the crop is deleafed, 1 [V]."""
     deleafing_interval: Number = 7.0
     """Days between two deleafings."""
-    fruit_growth: Number = 0.328e-6
-    """Potential growth of all fruits at 20 degC, kg m-2 s-1 [V]."""
+    fruit_growth: Number = 0.22e-6
+    """Potential growth of all fruits at 20 degC, kg m-2 s-1 [V] 0.328e-6 for round tomato; less in cherry [C]."""
     leaf_growth: Number = 0.095e-6
     """Potential growth of all leaves, kg m-2 s-1 [V]."""
     stem_growth: Number = 0.074e-6

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from igrow_core.air import co2_fraction, saturation_pressure
+from igrow_core.errors import IgrowError
 from igrow_core.greenhouse import books, canopy, climate, observation, tomato, ventilation
 from igrow_core.greenhouse.climate import Climate, Conditions
 from igrow_core.greenhouse.climate_computer import ClimateComputer, at_rest, control
@@ -23,6 +24,7 @@ from igrow_core.greenhouse.namespace import Array, clip, namespace
 from igrow_core.greenhouse.parameters import GreenhouseParameters
 from igrow_core.greenhouse.sensors import Sensors
 from igrow_core.greenhouse.state import PlantState, add
+from igrow_core.greenhouse.tomato import Crop
 from igrow_core.greenhouse.weather_table import WeatherTable
 
 __all__ = ["SCAN", "SLOW", "TICK", "Plant", "PlantState"]
@@ -49,7 +51,7 @@ class Plant:
         disturbances: Disturbances | None = None,
         sensors: Sensors | None = None,
         computer: ClimateComputer | None = None,
-        crop: str = "mature",
+        crop: str | Crop = "mature",
         seed: int = 0,
         tick: float = TICK,
         initial: Climate | None = None,
@@ -66,7 +68,7 @@ class Plant:
         self._innovated = any((self.disturbances.heat, self.disturbances.vapour, self.disturbances.co2))
         like: Array = 1.0 if count is None else np.ones(count)
         now = weather.at(start)
-        grown = (tomato.mature_crop if crop == "mature" else tomato.young_crop)(parameters, like)
+        grown = _planted(parameters, crop, like)
         rest = climate.initial(self.xp, 19.0 * like, 75.0 * like, 550.0 * like, now.outdoor_temperature * like)
         crop_rates = tomato.rates(self.xp, parameters, grown, 19.0 * like)
         self.state = PlantState(
@@ -269,6 +271,15 @@ class Plant:
         """Take up a saved state; the plant goes on exactly as it would have."""
         self.state = copy.deepcopy(state)
         self._area = tomato.leaf_area_index(self.parameters, self.state.crop)
+
+
+def _planted(parameters: GreenhouseParameters, crop: str | Crop, like: Array) -> Crop:
+    if isinstance(crop, Crop):
+        return crop
+    kinds = {"mature": tomato.mature_crop, "young": tomato.young_crop}
+    if crop not in kinds:
+        raise IgrowError(f"plant: the crop is {crop!r}; it must be one of {', '.join(kinds)}")
+    return kinds[crop](parameters, like)
 
 
 def _guided(state: Climate) -> tuple[Array, ...]:

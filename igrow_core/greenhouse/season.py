@@ -16,6 +16,7 @@ from igrow_core.greenhouse.hidden import HiddenEffect
 from igrow_core.greenhouse.parameters import GreenhouseParameters, stack
 from igrow_core.greenhouse.plant import TICK, Plant
 from igrow_core.greenhouse.sensors import Sensors
+from igrow_core.greenhouse.tomato import Crop
 from igrow_core.greenhouse.weather_table import WeatherTable
 from igrow_core.quantities import QUANTITIES, SETPOINTS
 from igrow_core.sun import unix_seconds
@@ -60,7 +61,7 @@ def simulate(
     computer: ClimateComputer | None = None,
     step: int = 300,
     tick: float = TICK,
-    crop: str = "mature",
+    crop: str | Crop = "mature",
 ) -> Season:
     """Run one greenhouse from `start` to `end` (UTC) and return its log.
 
@@ -77,7 +78,7 @@ def simulate(
         computer: settings of the PLC.
         step: seconds between rows.
         tick: longest step of the climate, s.
-        crop: "mature" or "young".
+        crop: "mature", "young", or a state of the crop.
 
     Raises:
         IgrowError: where weather or setpoints do not cover the time.
@@ -104,7 +105,7 @@ def simulate_many(
     computer: ClimateComputer | None = None,
     step: int = 300,
     tick: float = TICK,
-    crop: str = "mature",
+    crop: str | Crop = "mature",
 ) -> list[Season]:
     """Run a batch of `count` greenhouses at once; arguments as in `simulate`.
 

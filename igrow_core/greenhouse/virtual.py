@@ -13,6 +13,7 @@ from igrow_core.greenhouse.parameters import GreenhouseParameters
 from igrow_core.greenhouse.plant import Plant
 from igrow_core.greenhouse.sensors import Sensors
 from igrow_core.greenhouse.state import PlantState
+from igrow_core.greenhouse.tomato import Crop
 from igrow_core.greenhouse.weather_table import WeatherTable
 from igrow_core.sun import unix_seconds
 from igrow_core.telemetry import Telemetry
@@ -30,7 +31,7 @@ class VirtualGreenhouse:
         disturbances: unmodelled fluxes; the default ones if None.
         sensors: sensor noise; the default ones if None.
         computer: settings of the PLC.
-        crop: "mature" or "young".
+        crop: "mature", "young", or a state of the crop.
     """
 
     def __init__(
@@ -44,7 +45,7 @@ class VirtualGreenhouse:
         disturbances: Disturbances | None = None,
         sensors: Sensors | None = None,
         computer: ClimateComputer | None = None,
-        crop: str = "mature",
+        crop: str | Crop = "mature",
     ) -> None:
         self._plant = Plant(
             parameters, WeatherTable(weather), float(unix_seconds(start)), effects=effects, seed=seed,

@@ -49,7 +49,7 @@ def test_lee_vents_open_before_wind_vents() -> None:
 
 
 def test_moist_air_opens_the_vents() -> None:
-    assert settle(MILD._replace(air_humidity=95.0)).vent_lee > 0.2
+    assert settle(MILD._replace(air_humidity=95.0)).vent_lee > 0.15
 
 
 def test_a_storm_shuts_the_wind_vents_and_frost_almost_all() -> None:
