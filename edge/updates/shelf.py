@@ -45,20 +45,23 @@ class Shelf:
         try:
             partial.mkdir(parents=True)
             _unpack(archive, partial)
-            return self._place(partial)
+            return self._place(partial, own_site=True)
         except (OSError, tarfile.TarError) as error:
             raise UpdateError(f"{archive.name}: cannot be unpacked: {error}") from None
         finally:
             shutil.rmtree(partial, ignore_errors=True)
 
     def put_folder(self, folder: Path) -> Bundle:
-        """Check a bundle that an operator gives as a folder, and copy it; raises like `put`."""
+        """Check a bundle that an operator gives as a folder, and copy it; raises like `put`.
+
+        It may be made for another site: a gateway begins with a default bundle until it has one of its own.
+        """
         partial = self._folder / ".partial"
         shutil.rmtree(partial, ignore_errors=True)
         try:
             read_bundle(folder)  # before copying: a wrong folder could be anything
             shutil.copytree(folder, partial)
-            return self._place(partial)
+            return self._place(partial, own_site=False)
         except OSError as error:
             raise UpdateError(f"{folder}: cannot be copied: {error}") from None
         finally:
@@ -70,8 +73,10 @@ class Shelf:
             if path.is_dir() and path.name not in identities:
                 shutil.rmtree(path, ignore_errors=True)
 
-    def _place(self, partial: Path) -> Bundle:
+    def _place(self, partial: Path, *, own_site: bool) -> Bundle:
         bundle = read_bundle(partial)
+        if own_site and bundle.manifest.site != self._site:
+            raise RefusedError(f"{bundle.label}: made for site {bundle.manifest.site}, this gateway is {self._site}")
         self._check(bundle)
         self_test(bundle)
         final = self.path(bundle.identity)
@@ -83,8 +88,6 @@ class Shelf:
     def _check(self, bundle: Bundle) -> None:
         """Refuse a bundle that is not meant for this gateway."""
         manifest = bundle.manifest
-        if manifest.site != self._site:
-            raise RefusedError(f"{bundle.label}: made for site {manifest.site}, this gateway is {self._site}")
         if _version(manifest.igrow_version) > _version(self._version):
             raise RefusedError(
                 f"{bundle.label}: made by igrow {manifest.igrow_version}, newer than {self._version} here; "

@@ -40,6 +40,7 @@ def test_thirty_days_grow_neither_memory_nor_file_handles(tmp_path: Path) -> Non
             port = json.loads((plant.state / "status.json").read_text())["port"]
             with urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=10) as answer:
                 assert answer.status == 200
+        print("memory by day, MB:", " ".join(f"{value / 1e6:.1f}" for value in memory))
         slope = float(np.polyfit(np.arange(len(memory)), memory, 1)[0])
         print(
             f"30 days: memory {memory[0] / 1e6:.1f} -> {memory[-1] / 1e6:.1f} MB, {slope / 1e3:.1f} kB a day; "

@@ -227,7 +227,6 @@ def test_an_archive_with_anything_but_plain_files_is_refused(tmp_path: Path, cha
 @pytest.mark.parametrize(
     ("options", "gateway", "message"),
     [
-        ({"site": "elsewhere"}, {}, "made for site elsewhere, this gateway is demo"),
         ({}, {"igrow_version": "0.0.9"}, "made by igrow 0.1.0, newer than 0.0.9 here"),
         ({"golden_offset": 5.5}, {}, "self-test failed"),
         ({"quantity": "outdoor_humidity"}, {}, "outdoor_humidity in degC, expected %"),
@@ -239,6 +238,18 @@ def test_a_bundle_that_is_not_for_this_gateway_is_refused(tmp_path: Path, option
     with pytest.raises((UpdateError, BundleError), match=message):
         shelf.put_folder(bundle.folder)
     assert list((tmp_path / "shelf").iterdir()) == []
+
+
+def test_a_bundle_of_another_site_is_refused_from_the_exchange_but_not_from_the_operator(tmp_path: Path) -> None:
+    bundle = write_tiny_bundle(tmp_path / "made", site="elsewhere")
+    archive = tmp_path / "demo.tar"
+    with tarfile.open(archive, "w") as tar:
+        for path in bundle.folder.iterdir():
+            tar.add(path, arcname=path.name)
+    shelf = Shelf(tmp_path / "shelf", site="demo", igrow_version="0.1.0")
+    with pytest.raises(UpdateError, match="made for site elsewhere, this gateway is demo"):
+        shelf.put(archive)
+    assert shelf.put_folder(bundle.folder).identity == bundle.identity
 
 
 def test_the_trainer_does_not_publish_a_bundle_that_fails_its_self_test(world: World) -> None:
