@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import logging
 import signal
-from collections.abc import Coroutine
+from collections.abc import Coroutine, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -101,14 +101,31 @@ class Daemon:
         self.cycles += 1
         image = result.image
         control.holds.keep(control.cycle.readback.held(image.monotonic), image.true_time)
-        self.services.updates.tick(image.true_time)
-        if self.services.exchange is not None:
-            self.services.exchange.tick(image.true_time)
-        await self._plan_ahead(control, result)
-        if control.lockstep and self.services.updates.busy:
-            await self._unless_stopped(self.services.updates.wait(LOCKSTEP_WAIT))
-        self.services.status.publish(self._snapshot(control, result))
+        with self._contained("updates"):
+            self.services.updates.tick(image.true_time)
+            if control.lockstep and self.services.updates.busy:
+                await self._unless_stopped(self.services.updates.wait(LOCKSTEP_WAIT))
+        with self._contained("exchange"):
+            if self.services.exchange is not None:
+                self.services.exchange.tick(image.true_time)
+        with self._contained("planning"):
+            await self._plan_ahead(control, result)
+        with self._contained("status"):
+            self.services.status.publish(self._snapshot(control, result))
         self._notifier.cycle_completed(f"{result.decision.source}: {result.decision.why}")
+
+    @contextlib.contextmanager
+    def _contained(self, service: str) -> Iterator[None]:
+        """Keep a fault of ours in a service that control can do without from ending control."""
+        try:
+            yield
+        except Exception as error:
+            text = f"{service} failed: {type(error).__name__}: {error}"
+            if all(alarm.name != f"service {service}" for alarm in self._journal.alarms.active):
+                log.exception("%s", text)
+            self._journal.alarm(f"service {service}", text)
+        else:
+            self._journal.alarm(f"service {service}", "")
 
     async def _plan_ahead(self, control: Control, result: CycleResult) -> None:
         planning, schedule = self.services.planning, control.schedule

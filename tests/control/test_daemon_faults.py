@@ -7,7 +7,8 @@ import signal
 import sys
 from pathlib import Path
 
-from daemon_bench import Plant, free_port, running, until, write_files
+import pytest
+from daemon_bench import MAP, Plant, free_port, running, until, write_files
 
 from edge.image import Quality
 from edge.planning import PlanningProcess, ProcessLimits
@@ -206,6 +207,58 @@ async def test_a_reload_of_the_same_registers_keeps_the_line(tmp_path):
         cycles = daemon.cycles
         await until(lambda: daemon.cycles > cycles + 5 and daemon.last.image.link_ok)
     await plant.down()
+
+
+@pytest.mark.parametrize("service", ["updates", "exchange", "planning", "status"])
+async def test_a_service_that_fails_raises_an_alarm_and_stops_no_control(tmp_path, service):
+    port = free_port()
+    path = write_files(tmp_path, port)
+    path.write_text(path.read_text() + "exchange: exchange\n")
+    plant = Plant(tmp_path, port)
+    await plant.up()
+
+    def broken(*_):
+        raise ZeroDivisionError("a bug")
+
+    async with running(path) as daemon:
+        await until(lambda: daemon.cycles >= 2)
+        call = {"planning": "latest", "status": "publish"}.get(service, "tick")
+        owner = getattr(daemon.services, service)
+        works = getattr(owner, call)
+        setattr(owner, call, broken)
+        cycles = daemon.cycles
+        await until(lambda: daemon.cycles > cycles + 10)
+        assert plant.shows("heating_setpoint") != 17.0
+        (alarm,) = daemon._journal.alarms.active
+        assert alarm.text == f"{service} failed: ZeroDivisionError: a bug"
+        setattr(owner, call, works)
+        await until(lambda: not daemon._journal.alarms.active)
+    await plant.down()
+
+
+async def test_a_restart_gives_back_no_daily_budget(tmp_path):
+    port = free_port()
+    registers = MAP.replace("unit: degC, writable: true", "unit: degC, writable: true, non_volatile: true")
+    path = write_files(tmp_path, port, map_text=registers)
+    path.write_text(path.read_text() + "guard: {non_volatile_daily_budget: 4}\n")
+    plant = Plant(tmp_path, port)
+    await plant.up()
+    written = []
+    write = plant.plc.write
+
+    def watched(function, address, values):
+        if address == 0:
+            written.append(values)
+        write(function, address, values)
+
+    plant.plc.write = watched
+    for _ in range(3):
+        async with running(path) as daemon:
+            await until(lambda: daemon.cycles >= 40)
+    await plant.down()
+    assert len(written) == 3
+    rows = read_records(tmp_path / "state" / "store", "write")
+    assert any("3 of 4 writes of the last 24 h are used" in str(row.body["reason"]) for row in rows)
 
 
 async def test_the_watchdog_is_fed_by_completed_cycles_only(tmp_path):
