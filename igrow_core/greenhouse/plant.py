@@ -54,6 +54,7 @@ class Plant:
         crop: str | Crop = "mature",
         seed: int = 0,
         tick: float = TICK,
+        scan: float = SCAN,
         initial: Climate | None = None,
     ) -> None:
         self.xp: Any = namespace(count)
@@ -64,6 +65,7 @@ class Plant:
         self.sensors = sensors or Sensors()
         self.computer = computer or ClimateComputer()
         self.tick = tick
+        self.scan = scan
         self.effects = EffectBank(self.xp, effects, count, start) if effects else None
         self._innovated = any((self.disturbances.heat, self.disturbances.vapour, self.disturbances.co2))
         like: Array = 1.0 if count is None else np.ones(count)
@@ -104,7 +106,7 @@ class Plant:
         end = self.state.seconds + seconds
         while self.state.seconds < end - 1e-6:
             boundary = (self.state.seconds // SLOW + 1.0) * SLOW
-            scan = (self.state.seconds // SCAN + 1.0) * SCAN
+            scan = (self.state.seconds // self.scan + 1.0) * self.scan
             self._tick(min(self.tick, end - self.state.seconds, scan - self.state.seconds), setpoints)
             if boundary - self.state.seconds < 1e-6:
                 self._slow_step()
@@ -113,7 +115,7 @@ class Plant:
         xp, p, s = self.xp, self.parameters, self.state
         weather = self.weather.at(s.seconds + 0.5 * seconds)
         area = self._area
-        scan = int(s.seconds // SCAN)
+        scan = int(s.seconds // self.scan)
         if scan != s.scan:
             s.scan = scan
             s.control = control(

@@ -69,6 +69,6 @@ def test_varied_parameters_are_off_by_the_asked_size_and_known_ones_not_at_all()
 
 @pytest.mark.soak
 def test_one_step_of_one_greenhouse_costs_at_most_two_milliseconds(spring: Telemetry) -> None:
-    start = time.perf_counter()
+    start = time.process_time()
     simulate(GreenhouseParameters(), spring, recipe, SPRING, SPRING + hours(96), seed=1)
-    assert (time.perf_counter() - start) / (96 * 12) < 2e-3
+    assert (time.process_time() - start) / (96 * 12) < 2e-3
