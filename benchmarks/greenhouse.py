@@ -34,9 +34,8 @@ def speed() -> None:
         spent = time.process_time() - begin
         days = count * hours / 24.0
         step = 1e3 * spent / (hours * 12)
-        print(
-            f"{count:5d} greenhouses at once: {days / spent:8.1f} greenhouse-days/s of one core, {step:7.2f} ms per 300 s step"
-        )
+        pace = f"{days / spent:8.1f} greenhouse-days/s of one core, {step:7.2f} ms per 300 s step"
+        print(f"{count:5d} greenhouses at once: {pace}")
 
 
 def main(arguments: list[str]) -> int:
