@@ -10,7 +10,7 @@ from collections.abc import Coroutine, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
-from edge.configuration import Configuration, load_configuration
+from edge.configuration import ClockSource, Configuration, load_configuration
 from edge.cycle import CycleResult
 from edge.journal import Journal
 from edge.notify import Notifier
@@ -252,9 +252,22 @@ def _refuse_what_needs_a_restart(old: Configuration, new: Configuration) -> None
             raise IgrowError(f"{new.path}: {what} changed from {before} to {after}, which needs a restart")
 
 
+def refuse_cycles_slower_than_the_watchdog(configuration: Configuration, watchdog: float | None) -> None:
+    """Raise IgrowError when systemd would restart a daemon that is well."""
+    cycle = configuration.file.cycle
+    interval = cycle.interval.total_seconds()
+    if watchdog is not None and cycle.clock is ClockSource.SYSTEM and 2.0 * interval > watchdog:
+        raise IgrowError(
+            f"{configuration.path}: cycle.interval is {interval:g} s, but systemd's watchdog waits for {watchdog:g} s: "
+            f"an interval of at most {watchdog / 2:g} s, or a WatchdogSec of at least {2 * interval:g} s, is right"
+        )
+
+
 async def run_daemon(path: Path) -> None:
     """Run until SIGTERM or SIGINT; SIGHUP reads the configuration again. Raises IgrowError for a bad configuration."""
-    daemon = Daemon(load_configuration(path))
+    configuration, notifier = load_configuration(path), Notifier()
+    refuse_cycles_slower_than_the_watchdog(configuration, notifier.watchdog_seconds)
+    daemon = Daemon(configuration, notifier=notifier)
     loop = asyncio.get_running_loop()
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, daemon.stop)

@@ -24,6 +24,9 @@ class Notifier:
         if self._socket is not None:
             self._socket.setblocking(False)
         self._status = ""
+        microseconds = environment.get("WATCHDOG_USEC", "")
+        self.watchdog_seconds = int(microseconds) / 1e6 if microseconds.isdigit() else None
+        """After which silence systemd restarts us (WatchdogSec); None when it does not watch."""
 
     def ready(self) -> None:
         """Report that the daemon runs; the PLC need not answer yet."""
