@@ -1,0 +1,78 @@
+"""Does the named cause explain what is there, or does something remain that no candidate explains?
+
+A wrong name leaves structure: patterns in clock, calendar and weather that fit better than it, or still fit much
+after it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from trainer.diagnosis import search, selection
+from trainer.diagnosis.drivers import Pattern
+from trainer.diagnosis.problem import Problem
+from trainer.diagnosis.search import Fit
+from trainer.diagnosis.selection import Hypothesis, Selected
+
+SMALLEST_GAIN = 25.0
+"""Log-likelihood below which a pattern is no cause: a wrong structure makes as much."""
+LARGEST_P_VALUE = 0.005
+BETTER = 1.25
+"""A pattern that gains so many times what all names together gain replaces them."""
+LEFT = 0.5
+"""Share of the names' gain that a pattern may still add beside them."""
+MOST_PATTERNS = 3
+
+
+@dataclass(frozen=True)
+class Adequacy:
+    """The names that stand, and what remains beside them."""
+
+    selected: Selected
+    remainder: tuple[Hypothesis, ...] | None
+    """Patterns that fit what no candidate explains; None where nothing remains."""
+    pattern_gain: float
+    """Of the best single pattern instead of the names."""
+    left_gain: float
+    """Of the best pattern beside the names."""
+
+
+def judge(problem: Problem, chain: Sequence[Selected], rng: np.random.Generator) -> Adequacy:
+    """Judge the longest model of a chain against patterns."""
+    none, named = chain[0], chain[-1]
+    gained = named.fit.solution.gain - none.fit.solution.gain
+    instead = _best(problem, none.fit, rng)
+    beside = _best(problem, named.fit, rng) if named.hypotheses else instead
+    instead_gain = instead.gain if instead else 0.0
+    beside_gain = beside.gain if beside else 0.0
+    if instead is not None and instead_gain > max(SMALLEST_GAIN, BETTER * gained):
+        return Adequacy(none, _patterns(problem, none.fit, rng), instead_gain, beside_gain)
+    if beside is not None and beside_gain > max(SMALLEST_GAIN, LEFT * gained):
+        return Adequacy(named, _patterns(problem, named.fit, rng), instead_gain, beside_gain)
+    return Adequacy(named, None, instead_gain, beside_gain)
+
+
+def _best(problem: Problem, fit: Fit, rng: np.random.Generator) -> Hypothesis | None:
+    scored = selection.score_patterns(problem, fit, selection.onset_days(problem)[::4], rng)
+    significant = [one for one in scored if one.p_value <= LARGEST_P_VALUE]
+    return significant[0] if significant else None
+
+
+def _patterns(problem: Problem, fit: Fit, rng: np.random.Generator) -> tuple[Hypothesis, ...]:
+    """Return up to three patterns, each significant beside those before it."""
+    found: list[Hypothesis] = []
+    current = fit
+    for _ in range(MOST_PATTERNS):
+        best = _best(problem, current, rng)
+        if best is None or best.gain < 0.5 * SMALLEST_GAIN or not isinstance(best.cause, Pattern):
+            break
+        found.append(best)
+        current = search.fit(problem.grams, current.model.with_term(best.term))
+    amplitudes = np.asarray(current.amplitudes)[len(fit.model.terms) :]
+    return tuple(
+        Hypothesis(one.cause, one.term, one.gain, float(amplitude), one.statistic, one.p_value)
+        for one, amplitude in zip(found, amplitudes, strict=True)
+    )

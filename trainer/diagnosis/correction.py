@@ -1,0 +1,57 @@
+"""The corrected simulator as a model ready for export: parameters, effects with intervals, errors before and after."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+
+import numpy as np
+
+from igrow_core.bundle import Bundle, EffectRecord, Estimate, HeldOutError, Onset, Span
+from igrow_core.quantities import QUANTITIES
+from igrow_core.site import Site
+from trainer.calibration.posterior import Posterior
+from trainer.diagnosis.diagnose import Evidence
+from trainer.diagnosis.result import Diagnosis, Finding
+from trainer.export.bundle import read_hybrid_model
+from trainer.model import HybridModel
+
+
+def corrected_model(bundle: Bundle, site: Site, diagnosis: Diagnosis, evidence: Evidence) -> HybridModel:
+    """Return the model of a bundle with what a diagnosis found."""
+    model = read_hybrid_model(bundle, site)
+    corrected = evidence.corrected
+    names = model.posterior.names
+    known = model.posterior.values
+    mean = np.array([corrected.parameters.get(name, known[name]) for name in names])
+    before = dict(zip(names, map(float, model.posterior.standard_deviation), strict=True))
+    deviation = np.array([corrected.standard_deviation.get(name, before[name]) for name in names])
+    found = tuple(effect_record(one) for one in diagnosis.findings if one.kind != "remainder")
+    replaced = {one.name for one in found}
+    kept = tuple(one for one in model.effects if one.name not in replaced)
+    errors = tuple(
+        HeldOutError(quantity, horizon, stages["deployed"], stages["corrected"], QUANTITIES[quantity].unit)
+        for quantity, horizons in diagnosis.errors.items()
+        for horizon, stages in horizons.items()
+    )
+    span = Span(_utc(diagnosis.start), _utc(diagnosis.end))
+    fitted = model.corrected(Posterior(names, mean, np.diag(deviation**2)), (*kept, *found))
+    return fitted.trained(span, model.training_range, errors)
+
+
+def effect_record(finding: Finding) -> EffectRecord:
+    """Return a finding as the manifest's record of an effect."""
+    onset = finding.onset
+    return EffectRecord(
+        finding.effect,
+        finding.kind,
+        {
+            name: Estimate(float(one.value), float(one.low), float(one.high), one.unit)
+            for name, one in finding.parameters.items()
+        },
+        finding.balances,
+        None if onset is None else Onset(_utc(onset.time), _utc(onset.low), _utc(onset.high)),
+    )
+
+
+def _utc(time: np.datetime64) -> datetime:
+    return datetime.fromisoformat(str(time.astype("datetime64[s]"))).replace(tzinfo=UTC)

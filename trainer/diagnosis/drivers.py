@@ -1,0 +1,102 @@
+"""What a cause without a name may hang on: exogenous drivers only - clock, calendar and weather.
+
+Feedback control reveals disturbances, so that a learner who sees actuators or states finds structure in pure
+noise. Nothing here reads either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow_core.simulator.hybrid.record import Record
+from trainer.diagnosis.linearisation import Floats, Linearisation, flux_columns
+
+UNIT_FLUX: Mapping[str, float] = {
+    "heat": 10.0,
+    "vapour": 2e-6,
+    "co2": 3e-7,
+    "air_exchange": 5e-4,
+    "light_loss": 0.1,
+}
+"""Size of one unit of a pattern in each channel: W m-2, kg m-2 s-1, kg m-2 s-1, m s-1, 1."""
+BALANCES_OF: Mapping[str, tuple[str, ...]] = {
+    "heat": ("heat",),
+    "vapour": ("vapour",),
+    "co2": ("co2",),
+    "air_exchange": ("heat", "vapour", "co2"),
+    "light_loss": ("light", "heat"),
+}
+_WEEKDAYS = ("Monday", "Tuesday", "Wednesday", "Thursday", "Friday", "Saturday", "Sunday")
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """A course in time that exogenous drivers alone determine, in one channel."""
+
+    channel: str
+    when: str
+    """For people: at which hours, days or weather."""
+    drivers: tuple[str, ...]
+
+
+def patterns(record: Record, longitude: float) -> list[tuple[str, tuple[str, ...], Floats]]:
+    """Return (when, drivers, course (n,)) of every pattern, without the channel."""
+    hour = np.asarray(record.inputs["hour"])
+    seconds = record.time.astype("datetime64[s]").astype(np.int64) + int(240.0 * longitude)
+    weekday = (seconds // 86_400 + 3) % 7
+    table: list[tuple[str, tuple[str, ...], Floats]] = []
+
+    def window(first: float, last: float) -> NDArray[np.float64]:
+        inside = (hour >= first) & (hour < last) if first < last else (hour >= first) | (hour < last)
+        return inside.astype(np.float64)
+
+    for first, last in [(h, h + 2) for h in range(0, 24, 2)] + [(5, 9), (7, 16), (11, 14), (11, 17), (19, 5), (19, 11)]:
+        text = f"{first:02d} to {last:02d} h"
+        table.append((text, ("hour",), window(first, last)))
+        if (first, last) in {(5, 9), (7, 16), (11, 14)}:
+            table.append((f"{text} on working days", ("hour", "weekday"), window(first, last) * (weekday < 5)))
+    table.append(("working days", ("weekday",), 1.0 * (weekday < 5)))
+    for index, name in enumerate(_WEEKDAYS):
+        for first, last in ((0, 6), (6, 10), (10, 14), (14, 19), (19, 24)):
+            course = window(first, last) * (weekday == index)
+            table.append((f"{first:02d} to {last:02d} h on {name}s", ("hour", "weekday"), course))
+    outdoor = np.asarray(record.inputs["outdoor_temperature"])
+    cold = np.maximum(8.0 - outdoor, 0.0) / 8.0
+    table.append(("cold weather", ("outdoor_temperature",), cold))
+    table.append(("outdoor temperature", ("outdoor_temperature",), (outdoor - 10.0) / 10.0))
+    for first, last in ((5, 9), (9, 15), (19, 5), (19, 11)):
+        text = f"cold weather, {first:02d} to {last:02d} h"
+        table.append((text, ("outdoor_temperature", "hour"), cold * window(first, last)))
+    for name, scale in (("wind_speed", 5.0), ("global_radiation", 300.0), ("rain", 1.0)):
+        if name not in record.unknown:
+            table.append((name.replace("_", " "), (name,), np.asarray(record.inputs[name]) / scale))
+    if "outdoor_humidity" not in record.unknown:
+        table.append(
+            ("dry weather", ("outdoor_humidity",), (80.0 - np.asarray(record.inputs["outdoor_humidity"])) / 20.0)
+        )
+    if "rain" not in record.unknown:
+        fallen = np.cumsum(np.asarray(record.inputs["rain"])) * record.step / 72_000.0
+        table.append(("until rain has fallen", ("rain",), np.exp(-fallen)))
+    days = np.arange(len(record)) * record.step / 86_400.0
+    table.append(("from day to day", ("time",), days / 30.0))
+    table.append(("all the time", (), np.ones(len(record))))
+    return table
+
+
+def pattern_columns(line: Linearisation, longitude: float) -> tuple[tuple[Pattern, ...], Floats]:
+    """Return every pattern in every channel, and their columns of the errors, (p, 3, r, steps)."""
+    found: list[Pattern] = []
+    fluxes: list[tuple[Mapping[str, Floats], float]] = []
+    for when, drivers, course in patterns(line.record, longitude):
+        if not np.any(course):
+            continue
+        for channel, size in UNIT_FLUX.items():
+            found.append(Pattern(channel, when, drivers))
+            fluxes.append(({channel: size * course}, 0.1))
+    columns = flux_columns(line, fluxes)
+    kept = [index for index, column in enumerate(columns) if np.any(np.abs(column[line.runs.weight]) > 1e-9)]
+    return tuple(found[index] for index in kept), columns[kept]

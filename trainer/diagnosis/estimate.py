@@ -1,0 +1,173 @@
+"""Size, interval, beginning, rivals and regimes of each selected term."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from igrow_core.effects import EFFECTS
+from trainer.diagnosis import search, selection
+from trainer.diagnosis.activation import ActiveTerm
+from trainer.diagnosis.candidates import Candidate
+from trainer.diagnosis.gram import Term
+from trainer.diagnosis.problem import Problem
+from trainer.diagnosis.result import Interval, OnsetInterval
+from trainer.diagnosis.search import Fit, Model
+from trainer.diagnosis.selection import Hypothesis, Selected
+
+NORMAL_90 = 1.645
+INFLATION = 1.3
+"""Of the standard deviation of an amplitude, for the shape and structure that no covariance knows (fitted on the
+tuning cases)."""
+RIVAL_GAIN = 4.0
+"""Log-likelihood within which a rival fits as well."""
+RIVAL_SHARE = 0.15
+"""The same as a share of the term's own gain, for large effects: the truth is never quite of the catalogue's form."""
+
+
+@dataclass(frozen=True)
+class Estimated:
+    """A term with everything that is known of it."""
+
+    hypothesis: Hypothesis
+    term: ActiveTerm
+    amplitude: Interval
+    gain: float
+    """Log-likelihood that the term adds to the final model."""
+    onset: OnsetInterval | None
+    rivals: tuple[str, ...]
+    regimes: dict[str, Interval] = field(default_factory=dict)
+    effect_to_noise: float = 0.0
+    doubt: float = 0.0
+
+    @property
+    def effect(self) -> str:
+        """Name of the effect."""
+        return self.hypothesis.effect
+
+
+def estimate(problem: Problem, selected: Selected, rng: np.random.Generator) -> list[Estimated]:
+    """Return the terms of a selected model, the largest gain first."""
+    found = []
+    for position, hypothesis in enumerate(selected.hypotheses):
+        others = tuple(one for index, one in enumerate(selected.hypotheses) if index != position)
+        model = selected.fit.model
+        reduced = search.fit(
+            problem.grams, Model(model.base, model.precision, model.shift, tuple(one.term for one in others))
+        )
+        gain = selected.fit.solution.gain - reduced.solution.gain
+        amplitude = float(selected.fit.amplitudes[position])
+        deviation = _sandwich(problem, selected.fit, position)
+        candidate = hypothesis.cause
+        assert isinstance(candidate, Candidate)
+        shape = _shape(problem, reduced, hypothesis)
+        onset = _onset(problem, reduced, hypothesis)
+        unit = EFFECTS[hypothesis.effect].amplitude.unit
+        reach = NORMAL_90 * INFLATION * deviation
+        found.append(
+            Estimated(
+                hypothesis,
+                ActiveTerm(hypothesis.effect, amplitude, shape, None if onset is None else onset.time),
+                Interval(amplitude, amplitude - reach, amplitude + reach, unit),
+                gain,
+                onset,
+                rivals(problem, reduced, hypothesis, gain, tuple(one.effect for one in others), rng),
+            )
+        )
+    return sorted(found, key=lambda one: -one.gain)
+
+
+def rivals(
+    problem: Problem,
+    reduced: Fit,
+    hypothesis: Hypothesis,
+    gain: float,
+    others: tuple[str, ...],
+    rng: np.random.Generator,
+) -> tuple[str, ...]:
+    """Return the effects that would do as well in the place of a term, itself first."""
+    margin = max(RIVAL_GAIN, RIVAL_SHARE * gain)
+    onsets = selection.onset_days(problem) if hypothesis.term.onset is not None else [None]
+    scored = selection.score_candidates(problem, reduced, onsets, rng)
+    as_good = [one.effect for one in scored if one.gain >= gain - margin and one.effect not in others]
+    return (hypothesis.effect, *(name for name in as_good if name != hypothesis.effect))
+
+
+def _sandwich(problem: Problem, fit: Fit, position: int) -> float:
+    """Return the standard deviation of an amplitude from the scatter of its day scores."""
+    days = np.flatnonzero(problem.grams.fit)
+    coefficients = np.concatenate([[1.0], fit.solution.coefficients])
+    index = len(fit.model.base) + position
+    influence = fit.products[days][:, 1:, :] @ coefficients @ fit.solution.inverse[index]
+    plain = float(fit.deviations[position])
+    scatter = float(np.sqrt(np.sum((influence - influence.mean()) ** 2) * len(days) / max(len(days) - 1, 1)))
+    return max(plain, scatter)
+
+
+def _shape(problem: Problem, reduced: Fit, hypothesis: Hypothesis) -> dict[str, float]:
+    """Return shape values, by a parabola through the gains of neighbouring shapes where there is one shape."""
+    candidate = hypothesis.cause
+    assert isinstance(candidate, Candidate)
+    values = candidate.values
+    if len(values) != 1:
+        return values
+    (name,) = values
+    same = [
+        (one.values[name], column)
+        for one, column in zip(problem.candidates, problem.candidate, strict=True)
+        if one.effect == candidate.effect
+    ]
+    same.sort()
+    tried = np.array([value for value, _ in same])
+    if len(tried) < 3 or name == "direction":
+        return values
+    gains = np.array(
+        [
+            search.fit(problem.grams, reduced.model.with_term(Term(column, hypothesis.term.onset))).solution.gain
+            for _, column in same
+        ]
+    )
+    best = int(np.clip(np.argmax(gains), 1, len(tried) - 2))
+    x, y = tried[best - 1 : best + 2], gains[best - 1 : best + 2]
+    curve = np.polyfit(x, y, 2)
+    if curve[0] >= 0.0:
+        return values
+    return {name: float(np.clip(-0.5 * curve[1] / curve[0], tried[0], tried[-1]))}
+
+
+def _onset(problem: Problem, reduced: Fit, hypothesis: Hypothesis) -> OnsetInterval | None:
+    """Return the beginning and its 90 % interval: days whose profile likelihood lies within 1.35 of the best."""
+    if hypothesis.term.onset is None:
+        return None
+    days = list(range(1, problem.split.days - 1))
+    gains = np.array(
+        [
+            search.fit(
+                problem.grams,
+                reduced.model.with_term(Term(hypothesis.term.column, day, _ageing(problem, hypothesis))),
+            ).solution.gain
+            for day in days
+        ]
+    )
+    best = int(np.argmax(gains))
+    inside = np.flatnonzero(gains >= gains[best] - 1.353)
+    return OnsetInterval(
+        _day_start(problem, days[best]),
+        _day_start(problem, days[int(inside[0])] - 1),
+        _day_start(problem, days[int(inside[-1])] + 1),
+    )
+
+
+def _ageing(problem: Problem, hypothesis: Hypothesis) -> int | None:
+    return problem.ageing[hypothesis.term.column - problem.candidate.start] if _ages(hypothesis) else None
+
+
+def _ages(hypothesis: Hypothesis) -> bool:
+    return isinstance(hypothesis.cause, Candidate) and hypothesis.cause.ages
+
+
+def _day_start(problem: Problem, day: int) -> np.datetime64:
+    rows = np.flatnonzero(problem.split.day == min(max(day, 0), problem.split.days - 1))
+    time: np.datetime64 = problem.line.record.time[rows[0]]
+    return time

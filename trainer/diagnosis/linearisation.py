@@ -1,0 +1,287 @@
+"""Day-long free runs along a log: what the model misses, and how that depends on parameters and effects.
+
+From every local midnight the model runs freely for a day, driven by what the actuators did. Errors of one step
+would be cheaper, and they mislead: a simple model's fast dynamics are never quite right, the PLC answers every
+disturbance within minutes, and a fit to single steps then takes that answer for physics (on the mechanistic
+greenhouse it made the 24 h error five times as large). Over a day what matters is what the balances lack.
+
+The error of a run is the disturbance, passed through the plant: along a run it is coloured, and `innovations`
+whitens it. Sensitivities to all parameters, effects and patterns come from batches of such runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow_core.effects import EFFECTS, Effect
+from igrow_core.effects.definition import Array
+from igrow_core.simulator.hybrid import climate, measurement
+from igrow_core.simulator.hybrid.climate import ActiveEffects
+from igrow_core.simulator.hybrid.nominal import site_record
+from igrow_core.simulator.hybrid.parameters import PARAMETERS
+from igrow_core.simulator.hybrid.record import SUBSTEP, Record, free_run, observe
+from igrow_core.site import Site
+from igrow_core.telemetry import Telemetry, to_grid
+
+Floats = NDArray[np.float64]
+
+BALANCES = ("heat", "vapour", "co2")
+"""In the order of `measurement.PREDICTED`, which shows each of them first."""
+STEP = 900.0
+"""Seconds between rows of the record that is diagnosed; an hourly log keeps its hours."""
+_BATCH = 160
+"""Variants run at once: more do not fit into the cache."""
+_WEATHER = ("outdoor_temperature", "outdoor_humidity", "global_radiation", "wind_speed", "sky_temperature", "rain")
+
+
+def diagnosis_record(telemetry: Telemetry, site: Site) -> Record:
+    """Return the record that is diagnosed: inputs as means over each step, measurements as at its first instant."""
+    fine = telemetry.step
+    step = max(STEP, fine)
+    record = site_record(telemetry, site, step)
+    if fine >= STEP:
+        return record
+    grid = to_grid(telemetry, int(step))
+    inputs = dict(record.inputs)
+    for name in _WEATHER:
+        if name in grid and np.isfinite(grid[name]).any():
+            inputs[name] = _filled(grid[name])
+    # The first reading of each cell, where it lies on the cell's edge.
+    position = np.searchsorted(telemetry.time, record.time)
+    inside = np.minimum(position, len(telemetry) - 1)
+    near = np.abs((telemetry.time[inside] - record.time).astype("timedelta64[s]").astype(np.float64)) < 0.5 * fine
+    measured = {
+        name: np.where(near, telemetry[name][inside], np.nan) if name in telemetry else values
+        for name, values in record.measured.items()
+    }
+    return replace(record, inputs=inputs, measured=measured)
+
+
+@dataclass(frozen=True)
+class DayRuns:
+    """Where the runs of a record start, and what counts of them."""
+
+    starts: NDArray[np.int64]
+    """Rows, (r,)."""
+    steps: int
+    day: NDArray[np.int64]
+    """Index of each run's local day, (r,)."""
+    weight: NDArray[np.bool_]
+    """Rows with inputs since the start and a measurement at the end, by balance, (3, r, steps)."""
+
+    @property
+    def rows(self) -> NDArray[np.int64]:
+        """Row that each step ends at, (r, steps)."""
+        return self.starts[:, None] + 1 + np.arange(self.steps)
+
+
+def day_runs(record: Record, day: NDArray[np.int64]) -> DayRuns:
+    """Return one run a local day, from its first row to the next day's.
+
+    Args:
+        record: of the log.
+        day: index of the local day of each row, (n,).
+    """
+    steps = round(86_400.0 / record.step)
+    first = np.flatnonzero(np.diff(np.concatenate([[-1], day])) > 0)
+    starts = first[first + steps < len(record)]
+    ready = np.all(
+        [np.isfinite(values[starts]) for values in record.measured.values() if np.isfinite(values).any()], axis=0
+    )
+    starts = starts[ready]
+    rows = starts[:, None] + np.arange(steps)
+    driven = np.cumprod(record.usable[rows], axis=1).astype(bool)
+    shown = np.stack([np.isfinite(record.measured[name][rows + 1]) for name in measurement.PREDICTED])
+    return DayRuns(starts, steps, day[starts], shown & driven)
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """The model along a log at given parameters and active effects."""
+
+    record: Record
+    runs: DayRuns
+    parameters: Mapping[str, float]
+    effects: ActiveEffects
+    shown: Floats
+    """What the sensors would show, (3, r, steps), in degC, %, ppm."""
+    states: Mapping[str, Floats]
+    """From `observe`, (n,)."""
+    drivers: Mapping[str, Array]
+    """Along the measured climate, (n,)."""
+
+    @property
+    def errors(self) -> Floats:
+        """Measured minus predicted, 0 where it does not count, (3, r, steps)."""
+        measured = np.stack([self.record.measured[name][self.runs.rows] for name in measurement.PREDICTED])
+        return np.where(self.runs.weight, np.nan_to_num(measured) - self.shown, 0.0)
+
+
+def linearise(record: Record, runs: DayRuns, parameters: Mapping[str, float], effects: ActiveEffects) -> Linearisation:
+    """Run the model once along a log."""
+    states = observe(record, parameters, effects)
+    shown = free_run(record, states, runs.starts, runs.steps, parameters, effects)
+    drivers = climate.derive(np, states, record.inputs, parameters, record.lamp_efficacy)
+    return Linearisation(record, runs, parameters, effects, _stacked(shown), states, drivers)
+
+
+def parameter_columns(line: Linearisation, names: tuple[str, ...], spread: Floats) -> Floats:
+    """Return d(error)/d(parameter), (len(names), 3, r, steps), by finite differences.
+
+    Args:
+        line: where to differentiate.
+        names: of the parameters.
+        spread: typical change of each, (len(names),); a twentieth of it is the difference.
+    """
+    value = np.array([line.parameters[name] for name in names])
+    step = 0.05 * spread
+    high = np.array([PARAMETERS[name].high for name in names])
+    step = np.where(value + step > high, -step, step)
+    count = len(names)
+    varied = {
+        name: np.where(np.arange(count) == names.index(name), number + step[names.index(name)], number)[:, None]
+        if name in names
+        else number
+        for name, number in line.parameters.items()
+    }
+    # Memories of processes run along the log as they are: one course of drivers, not one a variant.
+    plain = {name: values for name, values in line.effects.items() if not _remembers(name)}
+    states = dict(observe(line.record, varied, plain))
+    states |= {name: values for name, values in line.states.items() if name not in states}
+    shown = free_run(line.record, states, line.runs.starts, line.runs.steps, varied, line.effects)
+    shape = (line.runs.steps, count, len(line.runs.starts))
+    moved = np.stack([np.broadcast_to(shown[name], shape) for name in measurement.PREDICTED]).transpose(2, 0, 3, 1)
+    columns: Floats = -(moved - line.shown) / step[:, None, None, None]
+    return columns
+
+
+def _remembers(name: str) -> bool:
+    return EFFECTS[name].kind == "process" and EFFECTS[name].memory is not None
+
+
+def sensor_column(line: Linearisation, effect: Effect, shape: Mapping[str, float]) -> Floats:
+    """Return d(error)/d(amplitude), (3, r, steps), of a sensor effect that is not active."""
+    small = 0.1 * effect.amplitude.typical
+    active = {**line.effects, effect.name: {effect.amplitude.name: small, **shape}}
+    states = observe(line.record, line.parameters, active)
+    shown = free_run(line.record, states, line.runs.starts, line.runs.steps, line.parameters, active)
+    column: Floats = -(_stacked(shown) - line.shown) / small
+    return column
+
+
+def unit_fluxes(line: Linearisation, effect: Effect, shape: Mapping[str, float]) -> dict[str, Array]:
+    """Return what a process effect of amplitude one adds to each channel along the measured climate, (n,) each."""
+    values = {effect.amplitude.name: 1.0, **shape}
+    memory = run_memory(effect, values, line.drivers, line.record.step) if effect.memory is not None else None
+    count = len(line.record)
+    return {
+        channel: np.broadcast_to(np.asarray(flux, dtype=np.float64), (count,))
+        for channel, flux in effect.contribution(np, line.drivers, values, memory).items()
+    }
+
+
+def flux_columns(line: Linearisation, fluxes: list[tuple[Mapping[str, Array], float]]) -> Floats:
+    """Return d(error)/d(amplitude), (f, 3, r, steps), of fluxes into the balances.
+
+    Args:
+        line: where to linearise.
+        fluxes: for each, the flux by channel at amplitude one, (n,), and a small amplitude to run it at.
+    """
+    parts = [_flux_batch(line, fluxes[first : first + _BATCH]) for first in range(0, len(fluxes), _BATCH)]
+    count = len(line.runs.starts)
+    return np.concatenate(parts) if parts else np.zeros((0, 3, count, line.runs.steps))
+
+
+def _flux_batch(line: Linearisation, fluxes: list[tuple[Mapping[str, Array], float]]) -> Floats:
+    record, runs = line.record, line.runs
+    channels = sorted({channel for flux, _ in fluxes for channel in flux})
+    zero = np.zeros(len(record))
+    added = {channel: np.stack([small * flux.get(channel, zero) for flux, small in fluxes]) for channel in channels}
+    substeps = max(1, round(record.step / SUBSTEP))
+    names = list(record.inputs)
+    table = np.stack([record.inputs[name] for name in names])
+    state: dict[str, Array] = {name: values[runs.starts] for name, values in line.states.items()}
+    moved = np.empty((len(fluxes), 3, len(runs.starts), runs.steps))
+    for k in range(runs.steps):
+        rows = runs.starts + k
+        inputs: Mapping[str, Array] = dict(zip(names, table[:, rows], strict=True))
+        active = _rows_of(line.effects, rows, len(record))
+        more = {channel: flux[:, rows] for channel, flux in added.items()}
+        for _ in range(substeps):
+            corrected = inputs
+            if "pipe_temperature_offset" in active:
+                drivers = climate.derive(np, state, inputs, line.parameters, record.lamp_efficacy)
+                corrected = measurement.correct_inputs(np, inputs, drivers, state, active)
+            state = climate.advance(
+                np, state, corrected, line.parameters, active,
+                seconds=record.step / substeps, lamp_efficacy=record.lamp_efficacy, added=more,
+            )  # fmt: skip
+        following = dict(zip(names, table[:, rows + 1], strict=True))
+        active = _rows_of(line.effects, rows + 1, len(record))
+        drivers = climate.derive(np, state, following, line.parameters, record.lamp_efficacy)
+        for balance, values in enumerate(measurement.measured(np, drivers, state, active).values()):
+            moved[:, balance, :, k] = values
+    small = np.array([size for _, size in fluxes])
+    columns: Floats = -(moved - line.shown) / small[:, None, None, None]
+    return columns
+
+
+def run_memory(effect: Effect, values: Mapping[str, float], drivers: Mapping[str, Array], step: float) -> Floats:
+    """Return the memory of an effect along the drivers, (n,)."""
+    memory = effect.memory
+    assert memory is not None
+    count = max(np.size(drivers[name]) for name in effect.drivers)
+    columns = [np.broadcast_to(drivers[name], (count,)).tolist() for name in effect.drivers]
+    substeps = max(1, round(step / SUBSTEP))
+    course = np.empty(count)
+    names = effect.drivers
+    row = dict(zip(names, (column[0] for column in columns), strict=True))
+    value = float(memory.start(_Scalars, row, values))
+    for k, cells in enumerate(zip(*columns, strict=True)):
+        course[k] = value
+        row = dict(zip(names, cells, strict=True))
+        for _ in range(substeps):
+            value = memory.advance(_Scalars, value, row, values, step / substeps)
+    return course
+
+
+class _Scalars:
+    """The few functions that memories use, for plain floats: ten times faster than numpy's on scalars."""
+
+    maximum = staticmethod(max)
+    minimum = staticmethod(min)
+    abs = staticmethod(abs)
+    exp = staticmethod(np.exp)
+    sqrt = staticmethod(np.sqrt)
+    tanh = staticmethod(np.tanh)
+
+
+def _stacked(shown: Mapping[str, Floats]) -> Floats:
+    return np.stack([shown[name].T for name in measurement.PREDICTED])
+
+
+def _rows_of(effects: ActiveEffects, rows: NDArray[np.int64], count: int) -> dict[str, dict[str, Array]]:
+    return {
+        effect: {
+            name: value[rows] if isinstance(value, np.ndarray) and value.shape == (count,) else value
+            for name, value in values.items()
+        }
+        for effect, values in effects.items()
+    }
+
+
+def _filled(values: Floats) -> Floats:
+    known = np.isfinite(values)
+    return np.interp(np.arange(len(values)), np.flatnonzero(known), values[known])
+
+
+def is_measured(record: Record, effect: Effect) -> bool:
+    """Tell whether the log has what a sensor effect falsifies."""
+    return all(
+        bool(np.isfinite(record.measured[name]).any()) if name in record.measured else name not in record.unknown
+        for name in EFFECTS[effect.name].measured
+    )

@@ -1,0 +1,194 @@
+"""A diagnosis made ready: the log linearised at the deployed model, filtered to innovations, summed up by day."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow_core.simulator.hybrid.climate import ActiveEffects
+from igrow_core.simulator.hybrid.record import Record
+from trainer.diagnosis import candidates, drivers, gram, innovations, linearisation
+from trainer.diagnosis.candidates import Candidate
+from trainer.diagnosis.drivers import Pattern
+from trainer.diagnosis.gram import DailyGrams
+from trainer.diagnosis.innovations import Whitening
+from trainer.diagnosis.linearisation import Floats, Linearisation
+from trainer.diagnosis.prior import Prior
+from trainer.diagnosis.split import Split
+
+ROUNDS = 3
+"""Alternations between parameters and the colour of the disturbances."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Everything the search works on."""
+
+    line: Linearisation
+    split: Split
+    prior: Prior
+    whitening: Whitening
+    balances: tuple[int, ...]
+    """Rows of the errors that the log can tell, of 0, 1, 2."""
+    candidates: tuple[Candidate, ...]
+    patterns: tuple[Pattern, ...]
+    untestable: tuple[str, ...]
+    grams: DailyGrams
+    parameter: range
+    """Columns of the parameters."""
+    candidate: range
+    """Columns of the candidates."""
+    ageing: range
+    """Columns that shift the beginning of a candidate that ages."""
+    pattern: range
+    """Columns of the patterns."""
+    known: range
+    """The column of the misfit that the calibration knew already (empty where it is not known)."""
+
+
+def counted_rows(line: Linearisation, balances: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Tell which rows have an error in every balance at hand, (r, steps)."""
+    rows: NDArray[np.bool_] = line.runs.weight[list(balances)].all(axis=0)
+    return rows
+
+
+def recalibrate(
+    start: Linearisation, split: Split, prior: Prior, misfit: Floats, rounds: int = ROUNDS
+) -> tuple[Linearisation, Whitening, tuple[int, ...]]:
+    """Fit parameters under their prior and the noise to the fit days, by turns.
+
+    Args:
+        start: the model at the prior's mean.
+        split: days to fit.
+        prior: of the parameters.
+        misfit: what is known to be missing, added to the errors, (3, r, steps).
+        rounds: of turns.
+
+    Returns the linearisation at the fitted parameters, the whitening and the balances at hand.
+    """
+    names = prior.names
+    parameters = dict(prior.mean)
+    line, runs = start, start.runs
+    balances = tuple(row for row in range(3) if runs.weight[row].mean() > 0.2)
+    fitted = split.fit[runs.day][:, None]
+    observed = counted_rows(line, balances)
+    whitening = _noise(line.errors + misfit, balances, observed, fitted)
+    for _ in range(rounds):
+        columns = linearisation.parameter_columns(line, names, prior.spread)
+        stack = np.concatenate([(line.errors + misfit)[None], columns])[:, list(balances)] * observed
+        flat = (whitening(stack) * fitted).reshape(len(stack), -1)
+        products = flat @ flat.T
+        # The prior's mean is where the search began, not where this round stands.
+        shift = np.array([parameters[name] - prior.mean[name] for name in names])
+        matrix = products[1:, 1:] + prior.precision
+        right = -products[1:, 0] - prior.precision @ shift
+        change = np.linalg.solve(matrix, right)
+        parameters = prior.clip(
+            {name: parameters[name] + float(step) for name, step in zip(names, change, strict=True)}
+        )
+        line = linearisation.linearise(line.record, runs, parameters, line.effects)
+        whitening = _noise(line.errors + misfit, balances, observed, fitted, whitening)
+    return line, whitening, balances
+
+
+def _misfit(
+    line: Linearisation, known: Mapping[str, float], longitude: float, found: candidates.CandidateColumns | None
+) -> Floats:
+    """Return the column of the known misfit, (3, r, steps)."""
+    if found is None:
+        return np.zeros_like(line.shown)
+    names, columns = drivers.pattern_columns(line, longitude)
+    total = np.zeros_like(line.shown)
+    for key, column in zip(map(candidate_key, found.candidates), found.columns, strict=True):
+        total += known.get(key, 0.0) * column
+    for key, column in zip(map(pattern_key, names), columns, strict=True):
+        total += known.get(key, 0.0) * column
+    return total
+
+
+def _noise(
+    errors: Floats,
+    balances: tuple[int, ...],
+    observed: NDArray[np.bool_],
+    fitted: NDArray[np.bool_],
+    before: Whitening | None = None,
+) -> Whitening:
+    errors = errors[list(balances)] * observed
+    counted = observed & fitted
+    starts = before.filters if before else (None,) * len(balances)
+    filters = tuple(
+        innovations.fit_filter(row, counted, start=start) for row, start in zip(errors, starts, strict=True)
+    )
+    whitening = innovations.fit_whitening(errors, counted, filters)
+    # Held-out rows are filtered and weighted too: the fit leaves them out by day.
+    return innovations.extend(whitening, errors, observed)
+
+
+def prepare(
+    record: Record,
+    split: Split,
+    prior: Prior,
+    effects: ActiveEffects,
+    longitude: float,
+    known: Mapping[str, float],
+    without: Collection[str] = (),
+) -> Problem:
+    """Recalibrate, then linearise everything that may be missing.
+
+    Args:
+        record: of the log.
+        split: its days.
+        prior: of the parameters.
+        effects: active already.
+        longitude: degrees east, for the calendar.
+        known: the misfit of the calibration, amplitude by key (`structure`).
+        without: effects that are no candidates.
+    """
+    runs = linearisation.day_runs(record, split.day)
+    line = linearisation.linearise(record, runs, prior.mean, effects)
+    misfit = _misfit(line, known, longitude, candidates.candidate_columns(line) if known else None)
+    line, whitening, balances = recalibrate(line, split, prior, misfit)
+    chosen = list(balances)
+    observed = counted_rows(line, balances)
+    base = linearisation.parameter_columns(line, prior.names, prior.spread)
+    found = candidates.candidate_columns(line, without)
+    names, pattern = drivers.pattern_columns(line, longitude)
+    parts = [line.errors[None], base, found.columns, found.ageing, pattern, misfit[None][: 1 if known else 0]]
+    edges = np.cumsum([0] + [len(part) for part in parts])
+    white = np.concatenate([whitening(part[:, chosen] * observed) for part in parts])
+    products = gram.daily_products(white, runs.day, split.days)
+    return Problem(
+        line,
+        split,
+        prior,
+        whitening,
+        balances,
+        found.candidates,
+        names,
+        found.untestable,
+        DailyGrams(products, split.fit),
+        *(range(int(edges[k]), int(edges[k + 1])) for k in range(1, 6)),
+    )
+
+
+def candidate_key(candidate: Candidate) -> str:
+    """Return the name of a candidate in a list of known misfits."""
+    return ":".join([candidate.effect, *(f"{name}={value:g}" for name, value in candidate.shape)])
+
+
+def pattern_key(pattern: Pattern) -> str:
+    """Return the name of a pattern in a list of known misfits."""
+    return f"{pattern.channel}:{pattern.when}"
+
+
+def parameter_shift(problem: Problem) -> Floats:
+    """Return where the fitted parameters stand against the prior's mean, (p,)."""
+    return np.array([problem.line.parameters[name] - problem.prior.mean[name] for name in problem.prior.names])
+
+
+def as_mapping(names: tuple[str, ...], values: Floats) -> Mapping[str, float]:
+    """Return values by name."""
+    return dict(zip(names, map(float, values), strict=True))

@@ -1,0 +1,177 @@
+"""Forward selection of up to three terms with a small beam, over all effects, shapes and beginnings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from igrow_core.effects import EFFECTS
+from trainer.diagnosis import search
+from trainer.diagnosis.candidates import Candidate
+from trainer.diagnosis.drivers import Pattern
+from trainer.diagnosis.gram import Floats, Term, day_losses
+from trainer.diagnosis.problem import Problem
+from trainer.diagnosis.search import Fit, Model
+
+MOST_TERMS = 3
+BEAM = 3
+ONSET_PRICE = 8.0
+"""Log-likelihood that a beginning within the log must add over an effect that was always there."""
+FIRST_ONSET_DAYS = 3
+"""No beginning is looked for within so many days of either end."""
+MOST_ONSETS = 30
+"""Beginnings tried in a log; longer logs are tried every few days, then day by day around the best."""
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """One candidate (or pattern) as a term, with what it would gain in the model it was scored against."""
+
+    cause: Candidate | Pattern
+    term: Term
+    gain: float
+    amplitude: float
+    statistic: float
+    p_value: float
+
+    @property
+    def effect(self) -> str:
+        """Name of the effect; a pattern has none."""
+        return self.cause.effect if isinstance(self.cause, Candidate) else ""
+
+
+@dataclass(frozen=True)
+class Selected:
+    """A model with named terms, and its fit."""
+
+    hypotheses: tuple[Hypothesis, ...]
+    fit: Fit
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects in order of selection."""
+        return tuple(one.effect for one in self.hypotheses)
+
+
+def onset_days(problem: Problem) -> list[int | None]:
+    """Return the days of beginning worth trying; None is always."""
+    last = problem.split.days - FIRST_ONSET_DAYS
+    step = max(1, -(-(last - FIRST_ONSET_DAYS) // MOST_ONSETS))
+    return [None, *range(FIRST_ONSET_DAYS, last + 1, step)]
+
+
+def score_candidates(
+    problem: Problem, current: Fit, onsets: Sequence[int | None], rng: np.random.Generator
+) -> list[Hypothesis]:
+    """Return the best hypothesis of every effect, the likeliest first."""
+    ageing = [
+        shift if candidate.ages else None for shift, candidate in zip(problem.ageing, problem.candidates, strict=True)
+    ]
+    bounds = np.array([(one.definition.amplitude.low, one.definition.amplitude.high) for one in problem.candidates])
+    scanned = search.scan(problem.grams, current, list(problem.candidate), ageing, onsets, bounds, rng)
+    return _best(scanned, problem.candidates, ageing, [one.effect for one in problem.candidates])
+
+
+def score_patterns(
+    problem: Problem, current: Fit, onsets: Sequence[int | None], rng: np.random.Generator
+) -> list[Hypothesis]:
+    """Return every pattern as a hypothesis, the likeliest first."""
+    count = len(problem.patterns)
+    bounds = np.tile([-1e9, 1e9], (count, 1))
+    none: list[int | None] = [None] * count
+    scanned = search.scan(problem.grams, current, list(problem.pattern), none, onsets, bounds, rng)
+    return _best(scanned, problem.patterns, none, list(range(count)))
+
+
+def _best(
+    scanned: search.Scan,
+    causes: Sequence[Candidate] | Sequence[Pattern],
+    ageing: Sequence[int | None],
+    groups: Sequence[object],
+) -> list[Hypothesis]:
+    price = np.array([0.0 if onset is None else ONSET_PRICE for onset in scanned.onsets])
+    merit = scanned.gain - price[:, None]
+    found: dict[object, Hypothesis] = {}
+    rows = np.argmax(merit, axis=0)
+    for column in np.argsort(-merit[rows, np.arange(merit.shape[1])]):
+        row = rows[column]
+        if groups[column] in found or merit[row, column] <= 0.0:
+            continue
+        onset = scanned.onsets[row]
+        found[groups[column]] = Hypothesis(
+            causes[column],
+            Term(int(scanned.columns[column]), onset, ageing[column] if onset is not None else None),
+            float(merit[row, column]),
+            float(scanned.amplitude[row, column]),
+            float(scanned.statistic[row, column]),
+            float(scanned.p_value[row, column]),
+        )
+    return list(found.values())
+
+
+def forward(
+    problem: Problem,
+    null: Model,
+    rng: np.random.Generator,
+    *,
+    smallest_gain: float,
+    largest_p_value: float,
+    most_terms: int = MOST_TERMS,
+) -> list[Selected]:
+    """Return the chain of best models, from none to at most `most_terms` terms, each in the bounds of its effect."""
+    start = Selected((), search.fit(problem.grams, null))
+    chain = [start]
+    beam = [start]
+    onsets = onset_days(problem)
+    for _ in range(most_terms):
+        grown: list[Selected] = []
+        for parent in beam:
+            ranked = score_candidates(problem, parent.fit, onsets, rng)
+            taken = 0
+            for hypothesis in ranked:
+                if hypothesis.effect in parent.effects:
+                    continue
+                if hypothesis.gain < smallest_gain or hypothesis.p_value > largest_p_value:
+                    continue
+                grown.append(_grow(problem, parent, hypothesis))
+                taken += 1
+                if taken == BEAM:
+                    break
+        grown = [one for one in grown if _within_bounds(one)]
+        if not grown:
+            break
+        grown.sort(key=lambda one: -one.fit.solution.gain)
+        beam = _distinct(grown)[:BEAM]
+        chain.append(beam[0])
+    return chain
+
+
+def _grow(problem: Problem, parent: Selected, hypothesis: Hypothesis) -> Selected:
+    model = parent.fit.model.with_term(hypothesis.term)
+    return Selected((*parent.hypotheses, hypothesis), search.fit(problem.grams, model))
+
+
+def _within_bounds(selected: Selected) -> bool:
+    for hypothesis, amplitude in zip(selected.hypotheses, selected.fit.amplitudes, strict=True):
+        bounds = EFFECTS[hypothesis.effect].amplitude
+        if not bounds.low <= amplitude <= bounds.high or (bounds.low == 0.0 and amplitude <= 0.0):
+            return False
+    return True
+
+
+def _distinct(selected: Sequence[Selected]) -> list[Selected]:
+    seen: set[frozenset[str]] = set()
+    kept: list[Selected] = []
+    for one in selected:
+        names = frozenset(one.effects)
+        if names not in seen:
+            seen.add(names)
+            kept.append(one)
+    return kept
+
+
+def losses_by_day(problem: Problem, fit: Fit) -> Floats:
+    """Return half the sum of squared innovations of every day under a fit, (days,)."""
+    return day_losses(fit.products, fit.solution.coefficients)
