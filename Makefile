@@ -18,7 +18,7 @@ $(STAMP): pyproject.toml
 	@touch $@
 
 demo: $(STAMP) ## Run the whole loop on a virtual greenhouse with an undeclared effect (at most 5 minutes).
-	$(BIN)/python -m benchmarks.demo --out out/demo
+	$(BIN)/python config/demo/run.py --out out/demo
 
 test: $(STAMP) ## Run the tests (at most 10 minutes).
 	$(BIN)/pytest -n 2 --dist worksteal -m 'not soak' tests

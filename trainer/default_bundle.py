@@ -14,9 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from igrow_core.bundle import Span
-from igrow_core.greenhouse import GreenhouseParameters, Season, generate_weather, recipe, simulate_many
+from igrow_core.greenhouse import Season, generate_weather, recipe, simulate_many
+from igrow_core.greenhouse.described import parameters_of
 from igrow_core.quantities import SETPOINTS
-from igrow_core.simulator import actuation, holding
+from igrow_core.simulator import holding
 from igrow_core.simulator.hybrid.nominal import nominal, site_record
 from igrow_core.site import Site
 from igrow_core.telemetry import Telemetry
@@ -43,10 +44,11 @@ def default_bundle_folder() -> Path:
     return Path(str(files("igrow_core"))) / "default_bundle"
 
 
-def virtual_seasons(count: int, days: int, seed: int) -> list[Season]:
+def virtual_seasons(site: Site, count: int, days: int, seed: int) -> list[Season]:
     """Simulate greenhouses that differ, under weather that differs, with setpoints around the recipe.
 
     Args:
+        site: describes their kind.
         count: of greenhouses.
         days: of each.
         seed: of everything.
@@ -54,7 +56,7 @@ def virtual_seasons(count: int, days: int, seed: int) -> list[Season]:
     random = np.random.default_rng(seed)
     end = START + np.timedelta64(days, "D")
     weathers = [generate_weather(START, end, seed=seed * 1000 + number) for number in range(count)]
-    houses = [GreenhouseParameters().varied(random, SPREAD / 2) for _ in range(count)]
+    houses = [parameters_of(site).varied(random, SPREAD / 2) for _ in range(count)]
     return simulate_many(
         houses,
         weathers,
@@ -89,7 +91,7 @@ def default_model(site: Site, *, seed: int = 0, report: Report = print) -> Hybri
         report: is told of the progress in lines.
     """
     report(f"simulating {HOUSES} virtual greenhouses for {DAYS} days")
-    seasons = virtual_seasons(HOUSES, DAYS, seed)
+    seasons = virtual_seasons(site, HOUSES, DAYS, seed)
     posterior = _fitted(site, seasons, report)
     rules, held = _fitted_control(site, seasons, posterior.values)
     crop = train_crop([season.true for season in seasons], seed=seed, report=report)
@@ -106,17 +108,17 @@ def default_model(site: Site, *, seed: int = 0, report: Report = print) -> Hybri
     )
 
 
-def default_control(site: Site) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the rules of the PLC and how it holds setpoints, from the site's equipment alone."""
-    house = site.greenhouse
-    rules = actuation.default_rules()
+def equipped(model: HybridModel) -> HybridModel:
+    """Return the model with the capacities of its site's equipment."""
+    house = model.site.greenhouse
+    rules, held = dict(model.actuation), dict(model.holding)
     rules["lamp_capacity"] = house.lamps.power if house.lamps else 0.0
-    rules["co2_capacity"] = house.co2_dosing_capacity
+    rules["co2_capacity"] = held["co2_capacity"] = house.co2_dosing_capacity
+    held["heating_capacity"] = house.heating_capacity
     for name, screen in (("energy_screen", house.energy_screen), ("blackout_screen", house.blackout_screen)):
         if screen is None:
             rules |= {f"{name}_unlit": 0.0, f"{name}_lit": 0.0, f"{name}_open": 0.0}
-    held = {name: parameter.value for name, parameter in holding.PARAMETERS.items()}
-    return rules, held | {"heating_capacity": house.heating_capacity, "co2_capacity": house.co2_dosing_capacity}
+    return model.controlled(rules, held)
 
 
 def _fitted_control(
@@ -127,7 +129,7 @@ def _fitted_control(
     for season in seasons:
         record = site_record(season.measured, site, 300.0)
         parts.append((record, setpoint_columns(season.measured, record)[0], None))
-    _, held = default_control(site)
+    held = {name: parameter.value for name, parameter in holding.PARAMETERS.items()}
     record, setpoints, _ = parts[0]
     return fit_actuation(parts, physical), fit_holding(record, setpoints, physical, held)
 

@@ -54,11 +54,16 @@ class HybridModel:
         return replace(self, actuation=dict(actuation), holding=dict(holding))
 
 
+MARGIN = 0.1
+"""Share of its width by which a range reaches beyond the data: so far a physical model may be believed."""
+
+
 def known_range(columns: Mapping[str, NDArray[np.float64]]) -> dict[str, tuple[float, float]]:
-    """Return the smallest and the largest value of each column that has any."""
+    """Return the smallest and the largest value of each column that has any, with a margin on either side."""
     found = {}
     for name, values in columns.items():
         finite = values[np.isfinite(values)]
         if len(finite):
-            found[name] = (float(finite.min()), float(finite.max()))
+            low, high = float(finite.min()), float(finite.max())
+            found[name] = (low - MARGIN * (high - low), high + MARGIN * (high - low))
     return found

@@ -42,7 +42,8 @@ def fit_holding(
             values["heating_offset"] = float(np.median(above[heating]))
             values["grow_share"] = float(np.sum(grow[heating]) / max(float(np.sum(rail[heating])), 1e-9))
         if idle.sum() > _ENOUGH:
-            values["heating_minimum"] = float(np.median(heat[idle]))
+            # Pipes that still cool down after a setpoint fell are no minimum.
+            values["heating_minimum"] = float(np.quantile(heat[idle], 0.1))
         values["heating_capacity"] = max(largest, values["heating_minimum"] + 5.0)
     ppm, dose = record.measured["air_co2"], record.inputs["co2_dosing"]
     fine = record.usable & np.isfinite(ppm)

@@ -9,7 +9,7 @@ from pathlib import Path
 from igrow_core.bundle import read_bundle, self_test
 from igrow_core.errors import IgrowError
 from igrow_core.site import load_site
-from trainer.default_bundle import default_bundle_folder, default_control
+from trainer.default_bundle import default_bundle_folder, equipped
 from trainer.export.bundle import read_hybrid_model, write_hybrid_bundle
 
 EXAMPLE = "igrow-trainer export --site config/site.yaml --out out/first-bundle"
@@ -29,7 +29,7 @@ def run(arguments: argparse.Namespace) -> int:
     site = load_site(arguments.site)
     model = read_hybrid_model(read_bundle(arguments.bundle or default_bundle_folder()), site)
     if arguments.bundle is None:
-        model = model.controlled(*default_control(site))
+        model = equipped(model)
     bundle = write_hybrid_bundle(arguments.out, model, created=datetime.now(UTC))
     worst = max(self_test(bundle), key=lambda deviation: deviation.relative)
     print(f"wrote {bundle.folder} ({bundle.label}); self-test: {worst.graph} {worst.output} {worst.relative:.1e}")

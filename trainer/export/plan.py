@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
 from onnx import GraphProto, ModelProto, helper
 
 from igrow_core import air
@@ -38,6 +39,8 @@ RANGED = ("air_temperature", "air_humidity", "air_co2", "outdoor_temperature", "
 """Quantities whose distance from the range of the training data is reported."""
 
 _SECONDS = 3600.0 / STEPS_PER_HOUR
+_EDGE = 3.0
+"""Standard deviations of the training data within which a crop stage is believed."""
 
 
 @dataclass(frozen=True)
@@ -359,10 +362,21 @@ def _crop_block(name: str, stage: network.Stage, drivers: Sequence[str]) -> Bloc
         read = xp.stack([named["driver"][driver] + like for driver in stage.drivers], axis=-1)
         state = xp.stack([named["state"][one] + like for one in stage.states], axis=-1)
         bounds = {"low": xp.asarray(stage.low), "high": xp.asarray(stage.high)}
-        following, _ = network.advance(xp, replace(stage, **bounds), state, read, read[..., :0])
+        # Beyond what it was trained on a network knows nothing: there it goes on as at the edge. How much was grown
+        # or picked before is no reason to grow: of a cumulative state it sees the mean.
+        edge = np.where(np.array(stage.cumulative), 0.0, _EDGE).astype(np.float32)
+        inside = _clipped(xp, state, stage.state_offset, edge * stage.state_scale)
+        read = _clipped(xp, read, stage.feature_offset, _EDGE * stage.feature_scale)
+        following, _ = network.advance(xp, replace(stage, **bounds), inside, read, read[..., :0])
+        following = following + (state - inside)
         return {one: following[..., column] for column, one in enumerate(stage.states)}
 
     return trace(name, formula, [f"driver:{one}" for one in drivers] + [f"state:{one}" for one in stage.states])
+
+
+def _clipped(xp: Any, values: Any, middle: Any, width: Any) -> Any:
+    low, high = xp.asarray(middle - width), xp.asarray(middle + width)
+    return xp.minimum(xp.maximum(values, low), high)
 
 
 def _range_formula(known: Mapping[str, tuple[float, float]]) -> Any:

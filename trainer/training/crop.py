@@ -55,15 +55,12 @@ def train_crop(
         hour=np.zeros(days - 1),
         valid=np.ones((len(hourly), days - 1), dtype=bool),
     )
+    first = untrained(_layout("growth", GROWTH, GROWTH_DRIVERS, (False, False, True)), growth, seed)
+    second = untrained(_layout("harvest", YIELD, HARVEST_DRIVERS, (True,)), harvest, seed)
     return CropStages(
-        growth=train_stage(
-            untrained(_layout("growth", GROWTH, GROWTH_DRIVERS, (False, False, True)), growth, seed),
-            growth, GROWTH_PLAN, report,
-        ),
-        harvest=train_stage(
-            untrained(_layout("harvest", YIELD, HARVEST_DRIVERS, (True,)), harvest, seed), harvest, HARVEST_PLAN, report
-        ),
-    )  # fmt: skip
+        growth=train_stage(first, growth, GROWTH_PLAN, report),
+        harvest=train_stage(second, harvest, HARVEST_PLAN, report),
+    )
 
 
 def _layout(name: str, states: tuple[str, ...], drivers: tuple[str, ...], cumulative: tuple[bool, ...]) -> StageLayout:

@@ -1,0 +1,191 @@
+"""What the demo shows at its end: one table, one figure, and `result.json` with the same numbers."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow_core.bundle import read_bundle
+from igrow_core.planner.objective import Objective, Outcome
+from igrow_core.quantities import QUANTITIES
+from igrow_core.simulator.hindcast import HindcastPredictor
+from igrow_core.site import Site, load_site
+from igrow_core.telemetry import Telemetry, read_csv, to_grid
+from trainer.publishing import read_exchange
+
+PREDICTED = ("air_temperature", "air_humidity", "air_co2")
+DAY = 288
+"""Rows of five minutes."""
+
+
+def summarise(out: Path, effect: str, days_before: int) -> str:
+    """Write result.json and demo.png into `out`, and return the table for the terminal."""
+    site = load_site(out / "site.yaml")
+    exchange = read_exchange(out / "exchange", "demo")
+    log = to_grid(exchange.telemetry, 300)
+    first = read_bundle(out / "first-bundle")
+    corrected = read_bundle(out / "diagnosis/bundle")
+    adopted = [event for event in exchange.events if event.get("kind") == "bundle_adopted"]
+    live = {
+        "first": live_error(first, log),
+        "corrected": live_error(corrected, log),
+    }
+    since = adoption_day(adopted, log)
+    diagnosis = json.loads((out / "diagnosis/diagnosis.json").read_text())
+    nothing = json.loads((out / "nothing-diagnosis/diagnosis.json").read_text())
+    money = compare_money(site, log, recipe_season(out), exchange.events, since)
+    result = {
+        "effect": effect,
+        "verdict": diagnosis["verdict"],
+        "findings": diagnosis["findings"],
+        "held_out_errors": diagnosis["errors"],
+        "verdict_without_effect": nothing["verdict"],
+        "adopted_on_day": since,
+        "live_error_24_h": {
+            name: {
+                "first_bundle_before": mean(live["first"][name][:days_before]),
+                "first_bundle_after": mean(live["first"][name][since:]) if since else None,
+                "bundle_in_force_after": mean(live["corrected"][name][since:]) if since else None,
+                "unit": QUANTITIES[name].unit,
+            }
+            for name in PREDICTED
+        },
+        "money": money,
+    }
+    (out / "result.json").write_text(json.dumps(result, indent=2))
+    draw(out / "demo.png", live, since, days_before, diagnosis, money)
+    return table(result)
+
+
+def live_error(bundle: Any, log: Telemetry) -> dict[str, NDArray[np.float64]]:
+    """Return the mean absolute error of the 24 h prediction that starts each midnight, by quantity, (days,)."""
+    origins = np.arange(0, len(log) - DAY, DAY)
+    predicted = HindcastPredictor().predict(bundle, log, origins, DAY)
+    rows = origins[:, None] + 1 + np.arange(DAY)
+    return {name: np.nanmean(np.abs(predicted[name] - log[name][rows]), axis=1) for name in PREDICTED}
+
+
+def adoption_day(adopted: list[Any], log: Telemetry) -> int | None:
+    """Return the first whole day under the corrected bundle, counted from the log's first row."""
+    if not adopted:
+        return None
+    moment = np.datetime64(int(adopted[-1]["time"]), "s")
+    return int(np.ceil((moment - log.time[0]) / np.timedelta64(1, "D")))
+
+
+def recipe_season(out: Path) -> Telemetry:
+    """Return the log of the same greenhouse under the recipe."""
+    return to_grid(read_csv(next((out / "recipe").glob("*.csv.gz"))), 300)
+
+
+def obtained(site: Site, log: Telemetry, days: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return what each day was worth by the planner's own rules, from what was measured, EUR m-2."""
+    physical = site.greenhouse
+    rail = np.maximum(log["rail_pipe_temperature"] - log["air_temperature"], 0.0)
+    grow = np.maximum(log["grow_pipe_temperature"] - log["air_temperature"], 0.0)
+    heat = physical.rail_pipe_heat_transfer * rail + physical.grow_pipe_heat_transfer * grow
+    hourly = {
+        "heat": heat * 3.6e-3,
+        "electricity": log["lamp_power"] * 1e-3,
+        "co2": log["co2_dosing"],
+        "net_growth": np.gradient(log["net_growth"]) * 12.0,
+        "fruit_fresh_weight": np.gradient(log["fruit_fresh_weight"]) * 12.0,
+    } | {name: log[name] for name in PREDICTED}
+    worth = []
+    for day in days:
+        rows = slice(day * DAY, (day + 1) * DAY)
+        means = {name: np.nanmean(values[rows].reshape(24, 12), axis=1)[None, None] for name, values in hourly.items()}
+        outcome = Outcome(**means, outside=np.zeros((1, 1, 24)))
+        time = log.time[rows][::12]
+        worth.append(float(Objective(site, time).value(outcome).profit[0, 0]))
+    return np.array(worth)
+
+
+def compare_money(site: Site, log: Telemetry, recipe: Telemetry, events: Any, since: int | None) -> dict[str, Any]:
+    """Return expected and obtained worth, plan against recipe, EUR m-2 per day, before and after the adoption."""
+    days = min(len(log), len(recipe)) // DAY
+    all_days = np.arange(1, days)
+    plan, other = obtained(site, log, all_days), obtained(site, recipe, all_days)
+    expected = np.full((2, days), np.nan)
+    for event in events:
+        if event.get("kind") == "plan":
+            detail = event.get("detail", event)
+            start = np.datetime64(str(detail["start"]).removesuffix("+00:00").removesuffix("Z"), "s")
+            day = int((start - log.time[0]) // np.timedelta64(1, "D"))
+            if 0 <= day < days:
+                expected[:, day] = detail["expected_profit"], detail["recipe_profit"]
+    spans = {"first bundle": slice(0, since), "corrected bundle": slice(since, None)} if since else {"all": slice(None)}
+    return {
+        name: {
+            "plan_expected": mean(expected[0, 1:][span]),
+            "plan_obtained": mean(plan[span]),
+            "recipe_expected": mean(expected[1, 1:][span]),
+            "recipe_obtained": mean(other[span]),
+            "unit": "EUR m-2 d-1",
+        }
+        for name, span in spans.items()
+    }
+
+
+def mean(values: NDArray[np.float64]) -> float:
+    """Return the mean of what is there, NaN for nothing."""
+    return float(np.nanmean(values)) if np.isfinite(values).any() else float("nan")
+
+
+def table(result: dict[str, Any]) -> str:
+    """Return the result as text."""
+    lines = ["held-out error, 24 h free runs   as deployed   recalibrated   with the effect"]
+    for name, horizons in result["held_out_errors"].items():
+        row = horizons.get("24_h")
+        if row:
+            cells = "".join(f"{row[stage]:15.3f}" for stage in ("deployed", "recalibrated", "corrected"))
+            lines.append(f"  {name:24}{cells}   {row['unit']}")
+    lines += ["", "live error of the daemon, 24 h      first bundle   first bundle   bundle in force"]
+    lines.append(f"{'':34}before         after it       after adoption")
+    for name, row in result["live_error_24_h"].items():
+        cells = [row["first_bundle_before"], row["first_bundle_after"], row["bundle_in_force_after"]]
+        lines.append(
+            f"  {name:24}"
+            + "".join("              -" if x is None else f"{x:15.3f}" for x in cells)
+            + f"   {row['unit']}"
+        )
+    lines += ["", "worth of a day (EUR m-2)        plan expected  obtained   recipe expected  obtained"]
+    for name, row in result["money"].items():
+        cells = [row[key] for key in ("plan_expected", "plan_obtained", "recipe_expected", "recipe_obtained")]
+        lines.append(f"  {name:28}{cells[0]:14.3f}{cells[1]:10.3f}{cells[2]:18.3f}{cells[3]:10.3f}")
+    named = ", ".join(one["effect"] for one in result["findings"]) or "nothing"
+    lines += ["", f"undeclared effect: {result['effect']}; found: {result['verdict']} ({named})"]
+    lines.append(f"the greenhouse with nothing missing: {result['verdict_without_effect']}")
+    return "\n".join(lines)
+
+
+def draw(path: Path, live: Any, since: int | None, days_before: int, diagnosis: Any, money: Any) -> None:
+    """Draw the figure: the live error falls when the corrected bundle is adopted."""
+    figure, axes = plt.subplots(3, 1, figsize=(9.0, 7.2), sharex=True, layout="constrained")
+    for axis, name, title in zip(axes, PREDICTED, ("air temperature", "relative humidity", "CO2"), strict=True):
+        first, corrected = live["first"][name], live["corrected"][name]
+        day = np.arange(len(first)) + 0.5
+        axis.plot(day, first, color="#b0b6bd", lw=1.6, label="first bundle")
+        if since is not None:
+            axis.plot(day[since:], corrected[since:], color="#1f8a4c", lw=2.2, label="corrected bundle, in force")
+            axis.axvline(since, color="#1f8a4c", lw=0.9, ls="--")
+        axis.axvline(days_before, color="#6b7280", lw=0.9, ls=":")
+        axis.set_ylabel(f"{title}\n{QUANTITIES[name].unit}")
+        axis.set_ylim(bottom=0)
+        axis.grid(alpha=0.25)
+        axis.spines[["top", "right"]].set_visible(False)
+    found = ", ".join(one["effect"].replace("_", " ") for one in diagnosis["findings"]) or "nothing"
+    axes[0].set_title(f"Error of the 24 h prediction, day by day: the trainer finds “{found}”", loc="left")
+    axes[0].legend(loc="upper right", frameon=False)
+    axes[0].text(days_before, axes[0].get_ylim()[1], " diagnosed", va="top", fontsize=9, color="#6b7280")
+    axes[-1].set_xlabel("day of plant time")
+    figure.savefig(path, dpi=120)
+    plt.close(figure)
