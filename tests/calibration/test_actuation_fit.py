@@ -1,0 +1,51 @@
+"""The actuation stage fitted to a log that known rules made."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from virtual_log import SITE, virtual_log
+
+from igrow_core.simulator import actuation
+from igrow_core.simulator.hybrid.nominal import nominal, site_record
+from trainer.calibration.actuation import fit_actuation, setpoint_columns
+from trainer.calibration.posterior import prior
+from trainer.calibration.site_model import fit_site
+from trainer.calibration.totals import daily_totals
+
+
+def test_rules_fitted_to_a_log_do_what_its_computer_did() -> None:
+    log = virtual_log(10, seed=8)
+    record = site_record(log, SITE, 300.0)
+    setpoints, inferred = setpoint_columns(log, record)
+    assert inferred == ()
+    rules = fit_actuation([(record, setpoints, None)], nominal(SITE))
+    usual = actuation.default_rules()
+    seen = record.inputs | record.measured | {"par": np.zeros(len(record))}
+    for name, size in (("vent_lee", 3.0), ("rail_pipe_temperature", 4.0), ("energy_screen", 10.0)):
+        wanted = actuation.targets(np, setpoints, seen, seen, seen, usual)[name]
+        got = actuation.targets(np, setpoints, seen, seen, seen, rules)[name]
+        assert np.abs(got - wanted).mean() < size, name
+    assert rules["lamp_capacity"] == usual["lamp_capacity"]
+
+
+def test_a_log_without_setpoints_has_them_inferred_and_says_which() -> None:
+    log = virtual_log(4, seed=9)
+    bare = log.only([name for name in log.columns if name not in {"heating_setpoint", "co2_setpoint"}])
+    record = site_record(bare, SITE, 300.0)
+    setpoints, inferred = setpoint_columns(bare, record)
+    assert inferred == ("heating_setpoint", "co2_setpoint")
+    assert np.isfinite(setpoints["heating_setpoint"]).all()
+
+
+@pytest.mark.soak
+def test_daily_totals_of_heat_and_co2_follow_from_setpoints() -> None:
+    log = virtual_log(14, seed=10)
+    record = site_record(log, SITE, 300.0)
+    setpoints, _ = setpoint_columns(log, record)
+    day = np.arange(len(record)) // 288
+    model = fit_site([(record, setpoints, day < 8, (day >= 8) & (day < 10))], prior(nominal(SITE)), {})
+    totals = daily_totals(record, setpoints, model, day >= 10)
+    for name in ("heat (MJ m-2)", "lamp electricity (kWh m-2)", "CO2 (kg m-2)"):
+        predicted, measured = totals[name]
+        assert abs(predicted.sum() / measured.sum() - 1.0) < 0.15, name

@@ -1,0 +1,135 @@
+"""The balances of the hybrid climate stage."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from virtual_log import SITE, virtual_log
+
+from igrow_core.simulator.hybrid import climate
+from igrow_core.simulator.hybrid import record as records
+from igrow_core.simulator.hybrid.nominal import leaf_area_curve, nominal, site_record
+from igrow_core.simulator.hybrid.parameters import PARAMETERS
+from igrow_core.site import Crop, Greenhouse, Site
+
+
+def steady_inputs(**changes: float) -> dict[str, float]:
+    usual = {
+        "outdoor_temperature": 8.0,
+        "outdoor_humidity": 80.0,
+        "outdoor_co2": 415.0,
+        "global_radiation": 300.0,
+        "wind_speed": 3.0,
+        "sky_temperature": 0.0,
+        "rail_pipe_temperature": 40.0,
+        "grow_pipe_temperature": 0.0,
+        "vent_lee": 0.0,
+        "vent_wind": 0.0,
+        "energy_screen": 0.0,
+        "blackout_screen": 0.0,
+        "lamp_power": 0.0,
+        "co2_dosing": 0.0,
+        "leaf_area_index": 3.0,
+        "mean_height": 5.0,
+    }
+    return usual | changes
+
+
+def settled(**changes: float) -> dict[str, float]:
+    """The climate that constant inputs lead to."""
+    values, inputs = nominal(SITE), steady_inputs(**changes)
+    start = {"air_temperature": 20.0, "air_humidity": 75.0, "air_co2": 600.0}
+    state = climate.initial_state(np, start, inputs, values, {}, 1.2)
+    for _ in range(24 * 12 * 8):
+        state = climate.advance(np, state, inputs, values, {}, seconds=300.0, lamp_efficacy=1.2)
+    drivers = climate.derive(np, state, inputs, values, 1.2)
+    return {name: float(drivers[name]) for name in ("air_temperature", "air_humidity", "air_co2", "ventilation")}
+
+
+def test_at_rest_every_balance_is_closed() -> None:
+    values, inputs = nominal(SITE), steady_inputs()
+    state = climate.initial_state(
+        np, {"air_temperature": 20.0, "air_humidity": 75.0, "air_co2": 600.0}, inputs, values, {}, 1.2
+    )
+    for _ in range(24 * 12 * 20):
+        state = climate.advance(np, state, inputs, values, {}, seconds=300.0, lamp_efficacy=1.2)
+    drivers = climate.derive(np, state, inputs, values, 1.2)
+    fluxes = climate.balances(np, state, drivers, values, {})
+    assert abs(fluxes["air_temperature"][0]) < 0.01
+    assert abs(fluxes["vapour_concentration"][0]) < 1e-9
+    assert abs(fluxes["co2_concentration"][0]) < 1e-10
+
+
+@pytest.mark.parametrize(
+    ("change", "quantity", "sign"),
+    [
+        ({"vent_lee": 60.0}, "air_temperature", -1),
+        ({"vent_lee": 60.0}, "air_humidity", -1),
+        ({"energy_screen": 100.0}, "air_temperature", 1),
+        ({"lamp_power": 100.0}, "air_temperature", 1),
+        ({"rail_pipe_temperature": 60.0}, "air_temperature", 1),
+        ({"global_radiation": 200.0}, "air_co2", -1),
+        ({"co2_dosing": 0.01}, "air_co2", 1),
+        ({"sky_temperature": -20.0}, "air_temperature", -1),
+        ({"leaf_area_index": 1.0}, "air_humidity", -1),
+    ],
+)
+def test_an_input_moves_the_climate_the_way_physics_says(change: dict[str, float], quantity: str, sign: int) -> None:
+    # With the night's screen there is no sun in the comparison, or the shade would hide the saving.
+    base = {"global_radiation": 0.0} if change.keys() & {"energy_screen", "global_radiation"} else {}
+    assert sign * (settled(**base | change)[quantity] - settled(**base)[quantity]) > 0.1
+
+
+def test_a_closed_screen_stops_vents_and_leaks() -> None:
+    values = nominal(SITE)
+    state = climate.initial_state(
+        np, {"air_temperature": 20.0, "air_humidity": 75.0, "air_co2": 800.0}, steady_inputs(), values, {}, 1.2
+    )
+    exchange = []
+    for screen in (0.0, 100.0):
+        inputs = steady_inputs(energy_screen=screen, vent_lee=20.0)
+        drivers = climate.derive(np, state, inputs, values, 1.2)
+        exchange.append(climate.balances(np, state, drivers, values, {})["co2_concentration"][1])
+    assert exchange[1] < 0.7 * exchange[0]
+
+
+def test_the_step_is_small_enough() -> None:
+    record = site_record(virtual_log(3, noise=False), SITE, 300.0)
+    fine = site_record(virtual_log(3, noise=False, step=300.0), SITE, 900.0)
+    values = nominal(SITE)
+    coarse = records.free_run(fine, records.observe(fine, values, {}), [0], 96, values, {})
+    exact = records.free_run(record, records.observe(record, values, {}), [0], 288, values, {})
+    difference = coarse["air_temperature"][:, 0] - exact["air_temperature"][2::3, 0]
+    assert np.abs(difference).mean() < 0.35
+
+
+def test_variants_in_one_batch_equal_runs_one_by_one() -> None:
+    record = site_record(virtual_log(2), SITE, 300.0)
+    values = nominal(SITE)
+    other = values | {"transmissivity": 0.5, "mass_heat_capacity": 200.0}
+    batch = {name: np.array([[values[name]], [other[name]]]) for name in values}
+    together = records.free_run(record, records.observe(record, batch, {}), [0, 100], 60, batch, {})
+    for position, single in enumerate((values, other)):
+        alone = records.free_run(record, records.observe(record, single, {}), [0, 100], 60, single, {})
+        np.testing.assert_allclose(together["air_temperature"][:, position], alone["air_temperature"], rtol=1e-9)
+
+
+def test_a_site_scales_what_it_describes_and_stays_within_bounds() -> None:
+    leaky = Site(name="leaky", latitude=52.0, longitude=4.5, greenhouse=Greenhouse(leakage=2.4e-4))
+    assert nominal(leaky)["leakage_wind"] == pytest.approx(2.0 * nominal(SITE)["leakage_wind"])
+    extreme = Site(
+        name="x", latitude=0.0, longitude=0.0, greenhouse=Greenhouse(cover_heat_transfer=15, cover_area_ratio=5)
+    )
+    assert all(PARAMETERS[name].low <= value <= PARAMETERS[name].high for name, value in nominal(extreme).items())
+
+
+def test_a_log_without_leaf_area_gets_the_crops_usual_course_and_says_so() -> None:
+    log = virtual_log(2)
+    record = site_record(log, SITE, 300.0)
+    assert "leaf_area_index" in record.unknown
+    curve = leaf_area_curve(
+        Site(name="young", latitude=0, longitude=0, crop=Crop(planting_date=np.datetime64("2020-02-01").item())),
+        log.time,
+    )
+    assert curve[0] < 0.2
+    assert (np.diff(curve) >= 0.0).all()

@@ -1,0 +1,90 @@
+"""A log that the hybrid stage and the actuation stage made themselves, for tests of what is fitted to logs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow_core import sun
+from igrow_core.simulator import actuation
+from igrow_core.simulator.closed_loop import closed_run
+from igrow_core.simulator.hybrid import record as records
+from igrow_core.simulator.hybrid.nominal import nominal, site_record
+from igrow_core.site import Site
+from igrow_core.telemetry import Telemetry
+
+Floats = NDArray[np.float64]
+
+SITE = Site(name="virtual", latitude=52.0, longitude=4.5)
+START = np.datetime64("2020-02-01T00:00:00", "s")
+
+
+def weather(days: int, step: float, seed: int) -> dict[str, Floats]:
+    """Weather with days that differ, seeded."""
+    generator = np.random.default_rng(seed)
+    count = round(days * 86_400 / step)
+    time = START + (np.arange(count) * step).astype("timedelta64[s]")
+    day = np.arange(count) * step / 86_400.0
+    clear = np.interp(day, np.arange(days + 2), generator.uniform(0.2, 0.9, days + 2))
+    warm = np.interp(day, np.arange(days + 2), generator.uniform(2.0, 12.0, days + 2))
+    wind = np.interp(day, np.arange(0, days + 2, 0.25), generator.uniform(0.5, 9.0, len(np.arange(0, days + 2, 0.25))))
+    radiation = 0.7 * clear * sun.extraterrestrial_radiation(time, SITE.latitude, SITE.longitude)
+    temperature = warm + 3.0 * np.sin(2.0 * np.pi * (day - 0.375))
+    return {
+        "outdoor_temperature": temperature,
+        "outdoor_humidity": 90.0 - 25.0 * clear,
+        "global_radiation": radiation,
+        "wind_speed": wind,
+        "sky_temperature": temperature - 4.0 - 14.0 * clear,
+        "outdoor_co2": np.full(count, 415.0),
+    }
+
+
+def setpoints(days: int, step: float) -> dict[str, Floats]:
+    """A day and a night temperature, CO2 and lamps by day."""
+    hour = (np.arange(round(days * 86_400 / step)) * step / 3600.0) % 24.0
+    day = (hour > 6.0) & (hour < 18.0)
+    return {
+        "heating_setpoint": np.where(day, 20.0, 17.0),
+        "co2_setpoint": np.where(day, 700.0, 400.0),
+        "lamp_on": np.where((hour > 4.0) & (hour < 18.0), 1.0, 0.0),
+        "irrigation_on": np.where(day, 0.1, 0.0),
+    }
+
+
+def virtual_log(
+    days: int,
+    *,
+    seed: int = 0,
+    step: float = 300.0,
+    parameters: Mapping[str, float] | None = None,
+    added: Mapping[str, Floats] | None = None,
+    noise: bool = True,
+) -> Telemetry:
+    """Return the log of a virtual greenhouse; `added` are fluxes that the simulator does not know, (n,)."""
+    generator = np.random.default_rng(seed + 1)
+    outside, asked = weather(days, step, seed), setpoints(days, step)
+    count = len(asked["lamp_on"])
+    time = START + (np.arange(count) * step).astype("timedelta64[s]")
+    empty = {name: np.zeros(count) for name in actuation.OUTPUTS}
+    begin = {
+        "air_temperature": np.full(count, 18.0),
+        "air_humidity": np.full(count, 75.0),
+        "air_co2": np.full(count, 450.0),
+    }
+    blank = Telemetry(time, outside | empty | begin)
+    record = site_record(blank, SITE, step)
+    values = dict(parameters or nominal(SITE))
+    states = records.observe(record, values, {})
+    out = closed_run(record, states, asked, [0], count - 1, values, {}, actuation.default_rules(), added)
+    columns = dict(outside) | asked
+    for name in ("air_temperature", "air_humidity", "air_co2"):
+        columns[name] = np.concatenate([begin[name][:1], out[name][:, 0]])
+    for name in actuation.OUTPUTS:
+        columns[name] = np.concatenate([out[name][:, 0], out[name][-1:, 0]])
+    if noise:
+        for name, size in (("air_temperature", 0.05), ("air_humidity", 0.4), ("air_co2", 5.0)):
+            columns[name] = columns[name] + size * generator.standard_normal(count)
+    return Telemetry(time, columns)
