@@ -22,8 +22,10 @@ from sklearn.ensemble import HistGradientBoostingRegressor
 from igrow_core.errors import IgrowError
 from igrow_core.simulator.hybrid.nominal import nominal, site_record
 from igrow_core.simulator.hybrid.record import Record
+from igrow_core.simulator.uncertainty import ErrorGrowth
 from trainer.calibration.actuation import setpoint_columns
 from trainer.calibration.evaluation import Errors, errors_of, summarise
+from trainer.calibration.forecast import Predictor, combined, remembering
 from trainer.calibration.posterior import prior
 from trainer.calibration.site_model import SiteModel, fit_site
 from trainer.calibration.split import weeks
@@ -55,34 +57,29 @@ class Greenhouse:
         return fit_site([(self.record, self.setpoints, fit, selection)], prior(nominal(self.site)), {}, **options)  # type: ignore[arg-type]
 
 
-def test_errors(
-    house: Greenhouse, model: SiteModel, rows: Mask, begin: Mask | None, every: float
-) -> dict[str, dict[tuple[str, str], Errors]]:
-    """Errors of both ways to drive a model."""
-    found = {
-        "hybrid, actuators": errors_of(
-            house.record, model.predictor(house.record), HORIZONS, rows, begin=begin, every=every
-        )
-    }
+Predictors = Mapping[str, tuple[Predictor, Mapping[str, ErrorGrowth]]]
+
+
+def predictors(house: Greenhouse, model: SiteModel) -> Predictors:
+    """All ways to drive a model, with their intervals."""
+    by_actuators = remembering(model.predictor(house.record))
+    found = {"hybrid, actuators": (by_actuators, model.growth)}
     if model.rules:
-        found["hybrid, setpoints"] = errors_of(
-            house.record,
-            model.closed_predictor(house.record, house.setpoints),
-            HORIZONS,
-            rows,
-            begin=begin,
-            every=every,
-        )
-    if model.combinations:
-        found["hybrid, combined"] = errors_of(
-            house.record,
-            model.combined_predictor(house.record, house.setpoints),
-            HORIZONS,
-            rows,
-            begin=begin,
-            every=every,
-        )
+        by_setpoints = remembering(model.closed_predictor(house.record, house.setpoints))
+        found["hybrid, setpoints"] = (by_setpoints, model.closed_growth)
+        if model.combinations:
+            both = combined(house.record, by_actuators, by_setpoints, model.combinations)
+            found["hybrid, combined"] = (remembering(both), model.combined_growth)
     return found
+
+
+def all_errors(
+    house: Greenhouse, ways: Predictors, rows: Mask, begin: Mask | None, every: float
+) -> dict[str, dict[tuple[str, str], Errors]]:
+    return {
+        name: errors_of(house.record, predict, HORIZONS, rows, begin=begin, every=every)
+        for name, (predict, _) in ways.items()
+    }
 
 
 def boosted(
@@ -152,14 +149,6 @@ def show(title: str, found: Mapping[str, Sequence[Mapping[tuple[str, str], Error
     return result
 
 
-def show_extras(house: Greenhouse, model: SiteModel, rows: Mask, begin: Mask | None = None) -> tuple[object, object]:
-    """Coverage of the intervals and daily totals of one model on rows it has not seen."""
-    return (
-        coverage(house.record, house.setpoints, model, rows, begin),
-        daily_totals(house.record, house.setpoints, model, rows, begin),
-    )
-
-
 def later(house: Greenhouse, every: float) -> dict[str, object]:
     count = int(house.week[-1]) + 1
     fit_weeks, selection_weeks = round(0.6 * count), max(2, round(0.15 * count))
@@ -169,36 +158,36 @@ def later(house: Greenhouse, every: float) -> dict[str, object]:
     began = time.monotonic()
     model = house.fit(fit, selection)
     print(f"{house.log.name}: fitted in {time.monotonic() - began:.0f} s")
-    found = {name: [errors] for name, errors in test_errors(house, model, rows, None, every).items()}
+    ways = predictors(house, model)
+    found = {name: [errors] for name, errors in all_errors(house, ways, rows, None, every).items()}
     found["gradient boosting"] = [boosted(house, fit | selection, rows, None, every)]
     title = (
         f"{house.log.name}, later: weeks 1-{fit_weeks} fit, {selection_weeks} selection, "
         f"{count - fit_weeks - selection_weeks} test"
     )
     table = show(title, found)
-    covered, totals = show_extras(house, model, rows)
-    print_coverage([covered])
-    print_totals([totals])
+    print_coverage([coverage(house.record, ways, rows, None, every)])
+    print_totals([daily_totals(house.record, house.setpoints, model, rows)])
     return table
 
 
-def weekly(house: Greenhouse, every: float, first: int = 8) -> dict[str, object]:
+def weekly(house: Greenhouse, every: float, refit: int, first: int = 8) -> dict[str, object]:
     found: dict[str, list[Mapping[tuple[str, str], Errors]]] = {}
     covered, totals = [], []
     count = int(house.week[-1]) + 1
-    for test in range(first, count):
+    for test in range(first, count, refit):
         fit = (house.week >= test - 8) & (house.week < test - 2)
         selection = (house.week >= test - 2) & (house.week < test)
         model = house.fit(fit, selection)
-        begin, rows = house.week == test, house.week >= test
-        for name, errors in test_errors(house, model, rows, begin, every).items():
+        begin, rows = (house.week >= test) & (house.week < test + refit), house.week >= test
+        ways = predictors(house, model)
+        for name, errors in all_errors(house, ways, rows, begin, every).items():
             found.setdefault(name, []).append(errors)
         found.setdefault("gradient boosting", []).append(boosted(house, fit | selection, rows, begin, every))
-        extras = show_extras(house, model, rows, begin)
-        covered.append(extras[0])
-        totals.append(extras[1])
+        covered.append(coverage(house.record, ways, rows, begin, every))
+        totals.append(daily_totals(house.record, house.setpoints, model, rows, begin))
         print(f"week {test + 1} of {count} done", file=sys.stderr)
-    table = show(f"{house.log.name}, weekly: refitted before each of weeks {first + 1}-{count}", found)
+    table = show(f"{house.log.name}, weekly: refitted every {refit} weeks, weeks {first + 1}-{count} test", found)
     print_coverage(covered)
     print_totals(totals)
     return table
@@ -264,6 +253,7 @@ def main() -> int:
     parser.add_argument("compartments", nargs="*", help="names; none: all that have a climate file")
     parser.add_argument("--tables", nargs="+", choices=("later", "weekly", "across"), default=["later"])
     parser.add_argument("--every", type=float, default=11_100.0, help="seconds between starts of test runs")
+    parser.add_argument("--refit", type=int, default=1, help="weeks between refits of the table weekly")
     parser.add_argument("--json", type=Path, help="file for the tables")
     given = parser.parse_args()
     try:
@@ -277,8 +267,12 @@ def main() -> int:
         if table == "across":
             result["across"] = across(houses, given.every)
         else:
-            run = later if table == "later" else weekly
-            result[table] = {house.log.name: run(house, given.every) for house in houses}
+            result[table] = {
+                house.log.name: later(house, given.every)
+                if table == "later"
+                else weekly(house, given.every, given.refit)
+                for house in houses
+            }
     if given.json is not None:
         given.json.write_text(json.dumps(result, indent=1))
     return 0

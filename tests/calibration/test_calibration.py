@@ -97,7 +97,7 @@ def test_a_run_counts_only_if_all_its_rows_are_allowed(record: Record) -> None:
 def test_the_remainder_finds_a_flux_that_follows_the_weather_and_stays_bounded() -> None:
     count = 10 * 288
     plain = site_record(virtual_log(10, seed=6), SITE, 300.0)
-    lost = -0.06 * plain.inputs["global_radiation"]
+    lost = -0.15 * plain.inputs["global_radiation"]
     record = site_record(virtual_log(10, seed=6, added={"heat": lost}), SITE, 300.0)
     fit, later = np.arange(count) < 6 * 288, np.arange(count) >= 7 * 288
     values = nominal(SITE)

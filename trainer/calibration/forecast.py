@@ -46,20 +46,22 @@ def usual_error(record: Record, predict: Predictor, starts: NDArray[np.int64], s
     day = round(86_400.0 / record.step)
     length = min(steps, day)
     following = 1 + np.arange(length)[:, None]
-    total = {name: np.zeros((length, len(starts))) for name in record.measured}
-    weights = {name: np.zeros((length, len(starts))) for name in record.measured}
-    for back in range(1, _DAYS + 1):
-        there = starts - back * day >= 0
-        past = np.where(there, starts - back * day, 0)
-        weight = float(np.exp(-(back - 1) / _MEMORY))
-        for name, predicted in predict(past, length).items():
-            if name in total:
-                error = record.measured[name][past + following] - predicted
-                known = np.isfinite(error) & there
-                total[name] += weight * np.where(known, error, 0.0)
-                weights[name] += weight * known
+    # All days in one batch: a run costs by its steps, hardly by how many run at once.
+    back = np.arange(1, _DAYS + 1)[:, None]
+    there = starts - back * day >= 0
+    past = np.where(there, starts - back * day, 0)
+    weight = np.exp(-(back - 1) / _MEMORY)
+    result = {}
+    for name, predicted in predict(past.ravel(), length).items():
+        if name not in record.measured:
+            continue
+        shape = (length, *past.shape)
+        error = (record.measured[name][past.ravel() + following] - predicted).reshape(shape)
+        known = np.isfinite(error) & there
+        total = np.sum(np.where(known, error, 0.0) * weight, axis=1)
+        result[name] = total / np.maximum(np.sum(known * weight, axis=1), 1e-9)
     repeat = np.arange(steps) % day
-    return {name: (total[name] / np.maximum(weights[name], 1e-9))[repeat] for name in total}
+    return {name: error[repeat] for name, error in result.items()}
 
 
 def fit_combination(
@@ -103,6 +105,19 @@ def combined(
         }
 
     return predict
+
+
+def remembering(predict: Predictor) -> Predictor:
+    """Return the predictor with a memory of what it was asked, for tables that ask the same twice."""
+    known: dict[tuple[bytes, int], Mapping[str, Floats]] = {}
+
+    def remembered(starts: NDArray[np.int64], steps: int) -> Mapping[str, Floats]:
+        key = (starts.tobytes(), steps)
+        if key not in known:
+            known[key] = predict(starts, steps)
+        return known[key]
+
+    return remembered
 
 
 def _share(target: Floats, regressor: Floats) -> float:

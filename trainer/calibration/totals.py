@@ -61,22 +61,26 @@ def daily_totals(
 
 
 def coverage(
-    record: Record, setpoints: Mapping[str, Floats], model: SiteModel, rows: Mask, begin: Mask | None = None
+    record: Record,
+    predictors: Mapping[str, tuple[Predictor, Mapping[str, ErrorGrowth]]],
+    rows: Mask,
+    begin: Mask | None = None,
+    every: float = 11_100.0,
 ) -> dict[tuple[str, str], tuple[float, float]]:
     """Return how many measurements lay within the 90 % intervals, and how many there were.
 
-    By (what drove the run, "quantity horizon"): at 1 h, over 24 h, over 7 days.
+    By (name of the predictor, "quantity horizon"): at 1 h, over 24 h, over 7 days.
+
+    Args:
+        record: the log.
+        predictors: with the error growth of each quantity, by name.
+        rows: a run counts only if all its rows are among these, (n,).
+        begin: rows at which runs may start, (n,); None: all.
+        every: seconds between starts.
     """
     found: dict[tuple[str, str], tuple[float, float]] = {}
-    driven: list[tuple[str, Predictor, Mapping[str, ErrorGrowth]]] = [
-        ("actuators", model.predictor(record), model.growth)
-    ]
-    if model.rules:
-        driven.append(("setpoints", model.closed_predictor(record, setpoints), model.closed_growth))
-    if model.combinations:
-        driven.append(("combined", model.combined_predictor(record, setpoints), model.combined_growth))
-    for how, predict, growth in driven:
-        for horizon, hours, every in (("1_h", 1.0, 7500.0), ("24_h", 24.0, 18_900.0), ("7_d", 168.0, 40_500.0)):
+    for how, (predict, growth) in predictors.items():
+        for horizon, hours in (("1_h", 1.0), ("24_h", 24.0), ("7_d", 168.0)):
             steps = round(hours * 3600.0 / record.step)
             starts = starts_within(record, rows, steps, max(1, round(every / record.step)))
             if begin is not None:
