@@ -46,7 +46,7 @@ _MOVEMENT: Mapping[str, tuple[float, float, float, float, float]] = MappingProxy
         "outdoor_temperature": (1.0, 2.0, 6.0, -INFINITE, INFINITE),
         "outdoor_humidity": (5.0, 10.0, 6.0, 1.0, 97.0),
         "global_radiation": (600.0, 900.0, 2.0, 5.0, INFINITE),
-        "wind_speed": (20.0, 25.0, 3.0, 0.5, INFINITE),
+        "wind_speed": (20.0, 25.0, 6.0, 0.5, INFINITE),
         "rail_pipe_temperature": (15.0, 15.0, INFINITE, -INFINITE, INFINITE),
         "grow_pipe_temperature": (15.0, 15.0, INFINITE, -INFINITE, INFINITE),
     }
