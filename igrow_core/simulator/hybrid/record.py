@@ -80,6 +80,19 @@ class Record:
             usable=self.usable[first:last],
         )
 
+    def coarser(self, factor: int) -> Record:
+        """Return a record of every `factor`-th row, its inputs the means from there to the next."""
+        whole = len(self) // factor * factor
+        first = slice(0, whole, factor)
+        return replace(
+            self,
+            time=self.time[first],
+            step=self.step * factor,
+            inputs={name: values[:whole].reshape(-1, factor).mean(axis=1) for name, values in self.inputs.items()},
+            measured={name: values[first] for name, values in self.measured.items()},
+            usable=self.usable[:whole].reshape(-1, factor).all(axis=1),
+        )
+
     def since(self, onset: np.datetime64 | None) -> Record:
         """Return the record with ``elapsed_days`` counted from `onset` (None: from the first row)."""
         start = self.time[0] if onset is None else onset
