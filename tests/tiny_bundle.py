@@ -69,9 +69,7 @@ def write_tiny_bundle(
         opset=OPSET,
         graphs={"simulator": signature, "optimizer": signature},
         effects=(
-            EffectRecord(
-                "wind_infiltration", "process", {"amplitude": Estimate(0.05, 0.04, 0.06, "m s-1")}, ("heat",)
-            ),
+            EffectRecord("wind_infiltration", "process", {"amplitude": Estimate(0.05, 0.04, 0.06, "m s-1")}, ("heat",)),
         ),
     )
     graph = linear_graph(1.0, offset)
