@@ -19,8 +19,8 @@ class UpdateRules:
     """Length of the probation after adoption."""
     tolerance: float = 0.02
     """By how much the candidate's errors, over all, may exceed those of the bundle in force."""
-    worst: float = 0.25
-    """By how much any single one may."""
+    worst: float = 0.5
+    """By how much any single one may: in two days of weather one quantity in three is worse by a quarter by chance."""
     early_tolerance: float = 0.25
     """During probation, once a day: an excess that ends it at once."""
     live_error_hours: float = 6.0

@@ -222,7 +222,7 @@ class BundleUpdates:
                 time, candidate, comparison, f"errors in the shadow run are {comparison.score:.2f} times those before"
             )
         else:
-            reason = f"worse in the shadow run: errors {comparison.score:.2f} times those of the bundle in force"
+            reason = f"worse in the shadow run: {comparison.words()}"
             self._reject(time, candidate.identity, candidate.label, reason, comparison, {})
             self._tidy()
 
@@ -244,7 +244,7 @@ class BundleUpdates:
         live = {"before": state.live_before, "after": after}
         tolerance, worst = (rules.tolerance, rules.worst) if over else (rules.early_tolerance, 2.0 * rules.worst)
         if not comparison.not_worse(tolerance, worst):
-            reason = f"worse than its predecessor on the same days: errors {comparison.score:.2f} times as large"
+            reason = f"worse than its predecessor on the same days: {comparison.words()}"
             with self._lock:
                 state.active, state.previous, state.watch_since = previous.identity, None, None
             self._reject(time, active.identity, active.label, reason, comparison, live, verdict="went_back")

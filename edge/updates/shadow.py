@@ -80,6 +80,13 @@ class Comparison:
         ratios = [pair.ratio for pair in self.pairs if pair.count]
         return self.score <= 1.0 + tolerance and all(ratio <= 1.0 + worst for ratio in ratios)
 
+    def words(self) -> str:
+        """Return in a few words how the candidate's errors compare, over all and at their worst."""
+        worst = max((pair for pair in self.pairs if pair.count), key=lambda pair: pair.ratio, default=None)
+        if worst is None:
+            return "nothing could be compared"
+        return f"errors {self.score:.2f} times as large, {worst.quantity} at {worst.horizon} h {worst.ratio:.2f} times"
+
     def table(self) -> list[dict[str, object]]:
         """Return the rows for reports."""
         return [
