@@ -20,7 +20,7 @@ class UpdateRules:
     tolerance: float = 0.02
     """By how much the candidate's errors, over all, may exceed those of the bundle in force."""
     worst: float = 0.5
-    """By how much any single one may: in two days of weather one quantity in three is worse by a quarter by chance."""
+    """By how much any single one may: two days of weather are few, and chance alone moves a single error far."""
     early_tolerance: float = 0.25
     """During probation, once a day: an excess that ends it at once."""
     live_error_hours: float = 6.0
