@@ -133,3 +133,12 @@ def test_a_log_without_leaf_area_gets_the_crops_usual_course_and_says_so() -> No
     )
     assert curve[0] < 0.2
     assert (np.diff(curve) >= 0.0).all()
+
+
+def test_a_coarser_record_keeps_what_was_measured_and_the_means_of_what_drove_it() -> None:
+    record = site_record(virtual_log(1), SITE, 300.0)
+    coarse = record.coarser(3)
+    assert coarse.step == 900.0
+    assert len(coarse) == len(record) // 3
+    np.testing.assert_array_equal(coarse.measured["air_co2"], record.measured["air_co2"][::3])
+    assert coarse.inputs["lamp_power"][5] == pytest.approx(record.inputs["lamp_power"][15:18].mean())

@@ -102,7 +102,7 @@ def calibrate(
 def coarser_rows(rows: NDArray[np.bool_], factor: int) -> NDArray[np.bool_]:
     """Return which rows of a coarser record are made of allowed rows only."""
     whole = len(rows) // factor * factor
-    coarse: NDArray[np.bool_] = rows[:whole].reshape(-1, factor).all(axis=1)
+    coarse: NDArray[np.bool_] = np.asarray(rows[:whole].reshape(-1, factor).all(axis=1))
     return coarse
 
 

@@ -90,7 +90,7 @@ class Record:
             step=self.step * factor,
             inputs={name: values[:whole].reshape(-1, factor).mean(axis=1) for name, values in self.inputs.items()},
             measured={name: values[first] for name, values in self.measured.items()},
-            usable=self.usable[:whole].reshape(-1, factor).all(axis=1),
+            usable=np.asarray(self.usable[:whole].reshape(-1, factor).all(axis=1)),
         )
 
     def since(self, onset: np.datetime64 | None) -> Record:
