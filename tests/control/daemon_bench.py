@@ -126,7 +126,7 @@ class Plant:
         return self.plc.memory.value(name)
 
 
-async def until(condition: Callable[[], object], seconds: float = 15.0) -> None:
+async def until(condition: Callable[[], object], seconds: float = 60.0) -> None:
     """Wait for a condition; the limit only says when a test has failed."""
     async with asyncio.timeout(seconds):
         while not condition():  # noqa: ASYNC110 - what is waited for happens in other tasks and processes
@@ -142,4 +142,4 @@ async def running(path: Path, **replaced: object) -> AsyncIterator[Daemon]:
         yield daemon
     finally:
         daemon.stop()
-        await asyncio.wait_for(task, 20.0)
+        await asyncio.wait_for(task, 60.0)

@@ -178,7 +178,7 @@ def test_simulate_plc_serves_what_mean_commands_ask_for(tmp_path):
         assert "answers" in subprocess.run(probe, capture_output=True, text=True, check=True).stdout
     finally:
         process.terminate()
-        assert process.wait(10) == 0
+        assert process.wait(60) == 0
 
 
 def test_an_effect_is_written_with_size_and_start():
