@@ -76,7 +76,8 @@ def run(arguments: argparse.Namespace) -> int:
     print(f"\nmean absolute error on {int(split.held_out.sum() * record.step / 86_400)} held-out days")
     print("before: the prior; calibrated: its parameters fitted; observed: also with the disturbance seen so far")
     print(
-    print(f"{'quantity':18}{'horizon':>8}{'persistence':>13}{'before':>10}{'calibrated':>12}{'observed':>10}  90 % of days")
+    header = f"{'quantity':18}{'horizon':>8}{'persistence':>13}{'before':>10}{'calibrated':>12}{'observed':>10}"
+    print(f"{header}  90 % interval")
     )
     for quantity, by_horizon in after.items():
         for horizon, summary in by_horizon.items():
