@@ -76,15 +76,14 @@ def run(arguments: argparse.Namespace) -> int:
     print(f"\nmean absolute error on {int(split.held_out.sum() * record.step / 86_400)} held-out days")
     print("before: the prior; calibrated: its parameters fitted; observed: also with the disturbance seen so far")
     print(
-    header = f"{'quantity':18}{'horizon':>8}{'persistence':>13}{'before':>10}{'calibrated':>12}{'observed':>10}"
-    print(f"{header}  90 % interval")
-    )
+    columns = ("persistence", "before", "calibrated", "observed")
+    print(f"{'quantity':18}{'horizon':>8}" + "".join(f"{name:>12}" for name in columns) + "   90 % interval")
     for quantity, by_horizon in after.items():
         for horizon, summary in by_horizon.items():
             unit = QUANTITIES[quantity].unit
             old, plain = before[quantity][horizon].mae, alone[quantity][horizon].mae
             print(
-                f"{quantity:18}{horizon:>8}{summary.persistence:13.3f}{old:10.3f}{plain:12.3f}{summary.mae:10.3f}  "
+                f"{quantity:18}{horizon:>8}{summary.persistence:12.3f}{old:12.3f}{plain:12.3f}{summary.mae:12.3f}   "
                 f"{summary.mae_low:.3f} to {summary.mae_high:.3f} {unit}"
             )
             errors.append(HeldOutError(quantity, horizon, float(old), float(plain), unit))
