@@ -75,7 +75,6 @@ def run(arguments: argparse.Namespace) -> int:
     errors = []
     print(f"\nmean absolute error on {int(split.held_out.sum() * record.step / 86_400)} held-out days")
     print("before: the prior; calibrated: its parameters fitted; observed: also with the disturbance seen so far")
-    print(
     columns = ("persistence", "before", "calibrated", "observed")
     print(f"{'quantity':18}{'horizon':>8}" + "".join(f"{name:>12}" for name in columns) + "   90 % interval")
     for quantity, by_horizon in after.items():
