@@ -46,7 +46,12 @@ class ErrorGrowth:
 
 
 def error_growth(
-    error: Floats, lead_hours: Floats, radiation: Floats, coverage: float = 0.9, centres: tuple[float, ...] = ()
+    error: Floats,
+    lead_hours: Floats,
+    radiation: Floats,
+    coverage: float = 0.9,
+    centres: tuple[float, ...] = (),
+    independent: float = float("inf"),
 ) -> ErrorGrowth:
     """Return the growth of errors seen on days that the model was not fitted on.
 
@@ -56,12 +61,15 @@ def error_growth(
         radiation: global, W m-2, (steps, runs).
         coverage: of the interval.
         centres: lead times at which quantiles are taken, each over the steps around it; () for a usual set.
+        independent: how many independent errors they are worth. With few, the quantiles are taken further out, as
+            conformal prediction does to keep its promise.
     """
     usual = (lead_hours[0], 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 24.0, 48.0, 96.0, 168.0)
     hours = np.array(
         sorted({float(c) for c in (centres or usual) if lead_hours[0] <= c <= lead_hours[-1]} | {float(lead_hours[-1])})
     )
     tail = 0.5 * (1.0 - coverage)
+    tail = max(tail - (1.0 - tail) / independent, 0.1 * tail)
     low, high = np.zeros((2, len(hours))), np.zeros((2, len(hours)))
     for position, hour in enumerate(hours):
         near = np.abs(np.log(lead_hours / hour)) <= 0.25

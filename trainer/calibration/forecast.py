@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from igrow_core.simulator.hybrid.record import Record
+from igrow_core.simulator.uncertainty import DAYLIGHT
 
 Floats = NDArray[np.float64]
 Predictor = Callable[[NDArray[np.int64], int], Mapping[str, Floats]]
@@ -26,16 +27,29 @@ _MEMORY = 3.0
 """Days after which a past day has lost 63 % of its weight."""
 
 
+_SHORT = 2.0
+"""Hours up to which a lead is short: what was seen at the start still tells."""
+CELLS = ("short lead by night", "short lead by day", "long lead by night", "long lead by day")
+
+
 @dataclass(frozen=True)
 class Combination:
-    """How the forecasts of one quantity are made from runs by measured actuators and by setpoints."""
+    """How the forecasts of one quantity are made from runs by measured actuators and by setpoints, by `CELLS`."""
 
-    actuators_share: float
-    """Part of the usual error of runs by actuators that is expected again."""
-    setpoints_share: float
-    """The same of runs by setpoints."""
-    setpoints_weight: float
-    """Weight of the corrected run by setpoints; the other has the rest."""
+    actuators_share: Floats
+    """Part of the usual error of runs by actuators that is expected again, (4,)."""
+    setpoints_share: Floats
+    """The same of runs by setpoints, (4,)."""
+    setpoints_weight: Floats
+    """Weight of the corrected run by setpoints, (4,); the other has the rest."""
+
+
+def cells(record: Record, starts: NDArray[np.int64], steps: int) -> NDArray[np.int64]:
+    """Return which of `CELLS` each row of runs is in, (steps, s): by lead time and outdoor radiation."""
+    lead = (np.arange(1, steps + 1) * (record.step / 3600.0))[:, None]
+    sun = record.inputs["global_radiation"][starts + 1 + np.arange(steps)[:, None]]
+    found: NDArray[np.int64] = 2 * (lead > _SHORT).astype(np.int64) + (sun > DAYLIGHT).astype(np.int64)
+    return found
 
 
 def usual_error(record: Record, predict: Predictor, starts: NDArray[np.int64], steps: int) -> dict[str, Floats]:
@@ -72,20 +86,23 @@ def fit_combination(
     one, other = by_actuators(starts, steps), by_setpoints(starts, steps)
     usual_one = usual_error(record, by_actuators, starts, steps)
     usual_other = usual_error(record, by_setpoints, starts, steps)
+    place = cells(record, starts, steps)
     result = {}
     for name, values in record.measured.items():
         measured = values[following]
-        known = np.isfinite(measured)
-        if not known.any():
+        if not np.isfinite(measured).any():
             continue
-        first, second = (
-            _share((measured - run[name])[known], usual[name][known])
-            for run, usual in ((one, usual_one), (other, usual_other))
-        )
-        error_one = (measured - one[name] - first * usual_one[name])[known]
-        error_other = (measured - other[name] - second * usual_other[name])[known]
-        # measured = one + weight (other - one): a regression of error_one on error_one - error_other.
-        result[name] = Combination(first, second, _share(error_one, error_one - error_other))
+        table = np.zeros((3, len(CELLS)))
+        for cell in range(len(CELLS)):
+            here = np.isfinite(measured) & (place == cell)
+            wanted = measured[here]
+            first = _share(wanted - one[name][here], usual_one[name][here])
+            second = _share(wanted - other[name][here], usual_other[name][here])
+            error_one = wanted - one[name][here] - first * usual_one[name][here]
+            error_other = wanted - other[name][here] - second * usual_other[name][here]
+            # measured = one + weight (other - one): a regression of error_one on error_one - error_other.
+            table[:, cell] = first, second, _share(error_one, error_one - error_other)
+        result[name] = Combination(*table)
     return result
 
 
@@ -98,9 +115,10 @@ def combined(
         one, other = by_actuators(starts, steps), by_setpoints(starts, steps)
         usual_one = usual_error(record, by_actuators, starts, steps)
         usual_other = usual_error(record, by_setpoints, starts, steps)
+        place = cells(record, starts, steps)
         return {
-            name: (1.0 - how.setpoints_weight) * (one[name] + how.actuators_share * usual_one[name])
-            + how.setpoints_weight * (other[name] + how.setpoints_share * usual_other[name])
+            name: (1.0 - how.setpoints_weight[place]) * (one[name] + how.actuators_share[place] * usual_one[name])
+            + how.setpoints_weight[place] * (other[name] + how.setpoints_share[place] * usual_other[name])
             for name, how in combinations.items()
         }
 

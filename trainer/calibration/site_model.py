@@ -36,6 +36,8 @@ RANGE_DRIVERS = (
     "lamp_on",
 )
 """What the training range watches: weather, climate and setpoints of a plan."""
+_INDEPENDENT = 3.0
+"""Independent errors that a day is worth, for the width of intervals."""
 _PENALTIES = (0.03, 0.1, 0.3, 1.0)
 
 
@@ -185,7 +187,7 @@ def _growth(
     parts: Sequence[tuple[Record, NDArray[np.bool_], Callable[[NDArray[np.int64], int], Mapping[str, Floats]]]],
 ) -> dict[str, ErrorGrowth]:
     """Return the growth of errors on selection rows: a day from runs of a day, a week from runs as long as fit in."""
-    pooled: dict[str, list[tuple[Floats, Floats, Floats]]] = {}
+    pooled: dict[str, list[tuple[Floats, Floats, Floats, float]]] = {}
     for record, rows, predict in parts:
         for hours, every in ((24.0, 7500.0), (168.0, 29_700.0)):
             steps = round(hours * 3600.0 / record.step)
@@ -194,15 +196,18 @@ def _growth(
                 continue
             following = starts + 1 + np.arange(steps)[:, None]
             lead: Floats = np.arange(1.0, steps + 1.0) * (record.step / 3600.0)
+            days = len(np.unique(record.time[following].astype("datetime64[D]")))
             keep = lead > 24.0 if hours > 24.0 else lead > 0.0
             for quantity, predicted in predict(starts, steps).items():
                 if quantity in record.measured:
                     error = record.measured[quantity][following] - predicted
                     sun = record.inputs["global_radiation"][following]
-                    pooled.setdefault(quantity, []).append((lead[keep], error[keep], sun[keep]))
+                    pooled.setdefault(quantity, []).append((lead[keep], error[keep], sun[keep], days))
     growth = {}
     for quantity, pieces in pooled.items():
-        parts_of_growth = [error_growth(error, lead, sun) for lead, error, sun in pieces]
+        parts_of_growth = [
+            error_growth(error, lead, sun, independent=_INDEPENDENT * days) for lead, error, sun, days in pieces
+        ]
         first = parts_of_growth[0]
         later = [one for one in parts_of_growth[1:] if one.hours[0] > first.hours[-1]]
         growth[quantity] = ErrorGrowth(

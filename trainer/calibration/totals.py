@@ -19,6 +19,8 @@ from trainer.calibration.site_model import SiteModel
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+_DAYS = 6
+"""Days that are looked back for how much more or less was used than predicted."""
 TOTALS = {
     "heat (MJ m-2)": ("heat", 0.0864),
     "ventilation (m3 m-2)": ("ventilation", 86_400.0),
@@ -33,8 +35,9 @@ def daily_totals(
 ) -> dict[str, Floats]:
     """Return daily totals predicted from setpoints and measured, by name, (2, days).
 
-    Days begin at each 24 h that lies whole within `rows` (and starts within `begin`). Heat and ventilation are
-    measured through pipes and vents, with the same coefficients as the prediction: there is no meter for them.
+    The prediction is scaled by what was used over what was predicted in the `_DAYS` days before. Days begin at each
+    24 h that lies whole within `rows` (and starts within `begin`). Heat and ventilation are measured through pipes
+    and vents, with the same coefficients as the prediction: there is no meter for them.
     """
     steps = round(86_400.0 / record.step)
     starts = starts_within(record, rows, steps, steps)
@@ -42,7 +45,12 @@ def daily_totals(
         starts = starts[begin[starts]]
     if len(starts) == 0 or not model.rules:
         return {}
-    predicted = model.closed_predictor(record, setpoints)(starts, steps)
+    predict = model.closed_predictor(record, setpoints)
+    predicted = predict(starts, steps)
+    back = np.arange(1, _DAYS + 1)[:, None] * steps
+    there = starts - back >= 0
+    past = np.where(there, starts - back, 0)
+    earlier = predict(past.ravel(), steps)
     values = model.posterior.values
     states = records.observe(record, values, model.effects)
     drivers = climate.derive(np, states, record.inputs, values, record.lamp_efficacy)
@@ -53,11 +61,18 @@ def daily_totals(
         "co2_dosing": record.inputs["co2_dosing"],
     }
     ahead = starts + np.arange(steps)[:, None]
-    return {
-        name: factor * np.stack([predicted[source].mean(axis=0), measured[source][ahead].mean(axis=0)])
-        for name, (source, factor) in TOTALS.items()
-        if source not in record.unknown
-    }
+    result = {}
+    for name, (source, factor) in TOTALS.items():
+        if source in record.unknown:
+            continue
+        expected = np.where(there, earlier[source].mean(axis=0).reshape(past.shape), 0.0).sum(axis=0)
+        used = measured[source][past[None] + np.arange(steps)[:, None, None]].mean(axis=0)
+        used = np.where(there, used, 0.0).sum(axis=0)
+        # Two days' worth of "no error" keeps the factor near one where little was used.
+        steady = 2.0 * float(np.mean(measured[source])) + 1e-12
+        today = predicted[source].mean(axis=0) * (used + steady) / (expected + steady)
+        result[name] = factor * np.stack([today, measured[source][ahead].mean(axis=0)])
+    return result
 
 
 def coverage(
