@@ -60,8 +60,8 @@ class RunningDaemon:
         self.daemon.send_signal(signal.SIGTERM)
         return self.daemon.wait(60)
 
-    def wait_for(self, condition, seconds: float = 60.0) -> None:
-        """Wait until a condition holds."""
+    def wait_for(self, condition, seconds: float = 900.0) -> None:
+        """Wait until a condition holds; the limit only ends a hang, on however busy a machine."""
         until = time.monotonic() + seconds
         while not condition():
             assert self.daemon is None or self.daemon.poll() is None, (self.folder / "daemon.log").read_text()

@@ -34,7 +34,7 @@ def test_thirty_days_grow_neither_memory_nor_file_handles(tmp_path: Path) -> Non
         memory, files = [], []
         # The first five days fill the caches and the page's day of history.
         for day in range(5, 31):
-            plant.wait_for(lambda day=day: plant_seconds(plant) >= day * DAY, seconds=600.0)
+            plant.wait_for(lambda day=day: plant_seconds(plant) >= day * DAY)
             memory.append(resident_bytes(pid))
             files.append(open_files(pid))
             port = json.loads((plant.state / "status.json").read_text())["port"]

@@ -1,0 +1,81 @@
+"""A plan from the default bundle: what the planning process runs, without the process."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import igrow_core
+from edge.planning.make_plan import hourly_recipe, make_plan, present
+from edge.ports import PlanRequest
+from igrow_core.quantities import SETPOINTS
+from igrow_core.site import Site
+from igrow_core.telemetry import Telemetry
+
+START = 1_780_012_800
+BUNDLE = Path(igrow_core.__file__).parent / "default_bundle"
+RECIPE = {"heating_setpoint": 18.0, "co2_setpoint": 600.0, "lamp_on": 0.0, "irrigation_on": 0.2}
+SITE = Site(name="demo", latitude=52.0, longitude=4.3)
+
+
+def log() -> Telemetry:
+    seconds = np.arange(START - 3 * 86400, START + 1, 300)
+    day = 2 * np.pi * (seconds % 86400) / 86400
+    columns = {
+        "outdoor_temperature": 12.0 - 5.0 * np.cos(day),
+        "outdoor_humidity": 80.0 + 10.0 * np.cos(day),
+        "global_radiation": np.maximum(0.0, -600.0 * np.cos(day)),
+        "wind_speed": np.full(len(seconds), 4.0),
+        "air_temperature": 20.0 - 2.0 * np.cos(day),
+        "air_humidity": np.full(len(seconds), 78.0),
+        "air_co2": np.full(len(seconds), 550.0),
+        "leaf_area_index": np.where(seconds == START - 2 * 86400, 3.0, np.nan),
+        **{name: np.full(len(seconds), value) for name, value in RECIPE.items()},
+    }
+    return Telemetry(seconds.astype("datetime64[s]"), columns)
+
+
+def request(step: float = 3600.0, steps: int = 24, names: tuple[str, ...] = SETPOINTS) -> PlanRequest:
+    recipe = {name: (RECIPE[name],) * steps for name in names}
+    return PlanRequest(float(START), step, log(), recipe, BUNDLE)
+
+
+def test_a_plan_stays_within_the_site_s_limits_and_is_worth_no_less_than_the_recipe() -> None:
+    if not BUNDLE.is_dir():
+        pytest.skip("the default bundle is not built: make bundle")
+    plan = make_plan(SITE, request())
+    assert set(plan.setpoints) == set(SETPOINTS)
+    for name, course in plan.setpoints.items():
+        limits = SITE.limits[name]
+        assert len(course) == 24
+        assert limits.low - 1e-6 <= min(course) <= max(course) <= limits.high + 1e-6
+    assert np.isfinite([plan.expected_profit, plan.recipe_profit]).all()
+    assert plan.valid_until == START + 86400
+    assert len(plan.predicted["air_temperature"]) == 24
+    assert all(5.0 < value < 45.0 for value in plan.predicted["air_temperature"])
+
+
+def test_slow_quantities_count_however_old_and_fast_ones_do_not() -> None:
+    table = log()
+    stale = table.with_columns(
+        {"air_co2": np.where(table.time.astype(np.int64) > START - 4 * 3600, np.nan, table["air_co2"])}
+    )
+    values = present(stale, START)
+    assert values["leaf_area_index"] == 3.0
+    assert values["air_temperature"] == pytest.approx(20.0 - 2.0 * np.cos(2 * np.pi * (START % 86400) / 86400))
+    assert "air_co2" not in values
+
+
+@pytest.mark.parametrize(("step", "steps"), [(600.0, 144), (3600.0, 24), (7200.0, 12), (3600.0, 30)])
+def test_a_recipe_of_any_step_becomes_hours(step: float, steps: int) -> None:
+    hours = 48
+    table = hourly_recipe(SITE, request(step, steps), hours)
+    assert table.shape == (hours, 4)
+    assert (table == [RECIPE[name] for name in SETPOINTS]).all()
+
+
+def test_a_setpoint_that_the_site_lacks_stands_at_its_safe_value() -> None:
+    table = hourly_recipe(SITE, request(names=("heating_setpoint", "co2_setpoint")), 24)
+    assert (table[:, SETPOINTS.index("lamp_on")] == SITE.limits["lamp_on"].safe).all()
