@@ -1,13 +1,15 @@
 """The benchmark's cases: what is hidden in which greenhouse, drawn from seeds, never by hand.
 
-Sizes are in ENR: RMS of the effect in 24 h free runs over the RMS that stays when nothing is missing, the larger of
-the quantities; measured once per season on the reference log with the calibrated model. Tuning and scoring draw from
-disjoint seeds, and bend the truth with disjoint forms.
+Sizes are in ENR: RMS of the effect in 24 h free runs over the RMS that stays when nothing is missing, root mean square
+over temperature, humidity and CO2; measured once per season on the reference log with the calibrated model. A cause
+that its bounds keep from reaching the size in that season (a closed valve in a winter of full heat) is not drawn.
+Tuning and scoring draw from disjoint seeds, and bend the truth with disjoint forms.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,6 +20,16 @@ from igrow_core.greenhouse.uncatalogued import UNCATALOGUED
 SEASONS = {"winter": "2020-01-20", "spring": "2020-04-01", "autumn": "2020-10-05"}
 """First day of the log; the reference log of the calibration ends there."""
 SIZES = (0.3, 1.0, 3.0)
+SHARES = {
+    "nothing": 0.25,
+    "single": 0.27,
+    "sensor": 0.11,
+    "pair": 0.08,
+    "onset": 0.1,
+    "outside": 0.11,
+    "withheld": 0.08,
+}
+"""Of all cases."""
 SEEDS = {"tuning": 1000, "scoring": 5000}
 FORMS = {
     "tuning": ((1.0, 0.0, 0.0), (1.2, 0.0, 0.0), (1.0, 0.1, 0.0), (1.0, 0.0, 600.0), (0.85, 0.0, 300.0)),
@@ -31,12 +43,8 @@ FORMS = {
     ),
 }
 """(exponent, threshold, delay in seconds) of the true effect against the catalogue's."""
-UNUSED = {
-    "photosynthesis_heat_limit": ("winter",),
-    "leaf_area_transpiration": (),
-    "deficit_stomata_closure": ("winter",),
-}
-"""Effects that cannot show in a season: no hour is hot enough."""
+REACHABLE = 1.5
+"""ENR that a cause must be able to reach in a season to be drawn for it."""
 
 
 @dataclass(frozen=True)
@@ -58,44 +66,37 @@ class Case:
     heavy_tails: bool = False
     wrong_noise: bool = False
     """Disturbances twice as large, with six times the correlation time, than the calibration saw."""
-    shapes: tuple[dict[str, float], ...] = field(default=())
 
 
-def draw(kind: str, count: int) -> list[Case]:
+def draw(kind: str, count: int, units: Mapping[str, Mapping[str, float]]) -> list[Case]:
     """Draw a balanced list of cases: a quarter with nothing missing.
 
     Args:
         kind: ``tuning`` or ``scoring``.
         count: about how many.
+        units: amplitude of ENR 1 of every cause, by season; its seasons are used.
     """
     rng = np.random.default_rng(SEEDS[kind])
-    shares = {
-        "nothing": 0.25,
-        "single": 0.27,
-        "sensor": 0.11,
-        "pair": 0.08,
-        "onset": 0.1,
-        "outside": 0.11,
-        "withheld": 0.08,
-    }
     process = [name for name, effect in EFFECTS.items() if effect.kind == "process"]
     sensor = [name for name, effect in EFFECTS.items() if effect.kind == "sensor"]
-    seasons = list(SEASONS)
+    turns = {
+        "single": _shuffled(rng, process),
+        "sensor": _shuffled(rng, sensor),
+        "withheld": _shuffled(rng, process),
+        "outside": _shuffled(rng, list(UNCATALOGUED)),
+        "pair": _shuffled(rng, process),
+        "onset": _shuffled(rng, [*process, *sensor]),
+    }
+    seasons = list(units)
     cases: list[Case] = []
-    turns = {"single": _turns(rng, process), "sensor": _turns(rng, sensor), "withheld": _turns(rng, process),
-             "outside": _turns(rng, list(UNCATALOGUED)), "pair": _turns(rng, process), "onset": _turns(rng, [*process, *sensor])}  # fmt: skip
-    for group, share in shares.items():
+    for group, share in SHARES.items():
         for index in range(max(1, round(share * count))):
             season = seasons[index % len(seasons)]
             causes: tuple[str, ...] = ()
             if group != "nothing":
-                causes = (_next(turns[group], season),)
+                causes = (_next(turns[group], units[season], ()),)
             if group == "pair":
-                second = _next(turns["single"] if index % 2 else turns["sensor"], season)
-                while second == causes[0]:
-                    second = _next(turns["single"], season)
-                causes = (*causes, second)
-            forms = FORMS[kind]
+                causes = (*causes, _next(turns["single" if index % 2 else "sensor"], units[season], causes))
             cases.append(
                 Case(
                     name=f"{kind}-{group}-{index:03d}",
@@ -103,14 +104,8 @@ def draw(kind: str, count: int) -> list[Case]:
                     season=season,
                     seed=SEEDS[kind] + len(cases),
                     causes=causes,
-                    size=0.0
-                    if group == "nothing"
-                    else SIZES[index // len(seasons) % 3]
-                    if group in {"single", "sensor"}
-                    else (1.0, 3.0)[index % 2]
-                    if group in {"outside", "withheld"}
-                    else 1.5,
-                    forms=tuple(forms[int(rng.integers(len(forms)))] for _ in causes),
+                    size=_size(group, index // len(seasons)),
+                    forms=tuple(FORMS[kind][int(rng.integers(len(FORMS[kind])))] for _ in causes),
                     onset_day=float(rng.uniform(7.0, 20.0)) if group == "onset" else None,
                     without=causes if group == "withheld" else (),
                     heavy_tails=bool(rng.random() < 0.5),
@@ -118,6 +113,14 @@ def draw(kind: str, count: int) -> list[Case]:
                 )
             )
     return cases
+
+
+def _size(group: str, turn: int) -> float:
+    if group == "nothing":
+        return 0.0
+    if group in {"single", "sensor"}:
+        return SIZES[turn % 3]
+    return (1.0, 3.0)[turn % 2] if group in {"outside", "withheld"} else 1.5
 
 
 def hidden(case: Case, unit: dict[str, float], start: np.datetime64) -> list[HiddenEffect]:
@@ -147,16 +150,17 @@ def hidden(case: Case, unit: dict[str, float], start: np.datetime64) -> list[Hid
     return effects
 
 
-def _turns(rng: np.random.Generator, names: list[str]) -> list[str]:
+def _shuffled(rng: np.random.Generator, names: list[str]) -> list[str]:
     order = list(names)
     rng.shuffle(order)
     return order
 
 
-def _next(turn: list[str], season: str) -> str:
-    for _ in range(len(turn)):
-        name = turn.pop(0)
-        turn.append(name)
-        if season not in UNUSED.get(name, ()):
+def _next(turn: list[str], unit: Mapping[str, float], but: tuple[str, ...]) -> str:
+    """Take the next cause that can be seen in the season, and put it at the end of the line."""
+    for position, name in enumerate(turn):
+        definition = EFFECTS.get(name) or UNCATALOGUED[name]
+        if name not in but and REACHABLE * unit[name] <= abs(definition.amplitude.high):
+            turn.append(turn.pop(position))
             return name
-    raise AssertionError("a season without any possible effect")
+    raise AssertionError("a season in which no cause can be seen")

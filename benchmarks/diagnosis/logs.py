@@ -73,8 +73,9 @@ def enr_units(record: Record, deployed: Deployed) -> dict[str, float]:
             column = linearisation.sensor_column(line, effect, shape)
         else:
             column = linearisation.flux_columns(line, [(unit_fluxes(line, effect, shape), small)])[0]
-        ratio = max(freerun.root_mean_square(part) / scale for part, scale in zip(column, noise, strict=True))
-        unit[name] = min(1.0 / max(ratio, 1e-9), abs(effect.amplitude.high))
+        ratios = [freerun.root_mean_square(part) / scale for part, scale in zip(column, noise, strict=True)]
+        ratio = float(np.sqrt(np.mean(np.square(ratios))))
+        unit[name] = 1.0 / max(ratio, 1e-9)
     return unit
 
 

@@ -17,10 +17,10 @@ from trainer.diagnosis.problem import Problem
 from trainer.diagnosis.search import Fit
 from trainer.diagnosis.selection import Hypothesis, Selected
 
-SMALLEST_GAIN = 25.0
+SMALLEST_GAIN = 15.0
 """Log-likelihood below which a pattern is no cause: a wrong structure makes as much."""
 LARGEST_P_VALUE = 0.005
-BETTER = 1.25
+BETTER = 1.6
 """A pattern that gains so many times what all names together gain replaces them."""
 LEFT = 0.5
 """Share of the names' gain that a pattern may still add beside them."""

@@ -73,7 +73,7 @@ class CandidateColumns:
     columns: Floats
     """(c, 3, r, steps)."""
     ageing: Floats
-    """The same with ``elapsed_days`` at one, for those that age and else 0, of the same shape: shifts their beginning."""
+    """The same with ``elapsed_days`` at one (0 for those that do not age): shifts their beginning."""
     untestable: tuple[str, ...]
     """Effects whose drivers the log lacks, or never moves."""
 

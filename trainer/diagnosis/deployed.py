@@ -14,8 +14,10 @@ from igrow_core.simulator.hybrid.nominal import nominal
 from igrow_core.simulator.hybrid.record import Record
 from igrow_core.site import Site
 from trainer.calibration import Posterior
-from trainer.diagnosis import prior, problem, structure
+from trainer.diagnosis import prior as priors
+from trainer.diagnosis import problem, structure
 from trainer.diagnosis.activation import ActiveTerm
+from trainer.diagnosis.prior import Prior
 from trainer.diagnosis.split import split_days
 
 STRUCTURE_KEY = "known_misfit"
@@ -35,19 +37,19 @@ class Deployed:
     """Rows by which the site's actuators are read ahead; None asks each log."""
 
     @property
-    def prior(self) -> prior.Prior:
+    def prior(self) -> Prior:
         """What is known of the parameters before a new log."""
         if self.standard_deviation:
-            knowledge = prior.from_posterior(self.parameters, self.standard_deviation)
+            knowledge = priors.from_posterior(self.parameters, self.standard_deviation)
             return structure.centre(knowledge, self.known_misfit)
-        return prior.from_nominal(self.parameters)
+        return priors.from_nominal(self.parameters)
 
     @property
-    def free_run_prior(self) -> prior.Prior:
+    def free_run_prior(self) -> Prior:
         """The same around the calibrated parameters themselves, for fits to free runs."""
         if self.standard_deviation:
-            return prior.from_posterior(self.parameters, self.standard_deviation)
-        return prior.from_nominal(self.parameters)
+            return priors.from_posterior(self.parameters, self.standard_deviation)
+        return priors.from_nominal(self.parameters)
 
 
 def from_site(site: Site) -> Deployed:
@@ -102,5 +104,5 @@ def learn_misfit(
         longitude: degrees east.
     """
     split = split_days(record, longitude)
-    knowledge = prior.from_posterior(parameters, deviation)
+    knowledge = priors.from_posterior(parameters, deviation)
     return structure.learn(problem.prepare(record, split, knowledge, {}, longitude, {}))

@@ -2,34 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from igrow_core.effects import EFFECTS
 from igrow_core.errors import IgrowError
+from igrow_core.simulator.hybrid.climate import ActiveEffects
 from igrow_core.simulator.hybrid.record import Record
 from igrow_core.site import Site
 from igrow_core.telemetry import Telemetry
-from trainer.diagnosis import freefit, freerun, problem, runner, screening, selection, structure, wording
+from trainer.diagnosis import freefit, freerun, problem, runner, screening, selection, structure, usual, wording
 from trainer.diagnosis.activation import ActiveTerm, activate
 from trainer.diagnosis.adequacy import Adequacy, judge
 from trainer.diagnosis.deployed import Deployed
+from trainer.diagnosis.drivers import Pattern, pattern_fluxes
 from trainer.diagnosis.estimate import Estimated, estimate
 from trainer.diagnosis.freerun import Runs
+from trainer.diagnosis.linearisation import Floats
+from trainer.diagnosis.prior import Prior
 from trainer.diagnosis.problem import Problem
 from trainer.diagnosis.result import HORIZONS, Diagnosis, Finding, Verdict
 from trainer.diagnosis.selection import Selected
 from trainer.diagnosis.split import Split, split_days
 
 LEAST_DAYS = 7
-SMALLEST_GAIN = 12.0
-"""Log-likelihood that a term must add on the fit days."""
-LARGEST_P_VALUE = 0.005
-"""Of the day-block max-T test, the price of searching paid."""
 SMALLEST_ENR = 0.15
 """A cause that moves a 24 h forecast by less is not worth a name."""
+SMALLEST_SKILL = -0.02
+"""Share of the squared error of plain free runs on unseen days that a cause must remove, mean over quantities: a
+recalibration can hide much of a cause, so that it need not remove more, but it must not add."""
+LARGEST_DOUBT = 0.4
+"""Bootstrap probability over unseen days that a cause does not make their 24 h free runs likelier."""
+FURTHER_SKILL, FURTHER_DOUBT, FURTHER_GAIN = 0.005, 0.2, 0.1
+"""What a second or third cause must show: skill, doubt, and a share of the gain of those before it. The first, bent
+otherwise than the catalogue has it, leaves traces that look like small others."""
+LARGEST_REMAINDER = 5.0
+"""Bound of the remainder's amplitudes, in units of a pattern."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +55,23 @@ class CorrectedModel:
 
 
 @dataclass(frozen=True)
+class Stage:
+    """One model of the tables: deployed, recalibrated, corrected."""
+
+    parameters: dict[str, float]
+    deviation: dict[str, float]
+    terms: tuple[ActiveTerm, ...]
+    remainder: dict[str, float] = field(default_factory=dict)
+    added: dict[str, Floats] = field(default_factory=dict)
+    """The remainder's fluxes by channel, (n,)."""
+
+    def runs(self, record: Record, split: Split, horizon: str = "24_h") -> Runs | None:
+        """Run freely on held-out days."""
+        effects = activate(record, self.terms)
+        return freerun.run(record, split, self.parameters, effects, horizon, added=self.added)
+
+
+@dataclass(frozen=True)
 class Evidence:
     """What the report plots."""
 
@@ -52,6 +79,8 @@ class Evidence:
     split: Split
     problem: Problem
     chain: tuple[Selected, ...]
+    weighed: tuple[Estimated, ...]
+    """Every selected term with its size and skill on unseen days, kept or not."""
     runs: dict[str, Runs]
     """24 h free runs on held-out days by stage."""
     corrected: CorrectedModel
@@ -93,44 +122,19 @@ def diagnose(
     record, _ = runner.open_record(screened.telemetry, site, deployed)
     split = split_days(record, site.longitude)
     active = activate(record, deployed.effects)
-    prepared = problem.prepare(record, split, deployed.prior, active, site.longitude, deployed.known_misfit, without)
+    prepared = problem.prepare(
+        record, split, deployed.prior, active, site.longitude, deployed.known_misfit, usual.installed(), without
+    )
     null = structure.null_model(prepared)
-    chain = selection.forward(prepared, null, rng, smallest_gain=SMALLEST_GAIN, largest_p_value=LARGEST_P_VALUE)
+    chain = selection.forward(prepared, null, rng)
     judged = judge(prepared, chain, rng)
     estimated = estimate(prepared, judged.selected, rng)
 
-    runs = prepared.line.runs
-    knowledge = deployed.free_run_prior
-    parameters, deviation = freefit.fit(record, runs, split, knowledge, active)
-    stages: dict[str, tuple[dict[str, float], tuple[ActiveTerm, ...]]] = {
-        "deployed": (dict(deployed.parameters), deployed.effects),
-        "recalibrated": (parameters, deployed.effects),
-        "corrected": (parameters, deployed.effects),
-    }
-    kept: list[Estimated] = []
-    for one in estimated:
-        terms = (*deployed.effects, *(other.term for other in kept), one.term)
-        fitted, spread = freefit.fit(record, runs, split, knowledge, activate(record, terms), stages["corrected"][0])
-        before, after = _stage_runs(record, split, stages["corrected"]), _stage_runs(record, split, (fitted, terms))
-        plain = _stage_runs(record, split, (fitted, stages["corrected"][1]))
-        if before is None or after is None or plain is None:
-            kept.append(one)
-            continue
-        doubt = freerun.improves(freerun.skill_by_day(before, after), rng)
-        size = freerun.effect_to_noise(plain, after)
-        if doubt < 0.5 and size >= SMALLEST_ENR:
-            kept.append(replace(one, effect_to_noise=size, doubt=doubt))
-            stages["corrected"] = (fitted, terms)
-            deviation = spread
+    stages, kept, weighed = _correct(record, split, site, deployed, prepared, judged, estimated, active)
     errors = _errors(record, split, stages)
     verdict, findings = _verdict(prepared, judged, kept)
-    model = CorrectedModel(
-        stages["corrected"][0],
-        deviation,
-        stages["corrected"][1],
-        {},
-        dict(deployed.known_misfit),
-    )
+    last = stages["corrected"]
+    model = CorrectedModel(last.parameters, last.deviation, last.terms, last.remainder, dict(deployed.known_misfit))
     diagnosis = Diagnosis(
         site.name,
         verdict,
@@ -144,8 +148,87 @@ def diagnose(
         prepared.untestable,
         record.unknown,
     )
-    shown = {name: one for name, stage in stages.items() if (one := _stage_runs(record, split, stage)) is not None}
-    return diagnosis, Evidence(record, split, prepared, tuple(chain), shown, model)
+    shown = {name: day for name, stage in stages.items() if (day := stage.runs(record, split)) is not None}
+    return diagnosis, Evidence(record, split, prepared, tuple(chain), tuple(weighed), shown, model)
+
+
+def _correct(
+    record: Record,
+    split: Split,
+    site: Site,
+    deployed: Deployed,
+    prepared: Problem,
+    judged: Adequacy,
+    estimated: Sequence[Estimated],
+    active: ActiveEffects,
+) -> tuple[dict[str, Stage], list[Estimated], list[Estimated]]:
+    """Fit the model with each term in turn, and keep those that stand on unseen days.
+
+    Returns the stages by name, the terms that were kept, and all of them with their size and skill.
+    """
+    runs, knowledge = prepared.line.runs, deployed.free_run_prior
+    parameters, deviation = freefit.fit(record, runs, split, knowledge, active)
+    stages = {
+        "deployed": Stage(dict(deployed.parameters), dict(deployed.standard_deviation), deployed.effects),
+        "recalibrated": Stage(parameters, deviation, deployed.effects),
+    }
+    current = stages["recalibrated"]
+    kept: list[Estimated] = []
+    weighed: list[Estimated] = []
+    for one in estimated:
+        terms = (*current.terms, one.term)
+        # Where the effect takes over what recalibration had put into the parameters, the fit starts there.
+        begin = {name: value + one.shift.get(name, 0.0) for name, value in current.parameters.items()}
+        trial = Stage(*freefit.fit(record, runs, split, knowledge, activate(record, terms), begin), terms)
+        before, after = current.runs(record, split), trial.runs(record, split)
+        plain = replace(trial, terms=current.terms).runs(record, split)
+        if before is not None and after is not None and plain is not None:
+            one = replace(  # noqa: PLW2901
+                one,
+                effect_to_noise=freerun.effect_to_noise(plain, after),
+                skill=float(freerun.skill_by_day(before, after).mean()),
+            )
+        weighed.append(one)
+        if _stands(one, kept):
+            kept.append(one)
+            current = trial
+    if judged.remainder:
+        current = _with_remainder(record, split, site, prepared, judged, knowledge, current)
+    return {**stages, "corrected": current}, kept, weighed
+
+
+def _stands(one: Estimated, kept: Sequence[Estimated]) -> bool:
+    """Tell whether a term is large enough, and holds on unseen days; one beside others must do more."""
+    if one.effect_to_noise < SMALLEST_ENR:
+        return False
+    if not kept:
+        return one.skill >= SMALLEST_SKILL and one.doubt <= LARGEST_DOUBT
+    return (
+        one.skill >= FURTHER_SKILL
+        and one.doubt <= FURTHER_DOUBT
+        and one.gain >= FURTHER_GAIN * sum(other.gain for other in kept)
+    )
+
+
+def _with_remainder(
+    record: Record, split: Split, site: Site, prepared: Problem, judged: Adequacy, knowledge: Prior, current: Stage
+) -> Stage:
+    """Return the stage with a bounded remainder on outside drivers, if that helps on unseen days."""
+    assert judged.remainder is not None
+    amplitudes = {
+        (one.cause.channel, one.cause.when): float(np.clip(one.amplitude, -LARGEST_REMAINDER, LARGEST_REMAINDER))
+        for one in judged.remainder
+        if isinstance(one.cause, Pattern)
+    }
+    added = pattern_fluxes(record, site.longitude, amplitudes)
+    effects = activate(record, current.terms)
+    fitted = freefit.fit(record, prepared.line.runs, split, knowledge, effects, current.parameters, added)
+    remainder = {f"{channel}:{when}": amplitude for (channel, when), amplitude in amplitudes.items()}
+    trial = Stage(*fitted, current.terms, remainder, added)
+    before, after = current.runs(record, split), trial.runs(record, split)
+    if before is None or after is None or freerun.skill_by_day(before, after).mean() <= 0.0:
+        return current
+    return trial
 
 
 def _verdict(prepared: Problem, judged: Adequacy, kept: Sequence[Estimated]) -> tuple[Verdict, tuple[Finding, ...]]:
@@ -157,24 +240,15 @@ def _verdict(prepared: Problem, judged: Adequacy, kept: Sequence[Estimated]) -> 
     return ("ambiguous" if any(len(one.rivals) > 1 for one in findings) else "named"), findings
 
 
-def _stage_runs(record: Record, split: Split, stage: tuple[dict[str, float], tuple[ActiveTerm, ...]]) -> Runs | None:
-    parameters, terms = stage
-    return freerun.run(record, split, parameters, activate(record, terms), "24_h")
-
-
-def _errors(
-    record: Record, split: Split, stages: dict[str, tuple[dict[str, float], tuple[ActiveTerm, ...]]]
-) -> dict[str, dict[str, dict[str, float]]]:
+def _errors(record: Record, split: Split, stages: Mapping[str, Stage]) -> dict[str, dict[str, dict[str, float]]]:
     """Return the mean absolute errors on held-out days: quantity -> horizon -> stage."""
     table: dict[str, dict[str, dict[str, float]]] = {}
     for horizon in HORIZONS:
-        for stage, (parameters, terms) in stages.items():
-            runs = freerun.run(record, split, parameters, activate(record, terms), horizon)
-            if runs is None:
-                continue
-            for name, error in runs.errors.items():
+        for name, stage in stages.items():
+            runs = stage.runs(record, split, horizon)
+            for quantity, error in runs.errors.items() if runs is not None else ():
                 if np.isfinite(error).any():
-                    table.setdefault(name, {}).setdefault(horizon, {})[stage] = float(np.nanmean(np.abs(error)))
+                    table.setdefault(quantity, {}).setdefault(horizon, {})[name] = float(np.nanmean(np.abs(error)))
     return table
 
 

@@ -87,6 +87,23 @@ def patterns(record: Record, longitude: float) -> list[tuple[str, tuple[str, ...
     return table
 
 
+def pattern_fluxes(record: Record, longitude: float, amplitudes: Mapping[tuple[str, str], float]) -> dict[str, Floats]:
+    """Return the fluxes of patterns by channel, (n,).
+
+    Args:
+        record: of the log.
+        longitude: degrees east.
+        amplitudes: in units of `UNIT_FLUX`, by (channel, when).
+    """
+    fluxes: dict[str, Floats] = {}
+    for when, _, course in patterns(record, longitude):
+        for channel, size in UNIT_FLUX.items():
+            amplitude = amplitudes.get((channel, when), 0.0)
+            if amplitude:
+                fluxes[channel] = fluxes.get(channel, 0.0) + amplitude * size * course
+    return fluxes
+
+
 def pattern_columns(line: Linearisation, longitude: float) -> tuple[tuple[Pattern, ...], Floats]:
     """Return every pattern in every channel, and their columns of the errors, (p, 3, r, steps)."""
     found: list[Pattern] = []

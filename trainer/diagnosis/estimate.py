@@ -39,7 +39,12 @@ class Estimated:
     rivals: tuple[str, ...]
     regimes: dict[str, Interval] = field(default_factory=dict)
     effect_to_noise: float = 0.0
+    skill: float = 0.0
+    """Share of the squared error on unseen days that it removes."""
     doubt: float = 0.0
+    """Probability that it does not make the free runs of unseen days likelier."""
+    shift: dict[str, float] = field(default_factory=dict)
+    """How the parameters move when the term comes in."""
 
     @property
     def effect(self) -> str:
@@ -48,7 +53,18 @@ class Estimated:
 
 
 def estimate(problem: Problem, selected: Selected, rng: np.random.Generator) -> list[Estimated]:
-    """Return the terms of a selected model, the largest gain first."""
+    """Return the terms of a selected model that all still stand beside each other, the largest gain first."""
+    found = _estimate(problem, selected, rng)
+    while found and found[-1].gain < selection.SMALLEST_GAIN:
+        rest = tuple(one.hypothesis for one in found[:-1])
+        model = selected.fit.model
+        model = Model(model.base, model.precision, model.shift, tuple(one.term for one in rest))
+        selected = Selected(rest, search.fit(problem.grams, model))
+        found = _estimate(problem, selected, rng)
+    return found
+
+
+def _estimate(problem: Problem, selected: Selected, rng: np.random.Generator) -> list[Estimated]:
     found = []
     for position, hypothesis in enumerate(selected.hypotheses):
         others = tuple(one for index, one in enumerate(selected.hypotheses) if index != position)
@@ -73,6 +89,8 @@ def estimate(problem: Problem, selected: Selected, rng: np.random.Generator) -> 
                 gain,
                 onset,
                 rivals(problem, reduced, hypothesis, gain, tuple(one.effect for one in others), rng),
+                doubt=_doubt(problem, reduced, selected.fit, rng),
+                shift=_shift(problem, reduced, selected.fit),
             )
         )
     return sorted(found, key=lambda one: -one.gain)
@@ -92,6 +110,22 @@ def rivals(
     scored = selection.score_candidates(problem, reduced, onsets, rng)
     as_good = [one.effect for one in scored if one.gain >= gain - margin and one.effect not in others]
     return (hypothesis.effect, *(name for name in as_good if name != hypothesis.effect))
+
+
+def _doubt(problem: Problem, reduced: Fit, full: Fit, rng: np.random.Generator) -> float:
+    """Return the bootstrap probability that unseen days are not likelier with the term than without it."""
+    unseen = ~problem.grams.fit
+    if not unseen.any():
+        return 0.0
+    gain = (selection.losses_by_day(problem, reduced) - selection.losses_by_day(problem, full))[unseen]
+    means = gain[rng.integers(0, len(gain), size=(2000, len(gain)))].mean(axis=1)
+    return float(np.mean(means <= 0.0))
+
+
+def _shift(problem: Problem, reduced: Fit, full: Fit) -> dict[str, float]:
+    count = len(problem.parameter)
+    change = full.solution.coefficients[:count] - reduced.solution.coefficients[:count]
+    return {name: float(value) for name, value in zip(problem.prior.names, change, strict=True)}
 
 
 def _sandwich(problem: Problem, fit: Fit, position: int) -> float:

@@ -33,6 +33,7 @@ def fit(
     prior: Prior,
     effects: ActiveEffects,
     start: Mapping[str, float] | None = None,
+    added: Mapping[str, Floats] | None = None,
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Return parameters and their standard deviations.
 
@@ -43,8 +44,9 @@ def fit(
         prior: of the parameters.
         effects: active, held.
         start: where to begin (None: the prior's mean).
+        added: further fluxes by channel, (n,).
     """
-    line = linearisation.linearise(record, runs, prior.clip(start or prior.mean), effects)
+    line = linearisation.linearise(record, runs, prior.clip(start or prior.mean), effects, added)
     cost = _cost(line, split, prior)
     normal = prior.precision
     for _ in range(ITERATIONS):
@@ -60,7 +62,7 @@ def fit(
             moved = prior.clip(
                 {name: line.parameters[name] + float(part) for name, part in zip(prior.names, step, strict=True)}
             )
-            trial = linearisation.linearise(record, runs, moved, effects)
+            trial = linearisation.linearise(record, runs, moved, effects, added)
             after = _cost(trial, split, prior)
             if after < cost:
                 improved = cost - after > 1e-3 * cost

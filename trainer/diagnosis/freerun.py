@@ -88,7 +88,7 @@ def effect_to_noise(plain: Runs, corrected: Runs) -> float:
 
 
 def skill_by_day(before: Runs, after: Runs) -> Floats:
-    """Return, for each day, the fall of the squared error relative to its mean before, mean over quantities, (days,)."""
+    """Return by day the fall of the squared error over its mean before, mean over quantities, (days,)."""
     days = np.unique(before.day)
     skill = np.zeros(len(days))
     quantities = [name for name in before.errors if np.isfinite(before.errors[name]).any()]
@@ -99,9 +99,3 @@ def skill_by_day(before: Runs, after: Runs) -> Floats:
             part = fall[:, before.day == day]
             skill[index] += np.nanmean(part) / len(quantities) if np.isfinite(part).any() else 0.0
     return skill
-
-
-def improves(skill: Floats, rng: np.random.Generator, draws: int = 2000) -> float:
-    """Return the bootstrap probability over days that the mean skill is not above 0."""
-    means = skill[rng.integers(0, len(skill), size=(draws, len(skill)))].mean(axis=1)
-    return float(np.mean(means <= 0.0))

@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 FREEDOM = 5.0
 """Degrees of freedom of Student's t."""
-_LARGEST_ROOT = 0.99
+_LARGEST_ROOT = 0.92
 """At 15 minutes a correlation time of a day: what is slower is not a disturbance but a wrong model."""
 
 
@@ -111,7 +111,7 @@ def fit_whitening(errors: Floats, counted: NDArray[np.bool_], filters: tuple[Noi
         distance = np.sum((root @ chosen) ** 2, axis=0)
         weight = (FREEDOM + size) / (FREEDOM + distance)
         covariance = (chosen * weight) @ chosen.T / chosen.shape[1]
-    root = np.linalg.inv(np.linalg.cholesky(covariance))
+    root: Floats = np.linalg.inv(np.linalg.cholesky(covariance))
     return extend(Whitening(filters, root, np.zeros(errors.shape[1:])), errors, counted)
 
 
@@ -126,7 +126,9 @@ def extend(whitening: Whitening, errors: Floats, counted: NDArray[np.bool_]) -> 
 def _coefficients(raw: Floats, order: int) -> tuple[Floats, Floats, tuple[float, ...]]:
     roots = _LARGEST_ROOT * np.tanh(0.5 * raw)
     poles, zeros = roots[:order], roots[order:]
-    return np.poly(poles), np.poly(zeros), tuple(float(pole) for pole in poles)
+    numerator: Floats = np.poly(poles).astype(np.float64)
+    denominator: Floats = np.poly(zeros).astype(np.float64)
+    return numerator, denominator, tuple(float(pole) for pole in poles)
 
 
 def _filtered(values: Floats, raw: Floats, order: int) -> Floats:

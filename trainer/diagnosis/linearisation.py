@@ -11,8 +11,8 @@ whitens it. Sensitivities to all parameters, effects and patterns come from batc
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,6 +113,8 @@ class Linearisation:
     """From `observe`, (n,)."""
     drivers: Mapping[str, Array]
     """Along the measured climate, (n,)."""
+    added: Mapping[str, Floats] = field(default_factory=dict)
+    """Further fluxes by channel, (n,)."""
 
     @property
     def errors(self) -> Floats:
@@ -121,12 +123,18 @@ class Linearisation:
         return np.where(self.runs.weight, np.nan_to_num(measured) - self.shown, 0.0)
 
 
-def linearise(record: Record, runs: DayRuns, parameters: Mapping[str, float], effects: ActiveEffects) -> Linearisation:
-    """Run the model once along a log."""
+def linearise(
+    record: Record,
+    runs: DayRuns,
+    parameters: Mapping[str, float],
+    effects: ActiveEffects,
+    added: Mapping[str, Floats] | None = None,
+) -> Linearisation:
+    """Run the model once along a log; `added` are further fluxes by channel, (n,)."""
     states = observe(record, parameters, effects)
-    shown = free_run(record, states, runs.starts, runs.steps, parameters, effects)
+    shown = free_run(record, states, runs.starts, runs.steps, parameters, effects, added)
     drivers = climate.derive(np, states, record.inputs, parameters, record.lamp_efficacy)
-    return Linearisation(record, runs, parameters, effects, _stacked(shown), states, drivers)
+    return Linearisation(record, runs, parameters, effects, _stacked(shown), states, drivers, added or {})
 
 
 def parameter_columns(line: Linearisation, names: tuple[str, ...], spread: Floats) -> Floats:
@@ -152,7 +160,7 @@ def parameter_columns(line: Linearisation, names: tuple[str, ...], spread: Float
     plain = {name: values for name, values in line.effects.items() if not _remembers(name)}
     states = dict(observe(line.record, varied, plain))
     states |= {name: values for name, values in line.states.items() if name not in states}
-    shown = free_run(line.record, states, line.runs.starts, line.runs.steps, varied, line.effects)
+    shown = free_run(line.record, states, line.runs.starts, line.runs.steps, varied, line.effects, line.added)
     shape = (line.runs.steps, count, len(line.runs.starts))
     moved = np.stack([np.broadcast_to(shown[name], shape) for name in measurement.PREDICTED]).transpose(2, 0, 3, 1)
     columns: Floats = -(moved - line.shown) / step[:, None, None, None]
@@ -184,7 +192,7 @@ def unit_fluxes(line: Linearisation, effect: Effect, shape: Mapping[str, float])
     }
 
 
-def flux_columns(line: Linearisation, fluxes: list[tuple[Mapping[str, Array], float]]) -> Floats:
+def flux_columns(line: Linearisation, fluxes: Sequence[tuple[Mapping[str, Array], float]]) -> Floats:
     """Return d(error)/d(amplitude), (f, 3, r, steps), of fluxes into the balances.
 
     Args:
@@ -196,7 +204,7 @@ def flux_columns(line: Linearisation, fluxes: list[tuple[Mapping[str, Array], fl
     return np.concatenate(parts) if parts else np.zeros((0, 3, count, line.runs.steps))
 
 
-def _flux_batch(line: Linearisation, fluxes: list[tuple[Mapping[str, Array], float]]) -> Floats:
+def _flux_batch(line: Linearisation, fluxes: Sequence[tuple[Mapping[str, Array], float]]) -> Floats:
     record, runs = line.record, line.runs
     channels = sorted({channel for flux, _ in fluxes for channel in flux})
     zero = np.zeros(len(record))

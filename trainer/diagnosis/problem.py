@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,6 +47,8 @@ class Problem:
     """Columns of the patterns."""
     known: range
     """The column of the misfit that the calibration knew already (empty where it is not known)."""
+    usual: range
+    """Columns of how greenhouses and weathers usually differ."""
 
 
 def counted_rows(line: Linearisation, balances: tuple[int, ...]) -> NDArray[np.bool_]:
@@ -94,19 +96,16 @@ def recalibrate(
     return line, whitening, balances
 
 
-def _misfit(
-    line: Linearisation, known: Mapping[str, float], longitude: float, found: candidates.CandidateColumns | None
-) -> Floats:
-    """Return the column of the known misfit, (3, r, steps)."""
-    if found is None:
-        return np.zeros_like(line.shown)
+def _combined(line: Linearisation, longitude: float, lists: Sequence[Mapping[str, float]]) -> Floats:
+    """Return the columns of lists of amplitudes by key, (lists, 3, r, steps)."""
+    if not lists:
+        return np.zeros((0, *line.shown.shape))
+    found = candidates.candidate_columns(line)
     names, columns = drivers.pattern_columns(line, longitude)
-    total = np.zeros_like(line.shown)
-    for key, column in zip(map(candidate_key, found.candidates), found.columns, strict=True):
-        total += known.get(key, 0.0) * column
-    for key, column in zip(map(pattern_key, names), columns, strict=True):
-        total += known.get(key, 0.0) * column
-    return total
+    keys = (*map(candidate_key, found.candidates), *map(pattern_key, names))
+    amplitudes = np.array([[one.get(key, 0.0) for key in keys] for one in lists])
+    combined: Floats = np.tensordot(amplitudes, np.concatenate([found.columns, columns]), axes=1)
+    return combined
 
 
 def _noise(
@@ -134,6 +133,7 @@ def prepare(
     effects: ActiveEffects,
     longitude: float,
     known: Mapping[str, float],
+    usual: Sequence[Mapping[str, float]] = (),
     without: Collection[str] = (),
 ) -> Problem:
     """Recalibrate, then linearise everything that may be missing.
@@ -145,18 +145,28 @@ def prepare(
         effects: active already.
         longitude: degrees east, for the calendar.
         known: the misfit of the calibration, amplitude by key (`structure`).
+        usual: how greenhouses and weathers differ though nothing is missing, each in amplitudes by key (`usual`).
         without: effects that are no candidates.
     """
     runs = linearisation.day_runs(record, split.day)
     line = linearisation.linearise(record, runs, prior.mean, effects)
-    misfit = _misfit(line, known, longitude, candidates.candidate_columns(line) if known else None)
+    expected = _combined(line, longitude, [known, *usual] if known else usual)
+    misfit = expected[0] if known else np.zeros_like(line.shown)
     line, whitening, balances = recalibrate(line, split, prior, misfit)
     chosen = list(balances)
     observed = counted_rows(line, balances)
     base = linearisation.parameter_columns(line, prior.names, prior.spread)
     found = candidates.candidate_columns(line, without)
     names, pattern = drivers.pattern_columns(line, longitude)
-    parts = [line.errors[None], base, found.columns, found.ageing, pattern, misfit[None][: 1 if known else 0]]
+    parts = [
+        line.errors[None],
+        base,
+        found.columns,
+        found.ageing,
+        pattern,
+        expected[: 1 if known else 0],
+        expected[1 if known else 0 :],
+    ]
     edges = np.cumsum([0] + [len(part) for part in parts])
     white = np.concatenate([whitening(part[:, chosen] * observed) for part in parts])
     products = gram.daily_products(white, runs.day, split.days)
@@ -170,7 +180,7 @@ def prepare(
         names,
         found.untestable,
         DailyGrams(products, split.fit),
-        *(range(int(edges[k]), int(edges[k + 1])) for k in range(1, 6)),
+        *(range(int(edges[k]), int(edges[k + 1])) for k in range(1, 7)),
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,7 +93,7 @@ def _stuck(time: NDArray[np.datetime64], values: Floats, hours: float, *, satura
         return rows
     seconds = time[known].astype("datetime64[s]").astype(np.int64)
     change = np.flatnonzero(np.concatenate([[True], np.diff(values[known]) != 0.0, [True]]))
-    for first, end in zip(change[:-1], change[1:], strict=True):
+    for first, end in pairwise(change):
         lasted = seconds[end - 1] - seconds[first]
         if lasted >= hours * 3600.0 and not (saturated and values[known[first]] >= 99.0):
             rows[known[first] : known[end - 1] + 1] = True

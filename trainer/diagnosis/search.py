@@ -185,4 +185,5 @@ def _largest_flipped(centred: Floats, spread: Floats, usable: NDArray[np.bool_],
     """Return the largest statistic over all columns for each draw of day signs, (FLIPS,)."""
     signs = rng.choice(np.array([-1.0, 1.0]), size=(FLIPS, len(centred)))
     scaled = centred[:, usable] / spread[usable]
-    return np.max(np.abs(signs @ scaled), axis=1, initial=0.0)
+    largest: Floats = np.max(np.abs(signs @ scaled), axis=1, initial=0.0)
+    return largest

@@ -17,7 +17,11 @@ from trainer.diagnosis.search import Fit, Model
 
 MOST_TERMS = 3
 BEAM = 3
-ONSET_PRICE = 8.0
+SMALLEST_GAIN = 8.0
+"""Log-likelihood that a term must add on the fit days."""
+LARGEST_P_VALUE = 0.005
+"""Of the day-block max-T test, the price of searching paid."""
+ONSET_PRICE = 6.0
 """Log-likelihood that a beginning within the log must add over an effect that was always there."""
 FIRST_ONSET_DAYS = 3
 """No beginning is looked for within so many days of either end."""
@@ -115,9 +119,6 @@ def forward(
     problem: Problem,
     null: Model,
     rng: np.random.Generator,
-    *,
-    smallest_gain: float,
-    largest_p_value: float,
     most_terms: int = MOST_TERMS,
 ) -> list[Selected]:
     """Return the chain of best models, from none to at most `most_terms` terms, each in the bounds of its effect."""
@@ -133,7 +134,7 @@ def forward(
             for hypothesis in ranked:
                 if hypothesis.effect in parent.effects:
                     continue
-                if hypothesis.gain < smallest_gain or hypothesis.p_value > largest_p_value:
+                if hypothesis.gain < SMALLEST_GAIN or hypothesis.p_value > LARGEST_P_VALUE:
                     continue
                 grown.append(_grow(problem, parent, hypothesis))
                 taken += 1

@@ -8,7 +8,7 @@ one column with a coefficient near one, beside a little slack on each candidate.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -24,9 +24,6 @@ PATTERN_RIDGE = 0.5
 """The same for a pattern, in its units."""
 SPREAD = 0.3
 """How much of it may differ from one log to the next (relative deviation)."""
-SLACK = 1e-6
-"""Deviation of what any candidate may have in a log for which nothing is missing, in typical amplitudes."""
-
 PARAMETER_PREFIX = "parameter:"
 """Key of a parameter's shift: what short errors say of it beside the long ones that it was calibrated on."""
 
@@ -36,20 +33,38 @@ Structure = Mapping[str, float]
 
 def learn(problem: Problem) -> dict[str, float]:
     """Return the misfit of a calibrated model on its own log (all days)."""
+    # The parameters stay where the recalibration put them: moved along, they would leave their bounds.
+    return amplitudes(problem, ()) | {
+        PARAMETER_PREFIX + name: float(value)
+        for name, value in zip(problem.prior.names, parameter_shift(problem), strict=True)
+    }
+
+
+def amplitudes(problem: Problem, base: Sequence[int]) -> dict[str, float]:
+    """Return the ridge regression of what is left on all candidates and patterns, amplitude by key (all days).
+
+    Args:
+        problem: of a log for which nothing is missing.
+        base: columns that take their share first, under the null model's prior.
+    """
     columns = [*problem.candidate, *problem.pattern]
     keys = [candidate_key(one) for one in problem.candidates] + [pattern_key(one) for one in problem.patterns]
     scale = np.array(
         [RIDGE * EFFECTS[one.effect].amplitude.typical for one in problem.candidates]
         + [PATTERN_RIDGE] * len(problem.patterns)
     )
-    # The parameters stay where the recalibration put them: moved along, they would leave their bounds.
-    products = problem.grams.of(columns, ()).sum(axis=0)
-    solution = solve(products, np.diag(scale**-2.0))
-    misfit = {key: float(value) for key, value in zip(keys, solution.coefficients, strict=True)}
-    return misfit | {
-        PARAMETER_PREFIX + name: float(value)
-        for name, value in zip(problem.prior.names, parameter_shift(problem), strict=True)
-    }
+    size = len(base)
+    products = problem.grams.of([*base, *columns], ()).sum(axis=0)
+    precision = np.zeros((len(products) - 1,) * 2)
+    precision[size:, size:] = np.diag(scale**-2.0)
+    if base:
+        null = null_model(problem)
+        precision[:size, :size] = null.precision
+        pull = null.precision @ null.shift
+        products[0, 1 : size + 1] += pull
+        products[1 : size + 1, 0] += pull
+    solution = solve(products, precision)
+    return {key: float(value) for key, value in zip(keys, solution.coefficients[size:], strict=True)}
 
 
 def centre(knowledge: Prior, known: Structure) -> Prior:
@@ -59,35 +74,12 @@ def centre(knowledge: Prior, known: Structure) -> Prior:
 
 
 def null_model(problem: Problem) -> Model:
-    """Return the model under which nothing is missing: parameters, known misfit and slack, each under its prior."""
-    typical = [
-        index
-        for index, candidate in zip(problem.candidate, problem.candidates, strict=True)
-        if candidate.shape == nearest_shape(problem, candidate.effect)
-    ]
-    slack = [
-        SLACK * abs(EFFECTS[problem.candidates[index - problem.candidate.start].effect].amplitude.typical)
-        for index in typical
-    ]
-    deviations = np.array([*[SPREAD] * len(problem.known), *slack])
+    """Return the model under which nothing is missing: parameters, known and usual misfits, each under its prior."""
+    deviations = np.array([*[SPREAD] * len(problem.known), *[1.0] * len(problem.usual)])
     size = len(problem.parameter)
     precision = np.zeros((size + len(deviations),) * 2)
     precision[:size, :size] = problem.prior.precision
     precision[size:, size:] = np.diag(deviations**-2.0)
     # The linearisation has none of the known misfit yet: it stands one below the prior's mean.
-    shift = np.concatenate([parameter_shift(problem), [-1.0] * len(problem.known), np.zeros(len(slack))])
-    return Model((*problem.parameter, *problem.known, *typical), precision, shift)
-
-
-def nearest_shape(problem: Problem, effect: str) -> tuple[tuple[str, float], ...]:
-    """Return the shape of a candidate that lies nearest to the typical one."""
-    shapes = [candidate.shape for candidate in problem.candidates if candidate.effect == effect]
-    definition = {shape.name: shape for shape in EFFECTS[effect].shapes}
-
-    def distance(shape: tuple[tuple[str, float], ...]) -> float:
-        return sum(
-            abs(value - definition[name].typical) / (definition[name].high - definition[name].low)
-            for name, value in shape
-        )
-
-    return min(shapes, key=distance)
+    shift = np.concatenate([parameter_shift(problem), [-1.0] * len(problem.known), np.zeros(len(problem.usual))])
+    return Model((*problem.parameter, *problem.known, *problem.usual), precision, shift)

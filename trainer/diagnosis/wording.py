@@ -11,8 +11,12 @@ from trainer.diagnosis.result import Finding, Interval
 
 UNITS = {"heat": "W m-2", "vapour": "kg m-2 s-1", "co2": "kg m-2 s-1", "air_exchange": "m s-1", "light_loss": "1"}
 NAMES = {
-    "heat": "heat", "vapour": "water vapour", "co2": "CO2", "air_exchange": "air exchange", "light_loss": "loss of light",
-}  # fmt: skip
+    "heat": "heat",
+    "vapour": "water vapour",
+    "co2": "CO2",
+    "air_exchange": "air exchange",
+    "light_loss": "loss of light",
+}
 
 
 def finding(one: Estimated) -> Finding:

@@ -79,7 +79,6 @@ def _gains(diagnosis: Diagnosis) -> list[str]:
         if {"deployed", "corrected"} <= day.keys():
             unit = QUANTITIES[quantity].unit.replace("degC", "K")
             name = quantity.removeprefix("air_").replace("co2", "CO2")
-            sentences.append(
-                f"Predicted {name} was off by {day['deployed']:.2g} {unit} a day ahead; now {day['corrected']:.2g} {unit}."
-            )
+            before, after = (f"{day[stage]:.2g} {unit}" for stage in ("deployed", "corrected"))
+            sentences.append(f"Predicted {name} was off by {before} a day ahead; now {after}.")
     return sentences
