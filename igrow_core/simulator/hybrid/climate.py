@@ -54,7 +54,7 @@ _ENERGY_SCREEN_SHADE, _BLACKOUT_SCREEN_SHADE = 0.25, 0.98
 """Light that a closed screen takes (data documentation of the 2019 challenge)."""
 _PASCAL_PER_CONTENT = 1.36e5
 """Vapour pressure of a vapour content, Pa per kg m-3, at 20 degC."""
-_DRYING_SHARE = 0.3
+_DRYING_SHARE = 0.6
 """Share of the evaporation's answer to warmer air that lasts over a step; moister air takes back the rest. It is what
 brings steps of 5 to 30 minutes closest to those of one (tests/simulator/test_step_length.py)."""
 _EXTINCTION = 0.7
