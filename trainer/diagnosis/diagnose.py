@@ -84,6 +84,8 @@ class Evidence:
     runs: dict[str, Runs]
     """24 h free runs on held-out days by stage."""
     corrected: CorrectedModel
+    knowledge: Prior
+    """Under which the free runs were fitted."""
 
 
 def diagnose(
@@ -149,7 +151,9 @@ def diagnose(
         record.unknown,
     )
     shown = {name: day for name, stage in stages.items() if (day := stage.runs(record, split)) is not None}
-    return diagnosis, Evidence(record, split, prepared, tuple(chain), tuple(weighed), shown, model)
+    return diagnosis, Evidence(
+        record, split, prepared, tuple(chain), tuple(weighed), shown, model, deployed.free_run_prior
+    )
 
 
 def _correct(

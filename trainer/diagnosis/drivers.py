@@ -64,8 +64,8 @@ def patterns(record: Record, longitude: float) -> list[tuple[str, tuple[str, ...
         for first, last in ((0, 6), (6, 10), (10, 14), (14, 19), (19, 24)):
             course = window(first, last) * (weekday == index)
             table.append((f"{first:02d} to {last:02d} h on {name}s", ("hour", "weekday"), course))
-    outdoor = np.asarray(record.inputs["outdoor_temperature"])
-    cold = np.maximum(8.0 - outdoor, 0.0) / 8.0
+    outdoor = np.asarray(record.inputs["outdoor_temperature"], dtype=np.float64)
+    cold: Floats = np.maximum(8.0 - outdoor, 0.0) / 8.0
     table.append(("cold weather", ("outdoor_temperature",), cold))
     table.append(("outdoor temperature", ("outdoor_temperature",), (outdoor - 10.0) / 10.0))
     for first, last in ((5, 9), (9, 15), (19, 5), (19, 11)):

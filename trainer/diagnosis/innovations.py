@@ -107,8 +107,8 @@ def fit_whitening(errors: Floats, counted: NDArray[np.bool_], filters: tuple[Noi
     size = len(filters)
     covariance = np.diag([_scale(row) ** 2 for row in chosen])
     for _ in range(10):
-        root = np.linalg.inv(np.linalg.cholesky(covariance))
-        distance = np.sum((root @ chosen) ** 2, axis=0)
+        scaled = np.linalg.inv(np.linalg.cholesky(covariance))
+        distance = np.sum((scaled @ chosen) ** 2, axis=0)
         weight = (FREEDOM + size) / (FREEDOM + distance)
         covariance = (chosen * weight) @ chosen.T / chosen.shape[1]
     root: Floats = np.linalg.inv(np.linalg.cholesky(covariance))

@@ -53,7 +53,7 @@ class Problem:
 
 def counted_rows(line: Linearisation, balances: tuple[int, ...]) -> NDArray[np.bool_]:
     """Tell which rows have an error in every balance at hand, (r, steps)."""
-    rows: NDArray[np.bool_] = line.runs.weight[list(balances)].all(axis=0)
+    rows: NDArray[np.bool_] = np.all(line.runs.weight[list(balances)], axis=0)
     return rows
 
 

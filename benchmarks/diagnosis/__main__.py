@@ -1,0 +1,71 @@
+"""Print the diagnosis benchmark: `python -m benchmarks.diagnosis [scoring|tuning|usual|real DATA]`.
+
+`scoring` (the default) draws 208 cases, simulates their logs and those that the models are calibrated on, diagnoses
+each, and prints the table beside its bounds. `usual` learns anew what is usual between greenhouses, from seeds that
+no case has. Everything is made afresh: an hour or so on two cores.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict
+from pathlib import Path
+
+from benchmarks.diagnosis.cases import SEASONS, Case, draw
+from benchmarks.diagnosis.logs import Reference, reference, simulate_cases
+from benchmarks.diagnosis.scoring import Outcome, judge, show, table
+from igrow_core.telemetry import Telemetry
+
+
+def _judge(job: tuple[Case, Telemetry, Reference]) -> Outcome:
+    return judge(*job)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.diagnosis", description=__doc__)
+    parser.add_argument("what", nargs="?", default="scoring", choices=("scoring", "tuning", "usual", "real"))
+    parser.add_argument("data", nargs="?", type=Path, help="folder of the public data sets, for `real`")
+    parser.add_argument("--cases", type=int, default=208)
+    parser.add_argument("--days", type=int, default=28)
+    parser.add_argument("--season", action="append", choices=tuple(SEASONS), help="default: winter and spring")
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--json", type=Path, help="write each case's outcome as a line of JSON")
+    options = parser.parse_args()
+    if options.what == "real":
+        from benchmarks.diagnosis.real import main as real  # noqa: PLC0415
+
+        return real(options.data)
+    if options.what == "usual":
+        from benchmarks.diagnosis.usual import main as learn  # noqa: PLC0415
+
+        return learn()
+    seasons = options.season or ["winter", "spring"]
+    references = {}
+    for season in seasons:
+        print(f"calibrating on the reference log of {season}", file=sys.stderr)
+        references[season] = reference(season)
+    cases = draw(options.what, options.cases, {season: one.unit for season, one in references.items()})
+    outcomes: list[Outcome] = []
+    with ProcessPoolExecutor(options.processes) as pool:
+        for season in seasons:
+            own = [case for case in cases if case.season == season]
+            print(f"simulating {len(own)} logs of {season}", file=sys.stderr)
+            logs = simulate_cases(season, own, references[season].unit, options.days)
+            jobs = [(case, log, references[season]) for case, log in zip(own, logs, strict=True)]
+            for outcome in pool.map(_judge, jobs):
+                outcomes.append(outcome)
+                print(
+                    f"{outcome.case.name}: {outcome.case.causes} -> {outcome.verdict} {outcome.found}", file=sys.stderr
+                )
+    if options.json:
+        options.json.write_text("".join(json.dumps(asdict(one)) + "\n" for one in outcomes), encoding="utf-8")
+    print(f"{len(outcomes)} cases, {options.days} days, seeds of {options.what}")
+    print(show(table(outcomes)))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,206 @@
+"""What a diagnosis got right in a case whose truth is known, and the table of all cases beside the bounds."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from benchmarks.diagnosis.cases import SEASONS, Case, hidden
+from benchmarks.diagnosis.logs import SITE, Reference
+from igrow_core.effects import EFFECTS
+from igrow_core.greenhouse.uncatalogued import UNCATALOGUED
+from igrow_core.telemetry import Telemetry
+from trainer.diagnosis import diagnose, freefit, linearisation
+from trainer.diagnosis.activation import ActiveTerm, activate
+from trainer.diagnosis.diagnose import Evidence, Stage
+
+NOISE = {"air_temperature": 0.5, "air_humidity": 2.0, "air_co2": 35.0}
+"""Scales under which errors of different quantities are added."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One case, judged."""
+
+    case: Case
+    verdict: str
+    found: tuple[str, ...]
+    rivals: tuple[tuple[str, ...], ...]
+    relative_size: float | None
+    """Estimate over truth of the first finding, where it is right."""
+    covered: bool | None
+    """The truth lies in its 90 % interval."""
+    onset_error: float | None
+    """Days."""
+    recalibrated: float
+    """24 h error on unseen days, quantities scaled and added."""
+    corrected: float
+    perfect: float
+    """With the true cause in the model, in the catalogue's form."""
+    seconds: float
+
+
+def judge(case: Case, telemetry: Telemetry, reference: Reference) -> Outcome:
+    """Diagnose one case and compare with the truth."""
+    begun = time.perf_counter()
+    diagnosis, evidence = diagnose(telemetry, SITE, reference.deployed, without=case.without)
+    seconds = time.perf_counter() - begun
+    causes = [one for one in diagnosis.findings if one.kind != "remainder"]
+    found = tuple(one.effect for one in diagnosis.findings)
+    start = np.datetime64(f"{SEASONS[case.season]}T00:00:00")
+    truth = {one.name: one for one in hidden(case, reference.unit, start)}
+    relative, covered, onset_error = None, None, None
+    for one in causes:
+        if one.effect not in truth:
+            continue
+        true = truth[one.effect]
+        amplitude = one.parameters[EFFECTS[one.effect].amplitude.name]
+        relative = amplitude.value / float(true.size or 1.0)
+        covered = amplitude.low <= float(true.size or 0.0) <= amplitude.high
+        if true.start is not None:
+            onset_error = (
+                abs((one.onset.time - true.start) / np.timedelta64(1, "h")) / 24.0 if one.onset is not None else 99.0
+            )
+        break
+    errors = diagnosis.errors
+    return Outcome(
+        case,
+        diagnosis.verdict,
+        found,
+        tuple(one.rivals for one in causes),
+        relative,
+        covered,
+        onset_error,
+        _sum(errors, "recalibrated"),
+        _sum(errors, "corrected"),
+        _perfect(evidence, truth, start) if evidence is not None and truth else _sum(errors, "recalibrated"),
+        seconds,
+    )
+
+
+def _sum(errors: Mapping[str, Mapping[str, Mapping[str, float]]], stage: str) -> float:
+    return sum(table["24_h"][stage] / NOISE[quantity] for quantity, table in errors.items() if "24_h" in table)
+
+
+def _perfect(evidence: Evidence, truth: Mapping[str, Any], start: np.datetime64) -> float:
+    """Return the error of the model with the true causes in it, its parameters refitted."""
+    record, split, prepared = evidence.record, evidence.split, evidence.problem
+    terms = []
+    added: dict[str, Any] = {}
+    for name, one in truth.items():
+        if name in EFFECTS:
+            shape = {shape.name: shape.typical for shape in EFFECTS[name].shapes}
+            terms.append(ActiveTerm(name, float(one.size), shape, one.start))
+            continue
+        line = prepared.line
+        seconds = record.time.astype("datetime64[s]").astype(np.int64) + int(240.0 * SITE.longitude)
+        weekday = 1.0 * ((seconds // 86_400 + 3) % 7)
+        line = replace(line, drivers={**line.drivers, "weekday": weekday})
+        for channel, flux in linearisation.unit_fluxes(line, UNCATALOGUED[name], {}).items():
+            added[channel] = added.get(channel, 0.0) + float(one.size) * flux
+    effects = activate(record, terms)
+    fitted = freefit.fit(record, prepared.line.runs, split, evidence.knowledge, effects, None, added)
+    runs = Stage(*fitted, tuple(terms), {}, added).runs(record, split)
+    assert runs is not None
+    return sum(float(np.nanmean(np.abs(error))) / NOISE[name] for name, error in runs.errors.items())
+
+
+def _share(chosen: Sequence[Outcome], right: Callable[[Outcome], bool]) -> tuple[float, int]:
+    return (float(np.mean([right(one) for one in chosen])) if chosen else float("nan")), len(chosen)
+
+
+def _group(outcomes: Sequence[Outcome], *groups: str, size: float | None = None) -> list[Outcome]:
+    return [one for one in outcomes if one.case.group in groups and (size is None or one.case.size == size)]
+
+
+def _first_right(one: Outcome) -> bool:
+    return bool(one.found) and one.found[0] in one.case.causes
+
+
+def _claims(outcomes: Sequence[Outcome]) -> list[Outcome]:
+    return [one for one in _group(outcomes, "single", "sensor", "onset") if one.rivals]
+
+
+def _kind(name: str) -> str:
+    return EFFECTS[name].kind
+
+
+def _recovered(outcomes: Sequence[Outcome]) -> tuple[float, int]:
+    """Return the share of what a perfect correction removes beyond recalibration, summed over cases."""
+    gain = sum(one.recalibrated - one.corrected for one in outcomes)
+    possible = sum(max(one.recalibrated - one.perfect, 0.0) for one in outcomes)
+    return (gain / possible if possible > 0.0 else float("nan")), len(outcomes)
+
+
+def table(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int, str]]:
+    """Return rows (what, figure, cases, bound of the issue at 28 days [84 days])."""
+    outside = _group(outcomes, "outside", "withheld")
+    beyond = _group(outcomes, "outside")
+    sizes = [abs(one.relative_size - 1.0) for one in outcomes if one.relative_size is not None]
+    covered = [one.covered for one in outcomes if one.covered is not None]
+    claims = _claims(outcomes)
+    return [
+        (
+            "false claims on nothing",
+            *_share(_group(outcomes, "nothing"), lambda o: o.verdict != "nothing"),
+            "<= .02 [.05]",
+        ),
+        ("right cause first, ENR 3", *_share(_group(outcomes, "single", "sensor", size=3.0), _first_right), "-"),
+        ("right cause first, ENR 1", *_share(_group(outcomes, "single", "sensor", size=1.0), _first_right), ">= .95"),
+        ("right cause first, ENR 0.3", *_share(_group(outcomes, "single", "sensor", size=0.3), _first_right), ">= .85"),
+        ("  the same where something was claimed", *_share(claims, _first_right), "-"),
+        (
+            "process and sensor told apart, of claims",
+            *_share(claims, lambda o: _kind(o.found[0]) == _kind(o.case.causes[0]) if o.found[0] in EFFECTS else False),
+            ">= .97",
+        ),
+        (
+            "true cause in the set of rivals, of claims",
+            *_share(claims, lambda o: o.case.causes[0] in o.rivals[0]),
+            ">= .97",
+        ),
+        (
+            "mean size of the set of rivals",
+            float(np.mean([len(one.rivals[0]) for one in claims])) if claims else float("nan"),
+            len(claims),
+            "<= 1.5",
+        ),
+        (
+            "share of the recoverable error recovered",
+            *_recovered(_group(outcomes, "single", "sensor", "onset", "pair")),
+            ">= .90",
+        ),
+        ("size, median relative error", float(np.median(sizes)) if sizes else float("nan"), len(sizes), "<= .10"),
+        ("90 % intervals that cover", float(np.mean(covered)) if covered else float("nan"), len(covered), ".85 to .95"),
+        (
+            "both of a pair",
+            *_share(_group(outcomes, "pair"), lambda o: set(o.case.causes) <= set(o.found)),
+            ">= .80 [.90]",
+        ),
+        (
+            "onset within 2 days, where the cause was found",
+            *_share([o for o in outcomes if o.onset_error is not None], lambda o: (o.onset_error or 0.0) <= 2.0),
+            ">= .95",
+        ),
+        ("outside: confident wrong name", *_share(beyond, lambda o: o.verdict == "named"), "<= .10"),
+        ("outside: silence", *_share(beyond, lambda o: o.verdict == "nothing"), "<= .10"),
+        (
+            "withheld: confident wrong name",
+            *_share(_group(outcomes, "withheld"), lambda o: o.verdict == "named"),
+            "<= .10",
+        ),
+        ("withheld: silence", *_share(_group(outcomes, "withheld"), lambda o: o.verdict == "nothing"), "<= .10"),
+        ("outside and withheld: recoverable error recovered", *_recovered(outside), ">= .60"),
+        ("seconds a case, largest", max(one.seconds for one in outcomes), len(outcomes), "<= 60 (84 days, 2 cores)"),
+    ]
+
+
+def show(rows: Sequence[tuple[str, float, int, str]]) -> str:
+    """Return the table as text."""
+    lines = [f"{'':52} {'figure':>8} {'cases':>6}  bound"]
+    lines += [f"{what:52} {figure:8.2f} {count:6d}  {bound}" for what, figure, count, bound in rows]
+    return "\n".join(lines)
