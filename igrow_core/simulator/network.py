@@ -3,7 +3,7 @@
 After Cao et al. (2022), iGrow, AAAI 36(11), 11837-11845, with three changes that let a season be run freely
 from its first hour: a network gives the increment of its state, so that standing still costs it nothing;
 it also sees each driver through first-order filters, which stand for the heat and water that pipes, floor
-and crop remember; and what can only grow (net growth, harvest) cannot shrink.
+and crop remember; and what can only grow (the harvest) cannot shrink.
 
 Everything here is pure and written against a namespace `xp` (numpy, torch through an adapter, ndonnx): a day
 of it can be unrolled into one ONNX graph. The last axis of every array holds the features, the axes before

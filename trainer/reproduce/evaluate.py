@@ -15,8 +15,12 @@ from trainer.reproduce.scores import PUBLISHED_BASELINE, PUBLISHED_INCREMENTAL, 
 from trainer.reproduce.table1 import run_freely
 from trainer.training.checkpoint import load_simulator
 
+EXAMPLE = "igrow-trainer evaluate --bundle reproduced --data trajectories.parquet"
 
-def run(bundle: Path, data: Path, out: Path | None = None, report: Callable[[str], None] = print) -> dict[str, Score]:
+
+def evaluate(
+    bundle: Path, data: Path, out: Path | None = None, report: Callable[[str], None] = print
+) -> dict[str, Score]:
     """Run every season of `data` (a file in the format of trajectories.parquet) with the networks of `bundle`.
 
     `bundle` is a folder with network.npz, or that file. Returns and prints the scores without the two faulty days,
@@ -49,6 +53,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, help="write the scores to this JSON file")
 
 
-def run_command(arguments: Namespace) -> None:
+def run(arguments: Namespace) -> int:
     """Run `evaluate`."""
-    run(arguments.bundle, arguments.data, arguments.out)
+    evaluate(arguments.bundle, arguments.data, arguments.out)
+    return 0

@@ -35,8 +35,11 @@ def layout(
     clock: bool = False,
     step: float = 1.0,
 ) -> StageLayout:
-    """Return a layout whose bounds and cumulative states follow from the registry of quantities."""
-    cumulative = tuple(state in ("net_growth", "fruit_fresh_weight") for state in states)
+    """Return a layout whose bounds are those of the registry; only the harvest can but grow.
+
+    Net growth falls in dark hours, when the crop respires more than it assimilates.
+    """
+    cumulative = tuple(state == "fruit_fresh_weight" for state in states)
     low = tuple(QUANTITIES[state].low for state in states)
     high = tuple(QUANTITIES[state].high for state in states)
     return StageLayout(name, states, drivers, time_constants, clock, step, low, high, cumulative, hidden)

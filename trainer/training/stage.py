@@ -227,3 +227,17 @@ def run_stage(stage: Stage, drivers: Values, hour: Values, start: Values) -> Val
         scaled = module(features[:, 1:], module.scaled_states(start)).numpy().astype(np.float64)
     states = scaled * stage.state_scale + stage.state_offset
     return np.concatenate([start[:, None], states], axis=1)
+
+
+def run_windows(stage: Stage, data: StageData, starts: NDArray[np.int64], length: int) -> Values:
+    """Run freely for `length` steps from each start (run, step), filters knowing all that went before.
+
+    Returns states (windows, length, s); `starts` is (windows, 2).
+    """
+    module = StageModule(stage)
+    rows = starts[:, 1:] + 1 + np.arange(length)
+    with torch.no_grad():
+        features = module.scaled_features(raw_features(stage, data.drivers, data.hour))
+        begin = module.scaled_states(data.states[starts[:, 0], starts[:, 1]])
+        scaled = module(features[starts[:, :1], rows], begin).numpy().astype(np.float64)
+    return np.asarray(scaled * stage.state_scale + stage.state_offset)
