@@ -10,6 +10,7 @@ import numpy as np
 
 from igrow_core.effects import EFFECTS, Effect
 from igrow_core.effects.definition import Parameter
+from igrow_core.quantities import WEATHER
 from trainer.diagnosis.linearisation import (
     Floats,
     Linearisation,
@@ -92,7 +93,7 @@ def candidate_columns(line: Linearisation, without: Collection[str] = ()) -> Can
     testable = [
         effect
         for effect in effects
-        if not any(driver in line.record.unknown for driver in effect.drivers) and is_measured(line.record, effect)
+        if not _is_blind(line, effect) and is_measured(line.record, effect)
     ]
     found = [Candidate(effect.name, tuple(shape.items())) for effect in testable for shape in grid(effect)]
     columns = _columns(line, found)
@@ -111,6 +112,16 @@ def candidate_columns(line: Linearisation, without: Collection[str] = ()) -> Can
         ageing[moved],
         tuple(effect.name for effect in effects if effect.name not in names),
     )
+
+
+def _is_blind(line: Linearisation, effect: Effect) -> bool:
+    """Tell whether the log lacks a driver for which nothing can stand in.
+
+    An actuator that is not logged counts as equipment that is not there: its effects show nothing. The leaf area is
+    estimated where it is not measured, which does for all effects but the one that is about it.
+    """
+    lacking = set(effect.drivers) & set(line.record.unknown)
+    return bool(lacking & set(WEATHER)) or (effect.drivers[0] == "leaf_area_index" and bool(lacking))
 
 
 def _columns(line: Linearisation, candidates: Sequence[Candidate]) -> Floats:

@@ -150,7 +150,9 @@ def scan(
         )
         score[row] = (part @ coefficients).sum(axis=0)
         curvature[row] = square.sum(axis=0) - np.einsum("cp,cp->c", part.sum(axis=0)[:, 1:], weights)
-        slope = score[row] / np.maximum(curvature[row], 1e-300)
+        # A column that the base explains altogether has no curvature left, and no slope.
+        left = curvature[row] > 1e-6 * np.maximum(square.sum(axis=0), 1e-300)
+        slope = np.where(left, score[row] / np.where(left, curvature[row], 1.0), 0.0)
         centred[:, row] = day_score - day_curvature * slope
         spread[row] = np.sqrt(np.sum(centred[:, row] ** 2, axis=0))
     usable = curvature > 1e-6 * np.maximum(own.sum(axis=0), 1e-300)

@@ -1,0 +1,69 @@
+"""Logs of a virtual greenhouse with known truth, shared by the tests of the diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from igrow_core.simulator.hybrid.nominal import nominal
+from igrow_core.telemetry import Telemetry
+from tests.virtual_log import SITE, virtual_log, weather
+from trainer.diagnosis import Deployed
+
+Floats = NDArray[np.float64]
+DAYS = 20
+STEP = 900.0
+
+
+def disturbances(days: int, step: float, seed: int) -> dict[str, Floats]:
+    """Coloured fluxes that no model knows: correlation time of two hours."""
+    generator = np.random.default_rng(seed)
+    count = round(days * 86_400 / step)
+    keep = float(np.exp(-step / 7200.0))
+    sizes = {"heat": 4.0, "vapour": 1e-6, "co2": 6e-8}
+    return {
+        name: size * np.sqrt(1.0 - keep**2) * lfilter([1.0], [1.0, -keep], generator.standard_normal(count))
+        for name, size in sizes.items()
+    }
+
+
+def greenhouse_log(seed: int, added: Mapping[str, Floats] | None = None, days: int = DAYS) -> Telemetry:
+    """A log with disturbances, sensor noise, and whatever is added to the fluxes."""
+    fluxes = disturbances(days, STEP, seed)
+    for channel, flux in (added or {}).items():
+        fluxes[channel] = fluxes.get(channel, 0.0) + flux
+    return virtual_log(days, seed=seed, step=STEP, added=fluxes)
+
+
+def deployed_model() -> Deployed:
+    """A model that knows the greenhouse's parameters within five per cent."""
+    values = nominal(SITE)
+    return Deployed(values, {name: 0.05 * abs(value) + 1e-6 for name, value in values.items()}, shift=0.0)
+
+
+@pytest.fixture(scope="session")
+def quiet_log() -> Telemetry:
+    """Nothing is missing."""
+    return greenhouse_log(1)
+
+
+@pytest.fixture(scope="session")
+def leaky_log() -> Telemetry:
+    """Wind presses 0.12 air changes per hour and m/s more through the envelope than the model knows."""
+    wind = weather(DAYS, STEP, 2)["wind_speed"]
+    return greenhouse_log(2, {"air_exchange": 0.12 * wind * SITE.greenhouse.mean_height / 3600.0})
+
+
+@pytest.fixture(scope="session")
+def door_log() -> Telemetry:
+    """A door stands open from 7 to 16 h on working days: no effect of the catalogue."""
+    count = round(DAYS * 86_400 / STEP)
+    hours = np.arange(count) * STEP / 3600.0
+    # The log begins on a Saturday.
+    weekday = (5 + np.floor(hours / 24.0)) % 7
+    opened = (hours % 24.0 >= 7.0) & (hours % 24.0 < 16.0) & (weekday < 5)
+    return greenhouse_log(3, {"air_exchange": 0.003 * opened})
