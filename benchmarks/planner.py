@@ -15,7 +15,7 @@ from __future__ import annotations
 import argparse
 import tempfile
 import time
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -132,7 +132,7 @@ def plans(arguments: argparse.Namespace) -> None:
 def daily(arguments: argparse.Namespace) -> None:
     site = load_site(SITE)
     rng = np.random.default_rng(1)
-    train = Scenario(np.datetime64("2020-01-24T23:00:00"), 3, 500, seed=900_001)
+    train = Scenario(np.datetime64("2020-01-24T23:00:00"), 2, 500, seed=900_001)
     template = for_site(replace(site, planning=replace(site.planning, optimise=SETPOINTS)), train.start, HOURS)
     genes = rng.random((500, template.genes), dtype=np.float32)
     scores = np.zeros(500)
@@ -152,20 +152,27 @@ def daily(arguments: argparse.Namespace) -> None:
     }
     if arguments.policy:
         policy = OnnxPolicy(arguments.policy)
-        methods["policy"] = lambda world: to_setpoints(site, policy.act(world.observe()))
+        methods["policy"] = lambda world: to_setpoints(site, policy.act(world.observe()[:COUNT]))
     starts = [np.datetime64("2020-01-14T23:00:00") + 30 * month * DAY for month in range(3)]
-    results: dict[str, list[Valuation]] = {}
-    for name, method in methods.items():
-        for number, start in enumerate(starts):
-            world = DailyGreenhouses(site, Scenario(start, DAYS, COUNT, seed=number))
-            while not world.done:
-                results.setdefault(name, []).append(world.step(method(world)))
+    runs: dict[str, list[Valuation]] = {name: [] for name in methods}
+    for number, start in enumerate(starts):
+        world = DailyGreenhouses(site, Scenario(start, DAYS, COUNT, seed=number, copies=len(methods)))
+        days = []
+        while not world.done:
+            days.append(world.step(np.concatenate([method(world) for method in methods.values()])))
+        for place, name in enumerate(methods):
+            part = slice(place * COUNT, (place + 1) * COUNT)
+            # Days of one run depend on one another; its mean is one observation.
+            runs[name].append(_mean([_slice(day, part) for day in days]))
     print(HEADER)
-    for name, valuations in results.items():
-        # Days of one run depend on one another; its mean is one observation.
-        runs = [_mean(valuations[DAYS * run : DAYS * run + DAYS]) for run in range(len(starts))]
-        base = [_mean(results["recipe"][DAYS * run : DAYS * run + DAYS]) for run in range(len(starts))]
-        print(table_line(name, runs, base, 1.0))
+    for name, valuations in runs.items():
+        print(table_line(name, valuations, runs["recipe"], 1.0))
+
+
+def _slice(valuation: Valuation, part: slice) -> Valuation:
+    balance = valuation.balance
+    cut = {field.name: getattr(balance, field.name)[:, part] for field in fields(balance)}
+    return Valuation(type(balance)(**cut), valuation.harm[:, part], valuation.outside[:, part])
 
 
 def _mean(valuations: list[Valuation]) -> Valuation:

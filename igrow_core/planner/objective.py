@@ -32,6 +32,9 @@ HARM_PER_DEGREE_HOUR = 0.002
 DELAY_PER_DEGREE_DAY = 0.02
 """EUR m-2 for each kelvin that the mean of 24 h lies below the crop's bound: some 5 % of a summer day's income
 per kelvin, as much as fruit development slows down."""
+DISBELIEF = 2.0
+"""Growth promised outside the training data counts less by this much for each width of the range: half a width
+outside it counts for nothing. A network may promise any growth there, and a search finds where it does."""
 OUTSIDE_PENALTY = 0.2
 """EUR m-2 for a day spent one width of the range outside the data that the simulator knows: more than a plan of a
 day can hope to gain."""
@@ -123,7 +126,8 @@ class Objective:
             crop.stem_density,
             self.co2_before,
         )
-        fresh = outcome.net_growth * (crop.fruit_share / crop.dry_matter_fraction)
+        believed = outcome.net_growth * np.clip(1.0 - DISBELIEF * outcome.outside, 0.0, 1.0)
+        fresh = believed * (crop.fruit_share / crop.dry_matter_fraction)
         income = np.sum(fresh * self.growth_price(), axis=-1)
         return Valuation(
             balance=Balance(income, costs.plants, costs.upkeep, costs.electricity, costs.heat, costs.co2),

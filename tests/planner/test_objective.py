@@ -24,6 +24,16 @@ def test_growth_is_worth_the_fruit_it_becomes(site, weather, recipe) -> None:
     assert income == pytest.approx(outcome.net_growth.sum() * 0.7 / 0.09 * 2.0 * (1 - 0.2))
 
 
+def test_growth_promised_far_outside_the_data_is_not_believed(site, weather, recipe) -> None:
+    outcome = ToySimulator().simulate({}, weather, recipe[None], START)
+    objective = Objective(site, TIME)
+    income = [
+        objective.value(replace(outcome, outside=np.full((1, 1, HOURS), far))).balance.income[0, 0]
+        for far in (0.0, 0.25, 0.5, 2.0)
+    ]
+    np.testing.assert_allclose(income, income[0] * np.array([1.0, 0.5, 0.0, 0.0]))
+
+
 def test_growth_is_paid_at_the_prices_of_the_weeks_in_which_it_ripens(site) -> None:
     price = Objective(site, TIME).growth_price()
     days = np.datetime64("2020-02-02") + np.arange(47)

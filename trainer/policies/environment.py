@@ -44,6 +44,8 @@ class Scenario:
     seed: int
     variation: float = 0.08
     """Relative spread of the greenhouses' parameters."""
+    copies: int = 1
+    """How often each greenhouse stands there, so that methods can be compared in one batch: N = count * copies."""
 
 
 class World(Protocol):
@@ -69,19 +71,21 @@ class DailyGreenhouses:
         self.weather = [
             generate_weather(scenario.start, end, seed=int(rng.integers(2**31))) for _ in range(scenario.count)
         ]
+        self.weather *= scenario.copies
         base = parameters or GreenhouseParameters()
         varied = [base.varied(rng, relative=scenario.variation) for _ in range(scenario.count)]
+        self.count = scenario.count * scenario.copies
         self.site, self.scenario, self.day = site, scenario, 0
         self._forecast = np.stack([hourly_weather(table, scenario.start, 24 * scenario.days) for table in self.weather])
         self._plant = Plant(
-            stack(varied),
+            stack(varied * scenario.copies),
             WeatherTable(self.weather),
             float(unix_seconds(scenario.start)),
-            count=scenario.count,
+            count=self.count,
             disturbances=QUIET,
             sensors=EXACT,
         )
-        self._applied = np.full((scenario.count, 1, 4), np.nan)
+        self._applied = np.full((self.count, 1, 4), np.nan)
 
     @property
     def time(self) -> np.datetime64:
@@ -101,7 +105,7 @@ class DailyGreenhouses:
     def observe(self) -> NDArray[np.float32]:
         """Return the observations of the day that comes, (N, 76)."""
         truth = self._plant.truth({})
-        like = np.zeros(self.scenario.count)
+        like = np.zeros(self.count)
         return observe(self.site, {name: like + truth[name] for name in PRESENT}, self.forecast(), self.time)
 
     def step(self, setpoints: Setpoints) -> Valuation:
