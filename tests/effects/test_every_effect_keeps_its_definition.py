@@ -1,4 +1,4 @@
-"""One table for the whole catalogue: each effect is silent at amplitude zero, linear in it, and reads what it declares."""
+"""One table for the whole catalogue: silent at amplitude zero, linear in it, reading only what is declared."""
 
 from __future__ import annotations
 
@@ -9,12 +9,40 @@ from igrow_core.effects import EFFECTS, PROCESS_CHANNELS, Effect
 from igrow_core.quantities import QUANTITIES
 from igrow_core.simulator.hybrid.parameters import PARAMETERS
 
-CATALOGUE = """wind_infiltration screen_gap sky_cooling cover_condensation soil_heat_storage lamp_heat pipe_lag
-heating_valve_leak vent_wind_asymmetry stack_ventilation vent_backlash cover_ageing structure_shade angle_transmission
-rain_cooling night_transpiration deficit_stomata_closure irrigation_evaporation leaf_area_transpiration co2_valve_leak
-co2_dose_vent_loss photosynthesis_heat_limit photosynthesis_decline soil_respiration air_temperature_offset
-humidity_offset co2_offset pipe_temperature_offset air_temperature_radiation_error air_temperature_lag humidity_drift
-co2_drift""".split()
+CATALOGUE = [
+    "wind_infiltration",
+    "screen_gap",
+    "sky_cooling",
+    "cover_condensation",
+    "soil_heat_storage",
+    "lamp_heat",
+    "pipe_lag",
+    "heating_valve_leak",
+    "vent_wind_asymmetry",
+    "stack_ventilation",
+    "vent_backlash",
+    "cover_ageing",
+    "structure_shade",
+    "angle_transmission",
+    "rain_cooling",
+    "night_transpiration",
+    "deficit_stomata_closure",
+    "irrigation_evaporation",
+    "leaf_area_transpiration",
+    "co2_valve_leak",
+    "co2_dose_vent_loss",
+    "photosynthesis_heat_limit",
+    "photosynthesis_decline",
+    "soil_respiration",
+    "air_temperature_offset",
+    "humidity_offset",
+    "co2_offset",
+    "pipe_temperature_offset",
+    "air_temperature_radiation_error",
+    "air_temperature_lag",
+    "humidity_drift",
+    "co2_drift",
+]
 
 # name: (drivers of an hour that shows it, channel, sign of the first contribution at the typical amplitude)
 SIGNS = {

@@ -90,11 +90,7 @@ def candidate_columns(line: Linearisation, without: Collection[str] = ()) -> Can
     """Return the sensitivities to all effects but those in `without` and those already active."""
     one = _with_elapsed_one(line)
     effects = [effect for effect in EFFECTS.values() if effect.name not in without and effect.name not in line.effects]
-    testable = [
-        effect
-        for effect in effects
-        if not _is_blind(line, effect) and is_measured(line.record, effect)
-    ]
+    testable = [effect for effect in effects if not _is_blind(line, effect) and is_measured(line.record, effect)]
     found = [Candidate(effect.name, tuple(shape.items())) for effect in testable for shape in grid(effect)]
     columns = _columns(line, found)
     ageing = np.zeros_like(columns)

@@ -1,0 +1,110 @@
+"""The diagnosis on real logs: errors before and after on later weeks, withheld drivers, and a placebo.
+
+    python -m benchmarks.diagnosis real DATA
+
+DATA is the folder with ``agc2019`` and ``agc2018``. Each compartment's model is calibrated on its first eight weeks
+and diagnosed on the four that follow. Then the known truth: the model is told nothing of an actuator (its column is
+taken out of the log), and the diagnosis must say so. Then the placebo: wind and rain of another half of the season,
+put in the place of the true ones, must not be found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from igrow_core.errors import IgrowError
+from igrow_core.simulator.hybrid.nominal import nominal
+from igrow_core.site import Site
+from igrow_core.telemetry import Telemetry
+from trainer.calibration import calibrate, prior
+from trainer.diagnosis import Deployed, Diagnosis, alignment, diagnose, learn_misfit, runner
+from trainer.readers.open_log import open_log
+
+COMPARTMENTS = (
+    ("agc2019", "Reference"),
+    ("agc2018", "Reference"),
+    ("agc2018", "AiCU"),
+    ("agc2018", "Croperators"),
+    ("agc2018", "deep_greens"),
+)
+CALIBRATION_DAYS, DIAGNOSIS_DAYS = 56, 28
+WITHHELD = {"lamp_power": "lamp heat", "rail_pipe_temperature": "pipe heat", "energy_screen": "screen"}
+PLACEBO = ("wind_speed", "wind_direction", "rain")
+
+
+@dataclass(frozen=True)
+class Compartment:
+    name: str
+    site: Site
+    before: Telemetry
+    after: Telemetry
+
+
+def compartments(data: Path) -> Iterator[Compartment]:
+    for folder, name in COMPARTMENTS:
+        try:
+            log = open_log(data / folder, name)
+        except IgrowError as error:
+            print(f"{folder} {name}: {error}")
+            continue
+        assert log.site is not None
+        start = log.telemetry.time[0] + np.timedelta64(14, "D")
+        middle = start + np.timedelta64(CALIBRATION_DAYS, "D")
+        end = middle + np.timedelta64(DIAGNOSIS_DAYS, "D")
+        yield Compartment(
+            f"{folder} {name}", log.site, log.telemetry.select(start, middle), log.telemetry.select(middle, end)
+        )
+
+
+def deploy(log: Telemetry, site: Site) -> Deployed:
+    """Calibrate on a log as a bundle would be."""
+    before = Deployed(nominal(site), {}, shift=alignment.best_shift(log, site, nominal(site)))
+    record, shift = runner.open_record(log, site, before)
+    posterior = calibrate([(record, None)], prior(nominal(site)), {}, every_hours=8.0)
+    deviations = dict(zip(posterior.names, map(float, posterior.standard_deviation), strict=True))
+    misfit = learn_misfit(record, posterior.values, deviations, site.longitude)
+    return Deployed(posterior.values, deviations, (), misfit, shift)
+
+
+def say(title: str, diagnosis: Diagnosis) -> None:
+    causes = ", ".join(f"{one.effect} ({'/'.join(one.rivals)})" for one in diagnosis.findings) or "-"
+    print(f"{title:44} {diagnosis.verdict:12} {causes}")
+    for quantity, horizons in diagnosis.errors.items():
+        if "24_h" in horizons:
+            stages = "  ".join(f"{stage} {value:.3g}" for stage, value in horizons["24_h"].items())
+            print(f"{'':44} {quantity:16} 24 h: {stages}")
+
+
+def without(log: Telemetry, name: str) -> Telemetry:
+    return Telemetry(log.time, {column: values for column, values in log.columns.items() if column != name})
+
+
+def placebo(log: Telemetry, other: Telemetry) -> Telemetry:
+    """Return a log whose wind and rain come from another stretch of the season."""
+    rows = np.arange(len(log)) % len(other)
+    return log.with_columns({name: other[name][rows] for name in PLACEBO if name in log and name in other})
+
+
+def main(data: Path | None) -> int:
+    if data is None or not data.is_dir():
+        print("error: name the folder of the public data sets: python -m benchmarks.diagnosis real DATA")
+        return 2
+    found: dict[str, set[str]] = {}
+    for one in compartments(data):
+        model = deploy(one.before, one.site)
+        diagnosis, _ = diagnose(one.after, one.site, model)
+        say(one.name, diagnosis)
+        found[one.name] = {finding.effect for finding in diagnosis.findings}
+        for column in WITHHELD:
+            if column in one.after:
+                told, _ = diagnose(without(one.after, column), one.site, model)
+                say(f"  without {column}", told)
+        false, _ = diagnose(placebo(one.after, one.before), one.site, model)
+        say("  wind and rain of other weeks", false)
+    shared = {name for names in found.values() for name in names if sum(name in other for other in found.values()) > 1}
+    print(f"causes found in more than one compartment: {', '.join(sorted(shared)) or 'none'}")
+    return 0
