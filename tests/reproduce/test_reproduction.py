@@ -11,7 +11,7 @@ import pytest
 
 from igrow_core.errors import IgrowError
 from igrow_core.site import Prices
-from trainer.readers import automatoes2020
+from trainer.readers import automatoes2020, liaoyang2020
 from trainer.readers.wur2020 import FAULTY_DAYS, TrajectoryFileError, read_seasons
 from trainer.reproduce import evaluate, figure3, harvests, incremental, table1
 from trainer.reproduce.compartments import Compartment, read_2019
@@ -161,3 +161,13 @@ def test_weeks_outside_those_named_are_not_seen() -> None:
     data = StageData(np.zeros((1, 1680, 1)), np.zeros((1, 1680, 1)), np.zeros(1680), valid)
     seen = incremental.only_weeks(data, 2, 5).valid[0]
     assert seen.sum() == 3 * 168 and seen[2 * 168] and not seen[5 * 168]
+
+
+def test_the_second_pilot_is_read_per_square_metre(data_folder: Path) -> None:
+    pilot = liaoyang2020.read(data_folder / "liaoyang2020")
+    grown = {house: values.sum() for house, values in pilot.production.items()}
+    assert set(grown) == set(liaoyang2020.GREENHOUSES)
+    assert all(1.0 < total < 30.0 for total in grown.values())
+    assert pilot.costs["gh01"]["labour"] == pytest.approx(1543.96 / 667)
+    experiment, control = liaoyang2020.read_climate_pair(data_folder / "liaoyang2020", 3, 1)
+    assert experiment["air_temperature"].size == control["air_temperature"].size > 100
