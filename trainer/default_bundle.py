@@ -1,7 +1,9 @@
 """The default bundle: the hybrid simulator of a greenhouse that nobody has measured yet.
 
-Virtual seasons of the mechanistic greenhouse, under varied weather and setpoints, stand in for its log. Their
-parameters are varied too, so that the fitted means describe such greenhouses and not one of them.
+Virtual seasons of the mechanistic greenhouse stand in for its log. The first of them is the greenhouse that the site
+describes, under the grower's recipe: the physical parameters are fitted to it, as to the first log of a real one. The
+others differ a little from it and are led by varied setpoints: from them the rules of the PLC, growth and yield are
+learned, and the range that planning may use.
 """
 
 from __future__ import annotations
@@ -25,6 +27,8 @@ from trainer.calibration.actuation import fit_actuation, setpoint_columns
 from trainer.calibration.fit import calibrate
 from trainer.calibration.holding import fit_holding
 from trainer.calibration.posterior import Posterior, prior
+from trainer.diagnosis.deployed import from_site, learn_misfit
+from trainer.diagnosis.runner import open_record
 from trainer.model import HybridModel, known_range
 from trainer.training.crop import train_crop
 
@@ -32,9 +36,9 @@ START = np.datetime64("2020-01-20T00:00:00")
 CREATED = datetime(2020, 6, 1, tzinfo=UTC)
 """Fixed, so that the same sources give the same bundle."""
 _RANGED = ("air_temperature", "air_humidity", "air_co2", "outdoor_temperature", "global_radiation", *SETPOINTS)
-HOUSES, DAYS = 12, 42
+HOUSES, DAYS = 10, 56
 SPREAD = 0.08
-"""How far one greenhouse of this kind lies from the next, relative standard deviation of its parameters."""
+"""How far one greenhouse of this kind lies from the next, relative."""
 
 Report = Callable[[str], None]
 
@@ -56,11 +60,12 @@ def virtual_seasons(site: Site, count: int, days: int, seed: int) -> list[Season
     random = np.random.default_rng(seed)
     end = START + np.timedelta64(days, "D")
     weathers = [generate_weather(START, end, seed=seed * 1000 + number) for number in range(count)]
-    houses = [parameters_of(site).varied(random, SPREAD / 2) for _ in range(count)]
+    plain = parameters_of(site)
+    houses = [plain, *(plain.varied(random, SPREAD / 2) for _ in range(count - 1))]
     return simulate_many(
         houses,
         weathers,
-        [varied_recipe(START, end, random) for _ in range(count)],
+        [plain_recipe(START, end), *(varied_recipe(START, end, random) for _ in range(count - 1))],
         START,
         end,
         count=count,
@@ -68,10 +73,17 @@ def virtual_seasons(site: Site, count: int, days: int, seed: int) -> list[Season
     )
 
 
-def varied_recipe(start: np.datetime64, end: np.datetime64, random: np.random.Generator) -> Telemetry:
-    """Return the recipe hour by hour with each day's levels shifted, so that the data hold what planning may try."""
+def plain_recipe(start: np.datetime64, end: np.datetime64) -> Telemetry:
+    """Return the recipe hour by hour."""
     hours = np.arange(start, end + np.timedelta64(1, "h"), np.timedelta64(1, "h"))
     rows = np.array([[recipe(hour)[name] for name in SETPOINTS] for hour in hours])
+    return Telemetry(hours, {name: rows[:, column] for column, name in enumerate(SETPOINTS)})
+
+
+def varied_recipe(start: np.datetime64, end: np.datetime64, random: np.random.Generator) -> Telemetry:
+    """Return the recipe hour by hour with each day's levels shifted, so that the data hold what planning may try."""
+    plain = plain_recipe(start, end)
+    hours, rows = plain.time, np.stack([plain[name] for name in SETPOINTS], axis=1)
     day = ((hours - start) // np.timedelta64(1, "D")).astype(int)
     shift = random.normal(0.0, 1.5, day.max() + 1)[day]
     carbon = random.uniform(0.6, 1.25, day.max() + 1)[day]
@@ -92,7 +104,7 @@ def default_model(site: Site, *, seed: int = 0, report: Report = print) -> Hybri
     """
     report(f"simulating {HOUSES} virtual greenhouses for {DAYS} days")
     seasons = virtual_seasons(site, HOUSES, DAYS, seed)
-    posterior = _fitted(site, seasons, report)
+    posterior, misfit = _fitted(site, seasons[0], report)
     rules, held = _fitted_control(site, seasons, posterior.values)
     crop = train_crop([season.true for season in seasons], seed=seed, report=report)
     tables = [season.measured for season in seasons]
@@ -105,6 +117,7 @@ def default_model(site: Site, *, seed: int = 0, report: Report = print) -> Hybri
         crop=crop,
         training_span=Span(_utc(START), _utc(end)),
         training_range=known_range({name: concatenate_column(tables, name) for name in _RANGED}),
+        known_misfit=misfit,
     )
 
 
@@ -139,12 +152,12 @@ def concatenate_column(tables: Sequence[Telemetry], name: str) -> np.ndarray[tup
     return np.concatenate([table[name] for table in tables])
 
 
-def _fitted(site: Site, seasons: Sequence[Season], report: Report) -> Posterior:
-    """Fit one set of parameters to all virtual greenhouses; its spread is that between greenhouses."""
-    parts = [(site_record(season.measured, site, 300.0), None) for season in seasons]
-    fitted = calibrate(parts, prior(nominal(site)), {}, every_hours=24.0, progress=report)
-    spread = {name: max(SPREAD * abs(value), 1e-6) for name, value in fitted.values.items()}
-    return prior(fitted.values, spread)
+def _fitted(site: Site, season: Season, report: Report) -> tuple[Posterior, dict[str, float]]:
+    """Fit the physical parameters to one log; returns them and what they leave unexplained."""
+    record, _ = open_record(season.measured, site, from_site(site))
+    fitted = calibrate([(record, None)], prior(nominal(site)), {}, every_hours=8.0, progress=report)
+    deviation = dict(zip(fitted.names, map(float, fitted.standard_deviation), strict=True))
+    return fitted, learn_misfit(record, fitted.values, deviation, site.longitude)
 
 
 def _utc(time: np.datetime64) -> datetime:

@@ -30,6 +30,8 @@ class HybridModel:
     training_span: Span | None = None
     training_range: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     errors: tuple[HeldOutError, ...] = ()
+    known_misfit: Mapping[str, float] = field(default_factory=dict)
+    """What the calibration could not explain on its own log, which is no finding later (`trainer.diagnosis`)."""
 
     @property
     def active_effects(self) -> dict[str, dict[str, float]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from trainer.calibration.posterior import prior
 from trainer.calibration.site_model import fit_site
 from trainer.calibration.split import alternate_weeks, split_weeks
 from trainer.default_bundle import default_bundle_folder
+from trainer.diagnosis.deployed import learn_misfit
 from trainer.export.bundle import read_hybrid_model, write_hybrid_bundle
 from trainer.model import known_range
 from trainer.readers.open_log import open_log
@@ -90,6 +92,9 @@ def run(arguments: argparse.Namespace) -> int:
     span = Span(_utc(record.time[0]), _utc(record.time[-1]))
     known = known_range({**record.measured, **record.inputs, **setpoints})
     corrected = model.corrected(fitted.posterior, ()).trained(span, known, tuple(errors)).controlled(fitted.rules, held)
+    deviation = dict(zip(fitted.posterior.names, map(float, fitted.posterior.standard_deviation), strict=True))
+    misfit = learn_misfit(record, fitted.posterior.values, deviation, site.longitude)
+    corrected = replace(corrected, known_misfit=misfit)
     bundle = write_hybrid_bundle(arguments.out, corrected, created=datetime.now(UTC))
     print(f"wrote {bundle.folder} ({bundle.label})")
     return 0

@@ -41,6 +41,8 @@ from trainer.export.stage_file import stages_from_bytes, stages_to_bytes
 from trainer.model import HybridModel
 
 CROP_FILE = "crop.npz"
+MISFIT_KEY = "known_misfit"
+"""Where the manifest's `simulator` holds what the calibration could not explain."""
 MEMBERS = 3
 """Draws from the posterior that a bundle carries beside the mean, for cautious plans."""
 _UNITS = {"vent_lee": "%", "vent_wind": "%", "rail_pipe_excess": "K", "heat": "MJ m-2", "electricity": "kWh m-2"}
@@ -100,6 +102,7 @@ def write_hybrid_bundle(folder: Path, model: HybridModel, *, created: datetime, 
             "mean_height": model.site.greenhouse.mean_height,
             "lamp_efficacy": lamps.efficacy if lamps else 0.0,
             "leaf_area_index": 3.0,
+            MISFIT_KEY: dict(model.known_misfit),
             "reference_time": reference.astimezone(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
             "parameters": values,
             "members": [
@@ -144,6 +147,7 @@ def read_hybrid_model(bundle: Bundle, site: Site) -> HybridModel:
         training_span=manifest.training_span,
         training_range=manifest.training_range,
         errors=manifest.errors,
+        known_misfit={str(key): float(value) for key, value in manifest.simulator.get(MISFIT_KEY, {}).items()},
     )
 
 
