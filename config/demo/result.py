@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib
+from ideal import ideal_errors  # stands beside this file
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
@@ -47,6 +48,7 @@ def summarise(out: Path, effect: str, days_before: int) -> str:
         "verdict": diagnosis["verdict"],
         "findings": diagnosis["findings"],
         "held_out_errors": diagnosis["errors"],
+        "ideal_errors_24_h": ideal_errors(out, effect),
         "verdict_without_effect": nothing["verdict"],
         "adopted_on_day": since,
         "live_error_24_h": {
@@ -142,12 +144,14 @@ def mean(values: NDArray[np.float64]) -> float:
 
 def table(result: dict[str, Any]) -> str:
     """Return the result as text."""
-    lines = ["held-out error, 24 h free runs   as deployed   recalibrated   with the effect"]
+    ideal = result["ideal_errors_24_h"]
+    lines = ["error on unseen days, 24 h ahead    as deployed   recalibrated    with the    the truth"]
+    lines.append(f"{'':62}cause found     known")
     for name, horizons in result["held_out_errors"].items():
         row = horizons.get("24_h")
         if row:
-            cells = "".join(f"{row[stage]:15.3f}" for stage in ("deployed", "recalibrated", "corrected"))
-            lines.append(f"  {name:24}{cells}   {row['unit']}")
+            cells = "".join(f"{row[stage]:14.3f}" for stage in ("deployed", "recalibrated", "corrected"))
+            lines.append(f"  {name:31}{cells}{ideal.get(name, float('nan')):13.3f}   {row['unit']}")
     lines += ["", "live error of the daemon, 24 h      first bundle   first bundle   bundle in force"]
     lines.append(f"{'':34}before         after it       after adoption")
     for name, row in result["live_error_24_h"].items():

@@ -158,9 +158,10 @@ def run(demo: Demo) -> None:
 
     # In lock step the plant's time stands still while the daemon does: the trainer's minutes cost no plant time.
     daemon.send_signal(signal.SIGSTOP)
+    shutil.copytree(out / "exchange/telemetry/demo", out / "log")
     verdict = demo.run(
         "diagnose",
-        ["igrow-trainer", "diagnose", "exchange/telemetry/demo", "--bundle", "first-bundle", "--site", "site.yaml",
+        ["igrow-trainer", "diagnose", "log", "--bundle", "first-bundle", "--site", "site.yaml",
          "--out", "diagnosis"],
         (NOTHING, NAMED, 11, 12, 13),
     )  # fmt: skip

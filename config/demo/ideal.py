@@ -1,0 +1,37 @@
+"""The yardstick of the demo: the error that remains when the true effect is known, on the same unseen days."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from igrow_core.bundle import read_bundle
+from igrow_core.effects import EFFECTS
+from igrow_core.greenhouse.described import parse_effect
+from igrow_core.simulator.hybrid.measurement import PREDICTED
+from igrow_core.site import load_site
+from trainer.diagnosis import freefit
+from trainer.diagnosis.activation import ActiveTerm, activate
+from trainer.diagnosis.deployed import from_manifest
+from trainer.diagnosis.diagnose import Stage, diagnose
+from trainer.readers.open_log import open_log
+
+
+def ideal_errors(out: Path, effect: str) -> dict[str, float]:
+    """Return the mean absolute error of 24 h free runs by quantity, the parameters refitted beside the true effect."""
+    site = load_site(out / "site.yaml")
+    deployed = from_manifest(read_bundle(out / "first-bundle").manifest)
+    _, evidence = diagnose(open_log(out / "log").telemetry, site, deployed)
+    if evidence is None:
+        return {}
+    truth = parse_effect(effect)
+    size = truth.definition.amplitude.typical if truth.size is None else float(truth.size)
+    shape = {one.name: one.typical for one in EFFECTS[truth.name].shapes}
+    terms = (ActiveTerm(truth.name, size, shape, truth.start),)
+    record, split = evidence.record, evidence.split
+    fitted = freefit.fit(record, evidence.problem.line.runs, split, evidence.knowledge, activate(record, terms))
+    runs = Stage(*fitted, terms).runs(record, split)
+    if runs is None:
+        return {}
+    return {name: float(np.nanmean(np.abs(error))) for name, error in runs.errors.items() if name in PREDICTED}
