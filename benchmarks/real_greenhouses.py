@@ -27,7 +27,7 @@ from trainer.calibration.actuation import setpoint_columns
 from trainer.calibration.evaluation import Errors, errors_of, summarise
 from trainer.calibration.forecast import Predictor, combined, remembering
 from trainer.calibration.posterior import prior
-from trainer.calibration.site_model import SiteModel, fit_site
+from trainer.calibration.site_model import SiteModel, adapt, fit_site, from_few_days
 from trainer.calibration.split import weeks
 from trainer.calibration.totals import coverage, daily_totals
 from trainer.readers import challenge
@@ -204,15 +204,11 @@ def across(houses: Sequence[Greenhouse], every: float) -> dict[str, object]:
             "fitted on others": [errors_of(house.record, model.predictor(house.record), HORIZONS, rows, every=every)]
         }
         first = house.week < 1
-        adapted = fit_site(
-            [(house.record, house.setpoints, first, first)], model.posterior.widened(3.0), {}, actuation=False
-        )
+        adapted = adapt(model, house.record, first)
         found["and first 7 days"] = [
             errors_of(house.record, adapted.predictor(house.record), HORIZONS, later_rows, every=every)
         ]
-        alone = fit_site(
-            [(house.record, house.setpoints, first, first)], prior(nominal(house.site)), {}, actuation=False
-        )
+        alone = from_few_days(house.record, first, prior(nominal(house.site)))
         found["first 7 days alone"] = [
             errors_of(house.record, alone.predictor(house.record), HORIZONS, later_rows, every=every)
         ]

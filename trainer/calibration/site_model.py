@@ -156,6 +156,22 @@ def fit_site(
     return replace(model, combined_growth=_growth([(record, selection, model.combined_predictor(record, parts[0][1]))]))
 
 
+def adapt(model: SiteModel, record: Record, rows: NDArray[np.bool_], widening: float = 1.5) -> SiteModel:
+    """Return a model of other compartments brought to a new one of which there are few days.
+
+    Only the parameters move, under their posterior with standard deviations `widening` times as large; remainder and
+    disturbance are kept, since a week tells nothing about them.
+    """
+    return replace(model, posterior=calibrate([(record, rows)], model.posterior.widened(widening), model.effects))
+
+
+def from_few_days(record: Record, rows: NDArray[np.bool_], knowledge: Posterior) -> SiteModel:
+    """Return a model of a site of which there are few days and nothing else: parameters, and usual disturbances."""
+    posterior = calibrate([(record, rows)], knowledge, {})
+    table = {name: _driver(record, {}, name)[rows] for name in RANGE_DRIVERS}
+    return SiteModel(posterior, {}, None, DisturbanceModel(), {}, {}, {}, {}, {}, training_range(_complete(table)))
+
+
 def _choose_remainder(
     parts: Sequence[tuple[Record, Mapping[str, Floats], NDArray[np.bool_], NDArray[np.bool_]]],
     lacking: Sequence[tuple[Record, NDArray[np.bool_] | None, Mapping[str, Floats]]],
