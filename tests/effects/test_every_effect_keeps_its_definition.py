@@ -9,41 +9,6 @@ from igrow_core.effects import EFFECTS, PROCESS_CHANNELS, Effect
 from igrow_core.quantities import QUANTITIES
 from igrow_core.simulator.hybrid.parameters import PARAMETERS
 
-CATALOGUE = [
-    "wind_infiltration",
-    "screen_gap",
-    "sky_cooling",
-    "cover_condensation",
-    "soil_heat_storage",
-    "lamp_heat",
-    "pipe_lag",
-    "heating_valve_leak",
-    "vent_wind_asymmetry",
-    "stack_ventilation",
-    "vent_backlash",
-    "cover_ageing",
-    "structure_shade",
-    "angle_transmission",
-    "rain_cooling",
-    "night_transpiration",
-    "deficit_stomata_closure",
-    "irrigation_evaporation",
-    "leaf_area_transpiration",
-    "co2_valve_leak",
-    "co2_dose_vent_loss",
-    "photosynthesis_heat_limit",
-    "photosynthesis_decline",
-    "soil_respiration",
-    "air_temperature_offset",
-    "humidity_offset",
-    "co2_offset",
-    "pipe_temperature_offset",
-    "air_temperature_radiation_error",
-    "air_temperature_lag",
-    "humidity_drift",
-    "co2_drift",
-]
-
 # name: (drivers of an hour that shows it, channel, sign of the first contribution at the typical amplitude)
 SIGNS = {
     "wind_infiltration": ("air_exchange", 1),
@@ -79,6 +44,8 @@ SIGNS = {
     "humidity_drift": ("air_humidity", 1),
     "co2_drift": ("air_co2", 1),
 }
+CATALOGUE = list(SIGNS)
+"""In the order of the catalogue."""
 
 HOUR = {
     "outdoor_temperature": 5.0,

@@ -30,11 +30,13 @@ from trainer.diagnosis.split import Split, split_days
 LEAST_DAYS = 7
 SMALLEST_ENR = 0.15
 """A cause that moves a 24 h forecast by less is not worth a name."""
-SMALLEST_SKILL = -0.02
-"""Share of the squared error of plain free runs on unseen days that a cause must remove, mean over quantities: a
-recalibration can hide much of a cause, so that it need not remove more, but it must not add."""
-LARGEST_DOUBT = 0.4
-"""Bootstrap probability over unseen days that a cause does not make their 24 h free runs likelier."""
+SMALLEST_SKILL = -0.05
+"""Share of the squared error of plain free runs on unseen days that a cause must remove, mean over quantities. A
+recalibration can hide much of a cause, so that it need not remove more; but it must not add more than chance does."""
+CLEAR_SKILL = 0.03
+"""A cause that removes so much needs no other proof on unseen days."""
+LARGEST_DOUBT = 0.45
+"""Else the largest bootstrap probability over unseen days that it does not make their 24 h free runs likelier."""
 FURTHER_SKILL, FURTHER_DOUBT, FURTHER_GAIN = 0.005, 0.2, 0.1
 """What a second or third cause must show: skill, doubt, and a share of the gain of those before it. The first, bent
 otherwise than the catalogue has it, leaves traces that look like small others."""
@@ -206,7 +208,7 @@ def _stands(one: Estimated, kept: Sequence[Estimated]) -> bool:
     if one.effect_to_noise < SMALLEST_ENR:
         return False
     if not kept:
-        return one.skill >= SMALLEST_SKILL and one.doubt <= LARGEST_DOUBT
+        return one.skill >= CLEAR_SKILL or (one.skill >= SMALLEST_SKILL and one.doubt <= LARGEST_DOUBT)
     return (
         one.skill >= FURTHER_SKILL
         and one.doubt <= FURTHER_DOUBT
@@ -236,7 +238,7 @@ def _with_remainder(
 
 
 def _verdict(prepared: Problem, judged: Adequacy, kept: Sequence[Estimated]) -> tuple[Verdict, tuple[Finding, ...]]:
-    findings = tuple(wording.finding(one) for one in kept)
+    findings = tuple(wording.finding(one) for one in sorted(kept, key=lambda one: -one.effect_to_noise))
     if judged.remainder is not None:
         return "unexplained", (*findings, wording.remainder(prepared, judged))
     if not findings:

@@ -1,7 +1,7 @@
-"""What a cause without a name may hang on: exogenous drivers only - clock, calendar and weather.
+"""What a cause without a name may hang on: exogenous drivers only - clock, calendar, weather and schedules.
 
-Feedback control reveals disturbances, so that a learner who sees actuators or states finds structure in pure
-noise. Nothing here reads either.
+Feedback control reveals disturbances, so that a learner who sees states or what the PLC controls by them (heat,
+vents, CO2) finds structure in pure noise. Nothing here reads either.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from igrow_core.simulator.hybrid.record import Record
 from trainer.diagnosis.linearisation import Floats, Linearisation, flux_columns
@@ -48,9 +49,10 @@ def patterns(record: Record, longitude: float) -> list[tuple[str, tuple[str, ...
     hour = np.asarray(record.inputs["hour"])
     seconds = record.time.astype("datetime64[s]").astype(np.int64) + int(240.0 * longitude)
     weekday = (seconds // 86_400 + 3) % 7
+    working: Floats = (weekday < 5).astype(np.float64)
     table: list[tuple[str, tuple[str, ...], Floats]] = []
 
-    def window(first: float, last: float) -> NDArray[np.float64]:
+    def window(first: float, last: float) -> Floats:
         inside = (hour >= first) & (hour < last) if first < last else (hour >= first) | (hour < last)
         return inside.astype(np.float64)
 
@@ -58,11 +60,11 @@ def patterns(record: Record, longitude: float) -> list[tuple[str, tuple[str, ...
         text = f"{first:02d} to {last:02d} h"
         table.append((text, ("hour",), window(first, last)))
         if (first, last) in {(5, 9), (7, 16), (11, 14)}:
-            table.append((f"{text} on working days", ("hour", "weekday"), window(first, last) * (weekday < 5)))
-    table.append(("working days", ("weekday",), 1.0 * (weekday < 5)))
+            table.append((f"{text} on working days", ("hour", "weekday"), window(first, last) * working))
+    table.append(("working days", ("weekday",), working))
     for index, name in enumerate(_WEEKDAYS):
         for first, last in ((0, 6), (6, 10), (10, 14), (14, 19), (19, 24)):
-            course = window(first, last) * (weekday == index)
+            course: Floats = window(first, last) * (weekday == index).astype(np.float64)
             table.append((f"{first:02d} to {last:02d} h on {name}s", ("hour", "weekday"), course))
     outdoor = np.asarray(record.inputs["outdoor_temperature"], dtype=np.float64)
     cold: Floats = np.maximum(8.0 - outdoor, 0.0) / 8.0
@@ -81,6 +83,13 @@ def patterns(record: Record, longitude: float) -> list[tuple[str, tuple[str, ...
     if "rain" not in record.unknown:
         fallen = np.cumsum(np.asarray(record.inputs["rain"])) * record.step / 72_000.0
         table.append(("until rain has fallen", ("rain",), np.exp(-fallen)))
+    # Lamps and irrigation follow the clock and the light, not the climate that they are to be blamed for.
+    for name, scale in (("lamp_power", 80.0), ("irrigation", 1.0)):
+        if name not in record.unknown and np.any(record.inputs[name]):
+            table.append((f"{name.replace('_', ' ')} on", (name,), np.asarray(record.inputs[name]) / scale))
+            keep = np.exp(-record.step / 3600.0)
+            late = lfilter([1.0 - keep], [1.0, -keep], np.asarray(record.inputs[name]) / scale)
+            table.append((f"an hour after {name.replace('_', ' ')}", (name,), late))
     days = np.arange(len(record)) * record.step / 86_400.0
     table.append(("from day to day", ("time",), days / 30.0))
     table.append(("all the time", (), np.ones(len(record))))

@@ -111,7 +111,7 @@ def fit_whitening(errors: Floats, counted: NDArray[np.bool_], filters: tuple[Noi
         distance = np.sum((scaled @ chosen) ** 2, axis=0)
         weight = (FREEDOM + size) / (FREEDOM + distance)
         covariance = (chosen * weight) @ chosen.T / chosen.shape[1]
-    root: Floats = np.linalg.inv(np.linalg.cholesky(covariance))
+    root: Floats = np.linalg.inv(np.linalg.cholesky(covariance)).astype(np.float64)
     return extend(Whitening(filters, root, np.zeros(errors.shape[1:])), errors, counted)
 
 

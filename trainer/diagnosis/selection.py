@@ -17,11 +17,11 @@ from trainer.diagnosis.search import Fit, Model
 
 MOST_TERMS = 3
 BEAM = 3
-SMALLEST_GAIN = 8.0
+SMALLEST_GAIN = 7.5
 """Log-likelihood that a term must add on the fit days."""
 LARGEST_P_VALUE = 0.005
 """Of the day-block max-T test, the price of searching paid."""
-ONSET_PRICE = 6.0
+ONSET_PRICE = 9.0
 """Log-likelihood that a beginning within the log must add over an effect that was always there."""
 FIRST_ONSET_DAYS = 3
 """No beginning is looked for within so many days of either end."""
