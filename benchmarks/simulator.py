@@ -55,7 +55,7 @@ def numpy_rate() -> float:
     course = weather()
     spread = np.ones(CANDIDATES)
     shown = {"air_temperature": 20.0 * spread, "air_humidity": 75.0 * spread, "air_co2": 600.0 * spread}
-    inputs = {name: 0.0 * spread for name in climate.INPUTS} | {"mean_height": 5.0, "leaf_area_index": 3.0 * spread}
+    inputs = dict.fromkeys(climate.INPUTS, 0.0 * spread) | {"mean_height": 5.0, "leaf_area_index": 3.0 * spread}
     for column, name in enumerate(climate.INPUTS[:6]):
         inputs[name] = course[12, column] * spread
     state = climate.initial_state(np, shown, inputs, values, {}, 1.24)

@@ -20,6 +20,7 @@ from igrow_core.greenhouse import Season, generate_weather, recipe, simulate_man
 from igrow_core.greenhouse.described import parameters_of
 from igrow_core.quantities import SETPOINTS
 from igrow_core.simulator import holding
+from igrow_core.simulator.crop import CropStages
 from igrow_core.simulator.hybrid.nominal import nominal, site_record
 from igrow_core.site import Site
 from igrow_core.telemetry import Telemetry
@@ -30,7 +31,7 @@ from trainer.calibration.posterior import Posterior, prior
 from trainer.diagnosis.deployed import from_site, learn_misfit
 from trainer.diagnosis.runner import open_record
 from trainer.model import HybridModel, known_range
-from trainer.training.crop import train_crop
+from trainer.training.crop import fit_net_growth, train_networks
 
 START = np.datetime64("2020-01-20T00:00:00")
 CREATED = datetime(2020, 6, 1, tzinfo=UTC)
@@ -106,7 +107,12 @@ def default_model(site: Site, *, seed: int = 0, report: Report = print) -> Hybri
     seasons = virtual_seasons(site, HOUSES, DAYS, seed)
     posterior, misfit = _fitted(site, seasons[0], report)
     rules, held = _fitted_control(site, seasons, posterior.values)
-    crop = train_crop([season.true for season in seasons], seed=seed, report=report)
+    growth, harvest = train_networks([season.true for season in seasons], seed=seed, report=report)
+    records = [site_record(season.true, site, 300.0) for season in seasons]
+    conversion, maintenance = fit_net_growth(records, posterior.values, [season.true for season in seasons])
+    report(
+        f"growth: {conversion:.3f} kg of dry matter per kg of CO2, {24e3 * maintenance:.2f} g m-2 a day for maintenance"
+    )
     tables = [season.measured for season in seasons]
     end = START + np.timedelta64(DAYS, "D")
     return HybridModel(
@@ -114,7 +120,7 @@ def default_model(site: Site, *, seed: int = 0, report: Report = print) -> Hybri
         posterior=posterior,
         actuation=rules,
         holding=held,
-        crop=crop,
+        crop=CropStages(growth, harvest, conversion, maintenance),
         training_span=Span(_utc(START), _utc(end)),
         training_range=known_range({name: concatenate_column(tables, name) for name in _RANGED}),
         known_misfit=misfit,

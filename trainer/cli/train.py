@@ -9,11 +9,13 @@ from pathlib import Path
 
 from igrow_core.bundle import read_bundle
 from igrow_core.errors import IgrowError
+from igrow_core.simulator.crop import CropStages
+from igrow_core.simulator.hybrid.nominal import site_record
 from igrow_core.site import load_site
 from trainer.default_bundle import default_bundle_folder
 from trainer.export.bundle import read_hybrid_model, write_hybrid_bundle
 from trainer.readers.open_log import open_log
-from trainer.training.crop import train_crop
+from trainer.training.crop import fit_net_growth, train_networks
 
 EXAMPLE = "igrow-trainer train out/virtual/*.csv.gz --site config/site.yaml --out out/trained"
 
@@ -34,7 +36,10 @@ def run(arguments: argparse.Namespace) -> int:
     site = load_site(arguments.site)
     model = read_hybrid_model(read_bundle(arguments.bundle or default_bundle_folder()), site)
     seasons = [open_log(path).telemetry for path in arguments.seasons]
-    crop = train_crop(seasons, seed=arguments.seed, report=lambda line: print(line, flush=True))
+    growth, harvest = train_networks(seasons, seed=arguments.seed, report=lambda line: print(line, flush=True))
+    records = [site_record(season, site, max(300.0, season.step)) for season in seasons]
+    conversion, maintenance = fit_net_growth(records, model.posterior.values, seasons)
+    crop = CropStages(growth, harvest, conversion, maintenance)
     bundle = write_hybrid_bundle(arguments.out, replace(model, crop=crop), created=datetime.now(UTC))
     print(f"wrote {bundle.folder} ({bundle.label})")
     return 0

@@ -17,7 +17,7 @@ from onnx import GraphProto, ModelProto, helper
 from igrow_core import air
 from igrow_core.quantities import GROWTH, SETPOINTS, WEATHER, YIELD
 from igrow_core.simulator import actuation, holding, network
-from igrow_core.simulator.crop import GROWTH_DRIVERS, HARVEST_DRIVERS, CropStages
+from igrow_core.simulator.crop import GROWTH_DRIVERS, HARVEST_DRIVERS, CropStages, net_growth_rate
 from igrow_core.simulator.hybrid import climate
 from igrow_core.simulator.hybrid.measurement import PREDICTED
 from igrow_core.simulator.hybrid.parameters import PARAMETERS
@@ -55,13 +55,22 @@ class PlanBlocks:
     equipment: Block
     control: Block
     growth: Block
+    net_growth: Block
     harvest: Block
     range: Block
 
     @property
     def blocks(self) -> list[Block]:
         """Every block, for the model's list of functions."""
-        return [*self.climate.blocks, self.equipment, self.control, self.growth, self.harvest, self.range]
+        return [
+            *self.climate.blocks,
+            self.equipment,
+            self.control,
+            self.growth,
+            self.net_growth,
+            self.harvest,
+            self.range,
+        ]
 
 
 def plan_blocks(stage: ClimateBlocks, crop: CropStages, known: Mapping[str, tuple[float, float]]) -> PlanBlocks:
@@ -109,6 +118,7 @@ def plan_blocks(stage: ClimateBlocks, crop: CropStages, known: Mapping[str, tupl
             ],
         ),
         growth=_crop_block("growth", crop.growth, GROWTH_DRIVERS),
+        net_growth=trace("net_growth", _net_growth_formula(crop), ["net_growth", "assimilation", "air_temperature"]),
         harvest=_crop_block("harvest", crop.harvest, HARVEST_DRIVERS),
         range=trace("training_range", _range_formula(known), [*RANGED]),
     )
@@ -189,7 +199,7 @@ def _hour_graph(blocks: PlanBlocks, parameters: Mapping[str, str]) -> GraphProto
     state = {name: carried[name] for name in blocks.climate.states}
     equipment = {name: carried[name] for name in EQUIPMENT}
     used: dict[str, list[str]] = {name: [] for name in RESOURCES}
-    means: dict[str, list[str]] = {name: [] for name in GROWTH_DRIVERS}
+    means: dict[str, list[str]] = {name: [] for name in (*GROWTH_DRIVERS, "assimilation")}
     for _ in range(STEPS_PER_HOUR):
         inputs = base | {name: equipment[name] for name in CARRIED}
         before = wire_derived(wiring, blocks.climate, state, inputs, parameters)
@@ -226,8 +236,8 @@ def _hour_graph(blocks: PlanBlocks, parameters: Mapping[str, str]) -> GraphProto
         used["heat"].append(step["heat"])
         used["co2"].append(step["co2"])
         used["electricity"].append(set_["lamp_power"])
-        for name in GROWTH_DRIVERS:
-            means[name].append(drivers[name])
+        for name, parts in means.items():
+            parts.append(drivers[name])
 
     end = wire_derived(wiring, blocks.climate, state, base | {name: equipment[name] for name in CARRIED}, parameters)
     shown = wire_measured(wiring, blocks.climate, end, state, parameters, "hour_day")
@@ -238,7 +248,9 @@ def _hour_graph(blocks: PlanBlocks, parameters: Mapping[str, str]) -> GraphProto
         wiring.add("Mul", [wiring.total(used[name]), wiring.constant("unit", [per_hour[name] / STEPS_PER_HOUR])])[0]
         for name in RESOURCES
     ]
-    growth = wiring.call(blocks.growth, _tagged("driver", mean) | _tagged("state", growth))
+    balance = {name: mean[name] for name in ("assimilation", "air_temperature")}
+    grown = wiring.call(blocks.net_growth, balance | {"net_growth": growth["net_growth"]})
+    growth = wiring.call(blocks.growth, _tagged("driver", mean) | _tagged("state", growth)) | grown
     outside = wiring.call(blocks.range, {name: {**shown, **weather}[name] for name in RANGED})["outside"]
     like = state["air_temperature"]
     following = state | growth | equipment
@@ -372,6 +384,14 @@ def _crop_block(name: str, stage: network.Stage, drivers: Sequence[str]) -> Bloc
         return {one: following[..., column] for column, one in enumerate(stage.states)}
 
     return trace(name, formula, [f"driver:{one}" for one in drivers] + [f"state:{one}" for one in stage.states])
+
+
+def _net_growth_formula(crop: CropStages) -> Any:
+    def formula(xp: Any, arrays: Mapping[str, Any]) -> Mapping[str, Any]:
+        rate = net_growth_rate(xp, arrays["assimilation"], arrays["air_temperature"], crop.conversion, crop.maintenance)
+        return {"net_growth": arrays["net_growth"] + rate}
+
+    return formula
 
 
 def _clipped(xp: Any, values: Any, middle: Any, width: Any) -> Any:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import nnls
 
 from igrow_core.errors import IgrowError
 from igrow_core.quantities import GROWTH, QUANTITIES, YIELD
-from igrow_core.simulator.crop import GROWTH_DRIVERS, HARVEST_DRIVERS, CropStages
+from igrow_core.simulator.crop import GROWTH_DRIVERS, HARVEST_DRIVERS
+from igrow_core.simulator.hybrid import climate
+from igrow_core.simulator.hybrid.record import Record, observe
+from igrow_core.simulator.network import Stage
 from igrow_core.telemetry import Telemetry, to_grid
 from trainer.training.stage import StageData, StageLayout, TrainingPlan, train_stage, untrained
 
@@ -20,10 +24,10 @@ HARVEST_PLAN = TrainingPlan(updates=((4, 500), (14, 400)), batch=64, learning_ra
 _HIDDEN = (32, 32)
 
 
-def train_crop(
+def train_networks(
     seasons: Sequence[Telemetry], *, seed: int = 0, report: Callable[[str], None] | None = None
-) -> CropStages:
-    """Train both stages on seasons of equal length that start at one time.
+) -> tuple[Stage, Stage]:
+    """Train the networks of growth and harvest on seasons of equal length that start at one time.
 
     Args:
         seasons: logs with climate, growth and yield (of the mechanistic greenhouse, say).
@@ -57,10 +61,40 @@ def train_crop(
     )
     first = untrained(_layout("growth", GROWTH, GROWTH_DRIVERS, (False, False, True)), growth, seed)
     second = untrained(_layout("harvest", YIELD, HARVEST_DRIVERS, (True,)), harvest, seed)
-    return CropStages(
-        growth=train_stage(first, growth, GROWTH_PLAN, report),
-        harvest=train_stage(second, harvest, HARVEST_PLAN, report),
-    )
+    return train_stage(first, growth, GROWTH_PLAN, report), train_stage(second, harvest, HARVEST_PLAN, report)
+
+
+def fit_net_growth(
+    records: Sequence[Record], parameters: Mapping[str, float], seasons: Sequence[Telemetry]
+) -> tuple[float, float]:
+    """Return conversion and maintenance of `CropStages`, by least squares on the growth of whole days.
+
+    Args:
+        records: of the seasons.
+        parameters: of the climate stage, whose canopy assimilates.
+        seasons: on the records' grids, with net_growth.
+    """
+    rows, grown = [], []
+    for record, season in zip(records, seasons, strict=True):
+        states = observe(record, parameters, {})
+        drivers = climate.derive(np, states, record.inputs, parameters, record.lamp_efficacy)
+        day = round(86_400.0 / record.step)
+        days = len(record) // day
+        hours = record.step / 3600.0
+
+        def total(values: Values, day: int = day, days: int = days, hours: float = hours) -> Values:
+            summed: Values = values[: day * days].reshape(days, day).sum(axis=1) * hours
+            return summed
+
+        cumulative = to_grid(season, int(record.step))["net_growth"]
+        end = np.minimum(day * np.arange(1, days + 1), len(cumulative) - 1)
+        grown.append(cumulative[end] - cumulative[day * np.arange(days)])
+        respired = np.exp(0.0693147 * (states["air_temperature"] - 20.0))
+        rows.append(np.stack([total(3600.0 * drivers["assimilation"]), -total(respired)], axis=1))
+    table, target = np.concatenate(rows), np.concatenate(grown)
+    fine = np.isfinite(table).all(axis=1) & np.isfinite(target)
+    conversion, maintenance = nnls(table[fine], target[fine])[0]
+    return float(conversion), float(maintenance)
 
 
 def _layout(name: str, states: tuple[str, ...], drivers: tuple[str, ...], cumulative: tuple[bool, ...]) -> StageLayout:
