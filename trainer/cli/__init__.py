@@ -20,6 +20,7 @@ COMMANDS = {
     "diagnose": ("trainer.diagnosis.command", "find what the simulator lacks, and why; write the corrected bundle"),
     "recalibrate": ("trainer.diagnosis.loop", "diagnose every site of an exchange and publish what passed"),
     "export": ("trainer.cli.export", "write a bundle from a fitted simulator"),
+    "policy": ("trainer.policies.train", "train a policy by soft actor-critic"),
     "publish": ("trainer.cli.publish", "sign a bundle and put it into the exchange"),
     "reproduce": ("trainer.reproduce.command", "reproduce the tables and figures of the iGrow paper"),
     "evaluate": ("trainer.reproduce.evaluate", "run a bundle on logged or virtual seasons and print its errors"),
