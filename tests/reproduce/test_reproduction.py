@@ -80,12 +80,12 @@ def test_a_short_training_writes_a_bundle_that_evaluates_to_the_same_scores(data
     table = pd.read_parquet(data_folder / "wur2020" / "trajectories.parquet")
     table[table.trajectory.isin(sorted(table.trajectory.unique())[:5])].to_parquet(few)
     result = table1.run(few, tmp_path / "out", layouts=quick, report=lambda _: None)
-    assert set(result.test) == set(SCORED)
-    assert all(np.isfinite(value.mean) for value in result.test.values())
+    assert set(result.scores) == set(SCORED)
+    assert all(np.isfinite(value.mean) for value in result.scores.values())
     again = evaluate.evaluate(tmp_path / "out", few, tmp_path / "scores.json", report=lambda _: None)
     names = sorted(table.trajectory.unique())[:5]
-    row = names.index(result.seasons["test"][0])
-    assert again["air_temperature"].seasons[row] == pytest.approx(result.test["air_temperature"].seasons[0], abs=1e-6)
+    row = names.index(result.held_out[0])
+    assert again["air_temperature"].seasons[row] == pytest.approx(result.scores["air_temperature"].seasons[0], abs=1e-6)
 
 
 def crop(name: str, yield_per_mol: float, days: int = 120) -> Compartment:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from igrow_core.simulator.network import advance, initial_memory
 from igrow_core.simulator.network_run import day_ends, free_run
 from trainer.training.checkpoint import CheckpointError, load_simulator, save_simulator
+from trainer.training.ensemble import merge
 from trainer.training.simulator import CLIMATE, GROWTH, HARVEST, Layouts, train_simulator
 from trainer.training.stage import StageData, StageLayout, TrainingPlan, run_stage, run_windows, train_stage, untrained
 
@@ -170,3 +171,21 @@ def test_a_damaged_file_of_weights_is_refused_in_one_line(tmp_path: Path, conten
 
 def test_the_last_day_of_a_run_may_be_short() -> None:
     assert day_ends(50).tolist() == [23, 47, 49]
+
+
+def test_merged_networks_give_the_mean_of_their_increments(trained) -> None:
+    simulator, held_out, hour = trained
+    one = simulator.climate
+    two = replace(one, matrices=tuple(matrix * 0.9 for matrix in one.matrices))
+    state = np.stack([held_out[name][:, 5] for name in one.states], axis=-1).astype(np.float32)
+    drivers = np.stack([held_out[name][:, 6] for name in one.drivers], axis=-1).astype(np.float32)
+    memory, now = initial_memory(np, one, drivers), np.full((len(state), 1), hour[6], dtype=np.float32)
+    alone = [advance(np, stage, state, drivers, memory, now)[0] for stage in (one, two)]
+    together = advance(np, merge([one, two]), state, drivers, memory, now)[0]
+    np.testing.assert_allclose(together, np.mean(alone, axis=0), rtol=1e-4)
+
+
+def test_networks_of_different_scales_are_not_merged(trained) -> None:
+    climate = trained[0].climate
+    with pytest.raises(ValueError, match="differ in more than their weights"):
+        merge([climate, replace(climate, state_scale=2 * climate.state_scale)])

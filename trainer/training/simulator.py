@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import multiprocessing
 from collections.abc import Mapping
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from igrow_core.quantities import QUANTITIES
 from igrow_core.simulator.network import HOURS, LightFormula, NetworkSimulator, Stage
 from igrow_core.simulator.network_run import daily_drivers, day_ends
+from trainer.training.ensemble import merge
 from trainer.training.stage import Report, StageData, StageLayout, TrainingPlan, train_stage, untrained
 
 Values = NDArray[np.float64]
@@ -71,6 +75,8 @@ class Layouts:
     climate_plan: TrainingPlan = CLIMATE_PLAN
     growth_plan: TrainingPlan = GROWTH_PLAN
     harvest_plan: TrainingPlan = HARVEST_PLAN
+    members: int = 1
+    """Networks per stage, merged into one; see `trainer.training.ensemble`."""
 
 
 def with_setting_drivers(layouts: Layouts, *names: str) -> Layouts:
@@ -133,6 +139,7 @@ def train_simulator(
     layouts: Layouts | None = None,
     seed: int = 0,
     report: Report | None = None,
+    workers: int = 1,
 ) -> NetworkSimulator:
     """Train the three stages on seasons of equal length.
 
@@ -144,19 +151,41 @@ def train_simulator(
         (hours,) hour of the day.
     valid
         (hours,) or (runs, hours); the others are not learned from.
+    workers
+        Processes that train members side by side; the result does not depend on it.
     """
     chosen = layouts or Layouts()
     light = fit_light(columns)
     # Growth learns from the light that it will be given in a free run.
     formula = light.par(np, columns["global_radiation"], columns["lamp_on"])
     full = derived({**columns, "par": formula})
-
-    def trained(stage: StageLayout, data: StageData, plan: TrainingPlan) -> Stage:
-        return train_stage(untrained(stage, data, seed), data, replace(plan, seed=seed), report)
-
-    return NetworkSimulator(
-        climate=trained(chosen.climate, hourly_data(chosen.climate, full, hour, valid), chosen.climate_plan),
-        growth=trained(chosen.growth, hourly_data(chosen.growth, full, hour, valid), chosen.growth_plan),
-        harvest=trained(chosen.harvest, daily_data(chosen.harvest, full), chosen.harvest_plan),
-        light=light,
+    stages = (
+        (chosen.climate, hourly_data(chosen.climate, full, hour, valid), chosen.climate_plan),
+        (chosen.growth, hourly_data(chosen.growth, full, hour, valid), chosen.growth_plan),
+        (chosen.harvest, daily_data(chosen.harvest, full), chosen.harvest_plan),
     )
+    tasks = [
+        (untrained(stage, data, seed + member), data, replace(plan, seed=seed + member))
+        for stage, data, plan in stages
+        for member in range(chosen.members)
+    ]
+    if workers > 1:
+        with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
+            done = [pool.submit(_train_alone, *task) for task in tasks]
+            trained = []
+            for future in done:
+                trained.append(future.result())
+                if report is not None:
+                    report(f"{len(trained)} of {len(tasks)} networks trained")
+    else:
+        trained = [train_stage(*task, report) for task in tasks]
+    climate, growth, harvest = (
+        merge(trained[first : first + chosen.members]) for first in range(0, len(tasks), chosen.members)
+    )
+    return NetworkSimulator(climate, growth, harvest, light)
+
+
+def _train_alone(stage: Stage, data: StageData, plan: TrainingPlan) -> Stage:
+    """Train in a process that shares its machine with others."""
+    torch.set_num_threads(1)
+    return train_stage(stage, data, plan)
