@@ -17,7 +17,7 @@ from trainer.diagnosis.problem import Problem
 from trainer.diagnosis.search import Fit
 from trainer.diagnosis.selection import Hypothesis, Selected
 
-SMALLEST_GAIN = 15.0
+SMALLEST_GAIN = 13.0
 """Log-likelihood below which a pattern is no cause: a wrong structure makes as much."""
 LARGEST_P_VALUE = 0.005
 BETTER = 1.6
@@ -57,8 +57,14 @@ def judge(problem: Problem, chain: Sequence[Selected], rng: np.random.Generator)
 
 def _best(problem: Problem, fit: Fit, rng: np.random.Generator) -> Hypothesis | None:
     scored = selection.score_patterns(problem, fit, selection.onset_days(problem)[::4], rng)
-    significant = [one for one in scored if one.p_value <= LARGEST_P_VALUE]
+    significant = [one for one in scored if one.p_value <= LARGEST_P_VALUE and one.gain >= _needed(one)]
     return significant[0] if significant else None
+
+
+def _needed(one: Hypothesis) -> float:
+    """Return the gain below which a pattern is not believed: one that is always there is what a wrong model looks like."""
+    steady = isinstance(one.cause, Pattern) and not set(one.cause.drivers) - {"time"}
+    return 2.0 * SMALLEST_GAIN if steady else 0.0
 
 
 def _patterns(problem: Problem, fit: Fit, rng: np.random.Generator) -> tuple[Hypothesis, ...]:

@@ -13,12 +13,12 @@ from igrow_core.simulator.hybrid.climate import ActiveEffects
 from igrow_core.simulator.hybrid.record import Record
 from igrow_core.site import Site
 from igrow_core.telemetry import Telemetry
-from trainer.diagnosis import freefit, freerun, problem, runner, screening, selection, structure, usual, wording
+from trainer.diagnosis import freefit, freerun, problem, refine, runner, screening, selection, structure, usual, wording
 from trainer.diagnosis.activation import ActiveTerm, activate
 from trainer.diagnosis.adequacy import Adequacy, judge
 from trainer.diagnosis.deployed import Deployed
 from trainer.diagnosis.drivers import Pattern, pattern_fluxes
-from trainer.diagnosis.estimate import Estimated, estimate
+from trainer.diagnosis.estimate import Estimated, estimate, with_refined
 from trainer.diagnosis.freerun import Runs
 from trainer.diagnosis.linearisation import Floats
 from trainer.diagnosis.prior import Prior
@@ -132,7 +132,7 @@ def diagnose(
     null = structure.null_model(prepared)
     chain = selection.forward(prepared, null, rng)
     judged = judge(prepared, chain, rng)
-    estimated = estimate(prepared, judged.selected, rng)
+    estimated = _refined(prepared, judged, estimate(prepared, judged.selected, rng), deployed)
 
     stages, kept, weighed = _correct(record, split, site, deployed, prepared, judged, estimated, active)
     errors = _errors(record, split, stages)
@@ -156,6 +156,15 @@ def diagnose(
     return diagnosis, Evidence(
         record, split, prepared, tuple(chain), tuple(weighed), shown, model, deployed.free_run_prior
     )
+
+
+def _refined(prepared: Problem, judged: Adequacy, estimated: list[Estimated], deployed: Deployed) -> list[Estimated]:
+    """Return the terms at their refitted sizes and shapes; a size that turns round drops its term."""
+    if not estimated:
+        return []
+    found = refine.refine(prepared, judged.selected.fit, [one.term for one in estimated], deployed.effects)
+    better = [with_refined(one, two) for one, two in zip(estimated, found, strict=True)]
+    return [one for one in better if one.term.amplitude != 0.0]
 
 
 def _correct(

@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from igrow_core.simulator.hybrid.record import Record
@@ -75,7 +74,8 @@ def patterns(record: Record, longitude: float) -> list[tuple[str, tuple[str, ...
         table.append((text, ("outdoor_temperature", "hour"), cold * window(first, last)))
     for name, scale in (("wind_speed", 5.0), ("global_radiation", 300.0), ("rain", 1.0)):
         if name not in record.unknown:
-            table.append((name.replace("_", " "), (name,), np.asarray(record.inputs[name]) / scale))
+            weather: Floats = np.asarray(record.inputs[name], dtype=np.float64) / scale
+            table.append((name.replace("_", " "), (name,), weather))
     if "outdoor_humidity" not in record.unknown:
         table.append(
             ("dry weather", ("outdoor_humidity",), (80.0 - np.asarray(record.inputs["outdoor_humidity"])) / 20.0)
@@ -86,9 +86,10 @@ def patterns(record: Record, longitude: float) -> list[tuple[str, tuple[str, ...
     # Lamps and irrigation follow the clock and the light, not the climate that they are to be blamed for.
     for name, scale in (("lamp_power", 80.0), ("irrigation", 1.0)):
         if name not in record.unknown and np.any(record.inputs[name]):
-            table.append((f"{name.replace('_', ' ')} on", (name,), np.asarray(record.inputs[name]) / scale))
-            keep = np.exp(-record.step / 3600.0)
-            late = lfilter([1.0 - keep], [1.0, -keep], np.asarray(record.inputs[name]) / scale)
+            running: Floats = np.asarray(record.inputs[name], dtype=np.float64) / scale
+            table.append((f"{name.replace('_', ' ')} on", (name,), running))
+            keep = float(np.exp(-record.step / 3600.0))
+            late: Floats = lfilter([1.0 - keep], [1.0, -keep], running)
             table.append((f"an hour after {name.replace('_', ' ')}", (name,), late))
     days = np.arange(len(record)) * record.step / 86_400.0
     table.append(("from day to day", ("time",), days / 30.0))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,14 +12,17 @@ from trainer.diagnosis.activation import ActiveTerm
 from trainer.diagnosis.candidates import Candidate
 from trainer.diagnosis.gram import Term
 from trainer.diagnosis.problem import Problem
+from trainer.diagnosis.refine import Refined
 from trainer.diagnosis.result import Interval, OnsetInterval
 from trainer.diagnosis.search import Fit, Model
 from trainer.diagnosis.selection import Hypothesis, Selected
 
 NORMAL_90 = 1.645
 INFLATION = 1.3
-"""Of the standard deviation of an amplitude, for the shape and structure that no covariance knows (fitted on the
-tuning cases)."""
+"""Of the standard deviation of an amplitude, for the structure that no covariance knows (fitted on tuning cases)."""
+FORM_DOUBT = 0.25
+"""Relative standard deviation of an amplitude beside it: the truth is not quite of the catalogue's form, nor is the
+simulator's response quite the greenhouse's (fitted on tuning cases)."""
 RIVAL_GAIN = 4.0
 """Log-likelihood within which a rival fits as well."""
 RIVAL_SHARE = 0.15
@@ -37,6 +40,7 @@ class Estimated:
     """Log-likelihood that the term adds to the final model."""
     onset: OnsetInterval | None
     rivals: tuple[str, ...]
+    shapes: dict[str, Interval] = field(default_factory=dict)
     regimes: dict[str, Interval] = field(default_factory=dict)
     effect_to_noise: float = 0.0
     skill: float = 0.0
@@ -94,6 +98,21 @@ def _estimate(problem: Problem, selected: Selected, rng: np.random.Generator) ->
             )
         )
     return sorted(found, key=lambda one: -one.gain)
+
+
+def with_refined(one: Estimated, refined: Refined) -> Estimated:
+    """Return the term with refitted values and their intervals."""
+    definition = EFFECTS[one.effect]
+    reach = NORMAL_90 * INFLATION
+    amplitude = refined.term.amplitude
+    shapes = {}
+    for shape in definition.shapes:
+        value = refined.term.shape[shape.name]
+        wide = reach * refined.shape_deviation[shape.name]
+        shapes[shape.name] = Interval(value, max(value - wide, shape.low), min(value + wide, shape.high), shape.unit)
+    wide = NORMAL_90 * float(np.hypot(INFLATION * refined.deviation, FORM_DOUBT * amplitude))
+    interval = Interval(amplitude, amplitude - wide, amplitude + wide, definition.amplitude.unit)
+    return replace(one, term=refined.term, amplitude=interval, shapes=shapes)
 
 
 def rivals(

@@ -49,6 +49,8 @@ class Problem:
     """The column of the misfit that the calibration knew already (empty where it is not known)."""
     usual: range
     """Columns of how greenhouses and weathers usually differ."""
+    expected: Floats
+    """The known and the usual misfits as errors, not whitened, (known + usual, 3, r, steps)."""
 
 
 def counted_rows(line: Linearisation, balances: tuple[int, ...]) -> NDArray[np.bool_]:
@@ -170,17 +172,25 @@ def prepare(
     edges = np.cumsum([0] + [len(part) for part in parts])
     white = np.concatenate([whitening(part[:, chosen] * observed) for part in parts])
     products = gram.daily_products(white, runs.day, split.days)
+    spans = [range(int(edges[k]), int(edges[k + 1])) for k in range(1, len(parts))]
+    parameter, candidate, ageing, patterned, first_known, usually = spans
     return Problem(
-        line,
-        split,
-        prior,
-        whitening,
-        balances,
-        found.candidates,
-        names,
-        found.untestable,
-        DailyGrams(products, split.fit),
-        *(range(int(edges[k]), int(edges[k + 1])) for k in range(1, 7)),
+        line=line,
+        split=split,
+        prior=prior,
+        whitening=whitening,
+        balances=balances,
+        candidates=found.candidates,
+        patterns=names,
+        untestable=found.untestable,
+        grams=DailyGrams(products, split.fit),
+        parameter=parameter,
+        candidate=candidate,
+        ageing=ageing,
+        pattern=patterned,
+        known=first_known,
+        usual=usually,
+        expected=expected,
     )
 
 

@@ -18,9 +18,9 @@ from trainer.diagnosis.prior import Prior
 from trainer.diagnosis.problem import Problem, candidate_key, parameter_shift, pattern_key
 from trainer.diagnosis.search import Model
 
-RIDGE = 2.0
+RIDGE = 0.7
 """Prior deviation of each effect's amplitude, in typical amplitudes."""
-PATTERN_RIDGE = 0.5
+PATTERN_RIDGE = 0.15
 """The same for a pattern, in its units."""
 SPREAD = 0.3
 """How much of it may differ from one log to the next (relative deviation)."""

@@ -22,7 +22,7 @@ from trainer.diagnosis.drivers import Pattern
 from trainer.diagnosis.problem import Problem, candidate_key, pattern_key
 
 FILE = "usual_misfit.json"
-DIRECTIONS = 14
+DIRECTIONS = 24
 
 
 def directions(problems: Sequence[Problem], count: int = DIRECTIONS) -> list[dict[str, float]]:
@@ -44,7 +44,7 @@ def directions(problems: Sequence[Problem], count: int = DIRECTIONS) -> list[dic
     table = np.array([[one.get(key, 0.0) for key in keys] for one in lists]) * scale
     _, sizes, axes = np.linalg.svd(table / np.sqrt(len(table)), full_matrices=False)
     return [
-        {key: float(f"{value:.4g}") for key, value in zip(keys, size * axis / scale, strict=True) if abs(value) > 0.0}
+        {key: float(f"{value:.3g}") for key, value in zip(keys, size * axis / scale, strict=True) if value != 0.0}
         for size, axis in zip(sizes[:count], axes[:count], strict=True)
     ]
 

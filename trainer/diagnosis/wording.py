@@ -22,11 +22,7 @@ NAMES = {
 def finding(one: Estimated) -> Finding:
     """Return the finding of an estimated term."""
     effect = EFFECTS[one.effect]
-    parameters = {effect.amplitude.name: one.amplitude}
-    for shape in effect.shapes:
-        value = one.term.shape.get(shape.name, shape.typical)
-        tried = [float(shape.low), float(shape.high)]
-        parameters[shape.name] = Interval(value, min(tried), max(tried), shape.unit)
+    parameters = {effect.amplitude.name: one.amplitude, **one.shapes}
     return Finding(
         one.effect,
         effect.kind,
