@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from onnx import ModelProto
 
 from igrow_core.bundle import (
     Bundle,
@@ -84,7 +85,7 @@ def write_hybrid_bundle(folder: Path, model: HybridModel, *, created: datetime, 
         igrow_version=version("igrow"),
         variant="hybrid",
         opset=OPSET,
-        graphs=_signatures(planning),
+        graphs=_signatures(planning) | {"optimizer": _plain_signature(graphs["optimizer"])},
         training_span=model.training_span,
         effects=model.effects,
         parameters={
@@ -218,6 +219,13 @@ def _signatures(blocks: plan.PlanBlocks) -> dict[str, GraphSignature]:
             tuple(tensor(name, axes, traced[name]) for name, axes in hindcast.OUTPUTS.items()),
         ),
     }
+
+
+def _plain_signature(model: ModelProto) -> GraphSignature:
+    """Return the names of a graph's inputs and outputs, whose entries are no quantities."""
+    return GraphSignature(
+        tuple(Tensor(one.name) for one in model.graph.input), tuple(Tensor(one.name) for one in model.graph.output)
+    )
 
 
 def _unit(name: str) -> str:
