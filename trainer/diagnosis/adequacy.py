@@ -62,7 +62,7 @@ def _best(problem: Problem, fit: Fit, rng: np.random.Generator) -> Hypothesis | 
 
 
 def _needed(one: Hypothesis) -> float:
-    """Return the gain below which a pattern is not believed: one that is always there is what a wrong model looks like."""
+    """Return the gain below which a pattern is not believed: a wrong model looks like one that is always there."""
     steady = isinstance(one.cause, Pattern) and not set(one.cause.drivers) - {"time"}
     return 2.0 * SMALLEST_GAIN if steady else 0.0
 

@@ -92,7 +92,8 @@ def patterns(record: Record, longitude: float) -> list[tuple[str, tuple[str, ...
             late: Floats = lfilter([1.0 - keep], [1.0, -keep], running)
             table.append((f"an hour after {name.replace('_', ' ')}", (name,), late))
     days = np.arange(len(record)) * record.step / 86_400.0
-    table.append(("from day to day", ("time",), days / 30.0))
+    month: Floats = np.asarray(days / 30.0, dtype=np.float64)
+    table.append(("from day to day", ("time",), month))
     table.append(("all the time", (), np.ones(len(record))))
     return table
 
