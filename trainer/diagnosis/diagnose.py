@@ -162,7 +162,14 @@ def _refined(prepared: Problem, judged: Adequacy, estimated: list[Estimated], de
     """Return the terms at their refitted sizes and shapes; a size that turns round drops its term."""
     if not estimated:
         return []
-    found = refine.refine(prepared, judged.selected.fit, [one.term for one in estimated], deployed.effects)
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = refine.refine(prepared, judged.selected.fit, [one.term for one in estimated], deployed.effects)
+    except (ValueError, np.linalg.LinAlgError):
+        # Undamped steps can run away from a poor start; the terms then stay as the search found them.
+        return estimated
+    if not all(np.isfinite(one.term.amplitude) and np.isfinite(one.deviation) for one in found):
+        return estimated
     better = [with_refined(one, two) for one, two in zip(estimated, found, strict=True)]
     return [one for one in better if one.term.amplitude != 0.0]
 
