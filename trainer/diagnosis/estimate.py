@@ -112,7 +112,11 @@ def with_refined(one: Estimated, refined: Refined) -> Estimated:
         shapes[shape.name] = Interval(value, max(value - wide, shape.low), min(value + wide, shape.high), shape.unit)
     wide = NORMAL_90 * float(np.hypot(INFLATION * refined.deviation, FORM_DOUBT * amplitude))
     interval = Interval(amplitude, amplitude - wide, amplitude + wide, definition.amplitude.unit)
-    return replace(one, term=refined.term, amplitude=interval, shapes=shapes)
+    regimes = {
+        name: Interval(value, value - reach * deviation, value + reach * deviation, interval.unit)
+        for name, (value, deviation) in refined.regimes.items()
+    }
+    return replace(one, term=refined.term, amplitude=interval, shapes=shapes, regimes=regimes)
 
 
 def rivals(

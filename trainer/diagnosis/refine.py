@@ -33,6 +33,8 @@ class Refined:
     deviation: float
     """Of the amplitude, the larger of the curvature's and of the scatter of day scores."""
     shape_deviation: dict[str, float]
+    regimes: dict[str, tuple[float, float]]
+    """(amplitude, standard deviation) by regime, all else held."""
 
 
 def refine(problem: Problem, fit: Fit, terms: Sequence[ActiveTerm], before: Sequence[ActiveTerm]) -> list[Refined]:
@@ -52,6 +54,7 @@ def refine(problem: Problem, fit: Fit, terms: Sequence[ActiveTerm], before: Sequ
     current = list(terms)
     misfit = problem.expected[: len(problem.known)].sum(axis=0)
     deviation = np.zeros(0)
+    regimes: list[dict[str, tuple[float, float]]] = []
     for step in range(STEPS):
         line = _line(problem, parameters, [*before, *current])
         # The noise is fitted about the model as it now stands; its parameters do not move here.
@@ -91,10 +94,16 @@ def refine(problem: Problem, fit: Fit, terms: Sequence[ActiveTerm], before: Sequ
         parameters = prior.clip(
             {name: parameters[name] + float(part) for name, part in zip(prior.names, moved[:count], strict=True)}
         )
-        steps = moved[-len(knobs) :]
+        limit = np.array([_longest(current[index], shape) for index, shape in knobs])
+        steps = np.clip(moved[-len(knobs) :], -limit, limit)
         current = [
             _moved(term, {shape: float(part) for (at, shape), part in zip(knobs, steps, strict=True) if at == index})
             for index, term in enumerate(current)
+        ]
+        residual = np.tensordot(np.concatenate([[1.0], moved]), stack, axes=1)
+        offset = len(stack) - len(knobs)
+        regimes = [
+            _regimes(line, residual, stack[offset + index], current[index].amplitude) for index in range(len(current))
         ]
         if step and np.all(np.abs(steps) < 0.1 * deviation):
             break
@@ -107,6 +116,7 @@ def refine(problem: Problem, fit: Fit, terms: Sequence[ActiveTerm], before: Sequ
                 for (at, shape), part in zip(knobs, deviation, strict=True)
                 if at == index and shape is not None
             },
+            regimes[index],
         )
         for index, term in enumerate(current)
     ]
@@ -158,6 +168,46 @@ def _scale(term: ActiveTerm, shape: str | None) -> float:
         return max(abs(term.amplitude), 0.2 * abs(definition.amplitude.typical))
     one = next(one for one in definition.shapes if one.name == shape)
     return SHAPE_SPREAD * (one.high - one.low) * (1.0 if term.shape[shape] < 0.5 * (one.low + one.high) else -1.0)
+
+
+def _longest(term: ActiveTerm, shape: str | None) -> float:
+    """Return the longest step of a knob: half of its size, lest an undamped step runs away."""
+    return 0.5 * abs(_scale(term, shape)) if shape is None else abs(_scale(term, shape))
+
+
+def _regimes(line: Linearisation, residual: Floats, slope: Floats, amplitude: float) -> dict[str, tuple[float, float]]:
+    """Return (amplitude, standard deviation) refitted on the rows of each regime, all else held.
+
+    Args:
+        line: of the refitted model.
+        residual: whitened, after the fit, (b, r, steps).
+        slope: whitened, of the amplitude, (b, r, steps).
+        amplitude: as fitted on all rows.
+    """
+    rows = line.runs.rows - 1
+    inputs = line.record.inputs
+    wind, vents = inputs["wind_speed"][rows], (inputs["vent_lee"] + inputs["vent_wind"])[rows]
+    light, middle = inputs["global_radiation"][rows], np.median(line.runs.starts)
+    early = np.broadcast_to((line.runs.starts <= middle)[:, None], rows.shape)
+    masks = {
+        "day": light > 20.0,
+        "night": light <= 20.0,
+        "calm": wind <= np.median(wind),
+        "windy": wind > np.median(wind),
+        "vents shut": vents < 2.0,
+        "vents open": vents >= 2.0,
+        "first half": early,
+        "second half": ~early,
+    }
+    whole = float(np.sum(slope**2))
+    found = {}
+    for name, mask in masks.items():
+        curvature = float(np.sum((slope * mask) ** 2))
+        # A regime in which the effect hardly shows tells nothing of it.
+        if curvature > 0.02 * whole:
+            change = -float(np.sum(slope * residual * mask)) / curvature
+            found[name] = (amplitude + change, curvature**-0.5)
+    return found
 
 
 def _spread(term: ActiveTerm, shape: str | None) -> float:

@@ -42,11 +42,17 @@ def finding(one: Estimated) -> Finding:
 def sentence(one: Estimated) -> str:
     """Return the grower's sentence, with the beginning where there is one."""
     effect = EFFECTS[one.effect]
-    text = effect.sentence.format(value=f"{one.amplitude.value:.2g}", unit=effect.amplitude.unit)
+    text = effect.sentence.format(value=plain(one.amplitude.value), unit=effect.amplitude.unit)
     if one.onset is not None:
         time = one.onset.time.astype("datetime64[D]").item()
         return f"Since {time.day} {time:%B} {text}."
     return f"{text[0].upper()}{text[1:]}."
+
+
+def plain(value: float) -> str:
+    """Return a number with two significant digits, as people write it."""
+    rounded = float(f"{value:.2g}")
+    return f"{rounded:.0f}" if abs(rounded) >= 10.0 else f"{rounded:.10f}".rstrip("0").rstrip(".")
 
 
 def separating_test(rivals: tuple[str, ...]) -> str:

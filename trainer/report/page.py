@@ -12,6 +12,7 @@ from igrow_core.quantities import QUANTITIES
 from trainer.diagnosis.deployed import Deployed
 from trainer.diagnosis.diagnose import Evidence
 from trainer.diagnosis.result import HORIZONS, STAGES, Diagnosis
+from trainer.diagnosis.wording import plain
 
 _VERDICTS = {
     "nothing": "Nothing is missing that is large enough to matter: the model fits this greenhouse.",
@@ -79,6 +80,6 @@ def _gains(diagnosis: Diagnosis) -> list[str]:
         if {"deployed", "corrected"} <= day.keys():
             unit = QUANTITIES[quantity].unit.replace("degC", "K")
             name = quantity.removeprefix("air_").replace("co2", "CO2")
-            before, after = (f"{day[stage]:.2g} {unit}" for stage in ("deployed", "corrected"))
+            before, after = (f"{plain(day[stage])} {unit}" for stage in ("deployed", "corrected"))
             sentences.append(f"Predicted {name} was off by {before} a day ahead; now {after}.")
     return sentences
