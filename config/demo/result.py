@@ -187,7 +187,7 @@ def draw(path: Path, live: Any, since: int | None, days_before: int, diagnosis: 
         axis.grid(alpha=0.25)
         axis.spines[["top", "right"]].set_visible(False)
     found = ", ".join(one["effect"].replace("_", " ") for one in diagnosis["findings"]) or "nothing"
-    axes[0].set_title(f"Error of the 24 h prediction, day by day: the trainer finds “{found}”", loc="left")
+    axes[0].set_title(f"Error of the 24 h prediction, day by day\nfound by the trainer: {found}", loc="left")
     axes[0].legend(loc="upper right", frameon=False)
     axes[0].text(days_before - 0.3, axes[0].get_ylim()[1], "diagnosed", va="top", ha="right", color="#6b7280")
     axes[-1].set_xlabel("day of plant time")
