@@ -128,9 +128,10 @@ class FolderExchange:
         records = [
             record
             for category in ("event", "write", "alarm")
-            for record in read_records(self._store.folder, category)
+            # Not all of the ledger: over a season it outgrows the memory of a gateway.
+            for record in read_records(self._store.folder, category, after=sequence)
             # A record without a time belongs to the first day that is published after it.
-            if record.sequence > sequence and (record.time is None or record.time < DAY * (day + 1))
+            if record.time is None or record.time < DAY * (day + 1)
         ]
         records.sort(key=lambda record: record.sequence)
         if records:

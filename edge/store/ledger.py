@@ -257,18 +257,20 @@ class Ledger:
             pass
 
 
-def read_newest(path: Path, category: str) -> list[Record]:
+def read_newest(path: Path, category: str, after: int = 0) -> list[Record]:
     """Read one category of a ledger file that another process may be writing, newest first.
 
-    Raises sqlite3.Error.
+    Only records with a sequence number above `after`. Raises sqlite3.Error.
     """
     with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=5.0)) as connection:
-        return list(_newest(connection, category))
+        return list(_newest(connection, category, after))
 
 
-def _newest(connection: sqlite3.Connection, category: str) -> Iterator[Record]:
-    query = "SELECT sequence, category, time, body FROM records WHERE category = ? ORDER BY sequence DESC"
-    for line in connection.execute(query, (category,)):
+def _newest(connection: sqlite3.Connection, category: str, after: int = 0) -> Iterator[Record]:
+    query = (
+        "SELECT sequence, category, time, body FROM records WHERE category = ? AND sequence > ? ORDER BY sequence DESC"
+    )
+    for line in connection.execute(query, (category, after)):
         yield _record(line)
 
 

@@ -182,15 +182,15 @@ def read_telemetry(folder: Path, start: float, end: float) -> Telemetry:
         raise StoreError(f"{path}: the log cannot be read: {describe(error)}") from None
 
 
-def read_records(folder: Path, category: str) -> list[Record]:
+def read_records(folder: Path, category: str, *, after: int = 0) -> list[Record]:
     """Read one category of the ledger of a store that a daemon may be writing, newest first.
 
-    Raises StoreError where neither file can be read.
+    Only records with a sequence number above `after`. Raises StoreError where neither file can be read.
     """
     problem = ""
     for name in NAMES:
         try:
-            return read_newest(folder / name, category)
+            return read_newest(folder / name, category, after)
         except sqlite3.Error as error:
             problem = f"{folder / name}: the ledger cannot be read: {describe(error)}"
     raise StoreError(problem)

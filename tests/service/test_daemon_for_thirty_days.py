@@ -46,7 +46,7 @@ def test_thirty_days_grow_neither_memory_nor_file_handles(tmp_path: Path) -> Non
             f"30 days: memory {memory[0] / 1e6:.1f} -> {memory[-1] / 1e6:.1f} MB, {slope / 1e3:.1f} kB a day; "
             f"file handles {files[0]} -> {files[-1]}"
         )
-        assert slope < 60e3, "more than 20 MB a year"
+        assert slope < 20e3, "more than 7 MB a year"
         assert max(files) - min(files) <= 2
         assert plant.stop() == 0
     finally:
