@@ -18,7 +18,7 @@ FIRST_DAY = 20_000
 
 def fill_day(store: SqliteStore, day: int, events: int) -> None:
     for index in range(events):
-        store.record_event(DAY * day + 60.0 * index, "test", {"number": index, "padding": "x" * 100})
+        store.record_event(DAY * day + 30.0 * index, "test", {"number": index, "padding": "x" * 100})
     for hour in range(24):
         store.append(DAY * day + 3600.0 * hour, {"air_temperature": Value(20.0, Quality.GOOD, 1.0)})
 
