@@ -1,11 +1,13 @@
 """Tells systemd how the daemon is (sd_notify): ready, alive, reloading, stopping, and one line of status.
 
-The watchdog is fed by completed cycles only: a daemon whose cycle hangs is restarted, however alive its other
-tasks are. The protocol is a datagram to the socket named by NOTIFY_SOCKET (sd_notify(3)).
+The watchdog is fed by each completed cycle and, since cycles may be rarer than the watchdog is patient, by the wait
+between two of them, which knows when it ends. Nothing else feeds it: a daemon whose cycle hangs is restarted, however
+alive its other tasks are. The protocol is a datagram to the socket named by NOTIFY_SOCKET (sd_notify(3)).
 """
 
 from __future__ import annotations
 
+import math
 import os
 import socket
 import time
@@ -25,8 +27,8 @@ class Notifier:
             self._socket.setblocking(False)
         self._status = ""
         microseconds = environment.get("WATCHDOG_USEC", "")
-        self.watchdog_seconds = int(microseconds) / 1e6 if microseconds.isdigit() else None
-        """After which silence systemd restarts us (WatchdogSec); None when it does not watch."""
+        self.feed_every = int(microseconds) / 3e6 if microseconds.isdigit() else math.inf
+        """Seconds between two signs of life that the watchdog can rely on: a third of WatchdogSec, infinite without."""
 
     def ready(self) -> None:
         """Report that the daemon runs; the PLC need not answer yet."""
@@ -47,6 +49,10 @@ class Notifier:
             message += f"\nSTATUS={status}"
             self._status = status
         self._send(message)
+
+    def still_waiting(self) -> None:
+        """Feed the watchdog while the next cycle is not due yet."""
+        self._send("WATCHDOG=1")
 
     def close(self) -> None:
         """Let go of the socket."""

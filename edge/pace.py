@@ -15,11 +15,21 @@ PATIENCE = 2.0
 """Wall-clock seconds for a simulated plant to move on; then a cycle runs without it, as it would on a dead line."""
 
 
+class SignOfLife(Protocol):
+    """Hears that a wait goes on as it should (`edge.notify.Notifier`)."""
+
+    feed_every: float
+    """Seconds between two signs that it can rely on; may be infinite."""
+
+    def still_waiting(self) -> None:
+        """Take note that the next cycle is not due yet."""
+
+
 class Pace(Protocol):
     """Separates one cycle from the next."""
 
-    async def wait(self) -> None:
-        """Return when the next cycle is due."""
+    async def wait(self, life: SignOfLife) -> None:
+        """Return when the next cycle is due; let `life` hear of a long wait."""
 
 
 class TickPace:
@@ -29,12 +39,15 @@ class TickPace:
         self._interval = interval
         self._next = time.monotonic()
 
-    async def wait(self) -> None:
+    async def wait(self, life: SignOfLife) -> None:
         """Sleep until the next tick."""
         now = time.monotonic()
-        if self._next > now:
-            await asyncio.sleep(self._next - now)
-        self._next = max(self._next, now) + self._interval
+        due = max(self._next, now)
+        while (rest := due - time.monotonic()) > life.feed_every:
+            await asyncio.sleep(life.feed_every)
+            life.still_waiting()
+        await asyncio.sleep(max(0.0, rest))
+        self._next = due + self._interval
 
 
 class FollowedPlant:
@@ -54,8 +67,8 @@ class FollowedPlant:
         self._interval = 0.0 if lockstep else interval
         self._kept: Mapping[str, RawReading] | None = None
 
-    async def wait(self) -> None:
-        """Return when the plant has moved on, or when it has not for `PATIENCE` seconds."""
+    async def wait(self, life: SignOfLife) -> None:
+        """Return when the plant has moved on, or when it has not for `PATIENCE` seconds, too soon to tell `life`."""
         before = self._clock.monotonic()
         patience_ends = time.monotonic() + PATIENCE
         while True:

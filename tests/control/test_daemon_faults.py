@@ -267,8 +267,11 @@ async def test_a_restart_gives_back_no_daily_budget(tmp_path):
     assert any("3 of 4 writes of the last 24 h are used" in str(row.body["reason"]) for row in rows)
 
 
-async def test_the_watchdog_is_fed_by_completed_cycles_only(tmp_path):
+@pytest.mark.parametrize(("clock", "interval"), [("lockstep", "5 min"), ("system", "1 s")])
+async def test_a_cycle_that_hangs_feeds_the_watchdog_no_more(tmp_path, clock, interval):
     class Recorder:
+        feed_every = 0.02
+
         def __init__(self):
             self.sent = []
 
@@ -284,29 +287,34 @@ async def test_the_watchdog_is_fed_by_completed_cycles_only(tmp_path):
         def cycle_completed(self, status):
             self.sent.append(status)
 
+        def still_waiting(self):
+            self.sent.append("waiting")
+
         def close(self):
             return
 
     port = free_port()
-    path = write_files(tmp_path, port)
+    path = write_files(tmp_path, port, clock=clock, interval=interval)
     plant = Plant(tmp_path, port)
     await plant.up()
     recorder = Recorder()
     async with running(path, notifier=recorder) as daemon:
-        await until(lambda: daemon.cycles >= 10)
+        await until(lambda: daemon.cycles >= 3)
         go_on = asyncio.Event()
         plc = daemon._control.cycle._plc
         read = plc.read
 
+        hangs = []
+
         async def hanging_read(names=None):
+            hangs.append(True)
             await go_on.wait()
             return await read(names)
 
+        assert ("waiting" in recorder.sent) == (clock == "system")
         plc.read = hanging_read
-        fed = -1
-        while fed != len(recorder.sent):
-            fed = len(recorder.sent)
-            await asyncio.sleep(0.1)
+        await until(lambda: hangs)
+        fed = len(recorder.sent)
         cycles = daemon.cycles
         await asyncio.sleep(0.3)
         assert (daemon.cycles, len(recorder.sent)) == (cycles, fed)

@@ -2,13 +2,8 @@
 
 import socket
 
-import pytest
-from daemon_bench import write_files
-
-from edge.configuration import load_configuration
-from edge.daemon import refuse_cycles_slower_than_the_watchdog
 from edge.notify import Notifier
-from igrow_core.errors import IgrowError
+from edge.pace import TickPace
 
 
 def test_each_cycle_feeds_the_watchdog_and_a_new_status_is_sent_once(tmp_path):
@@ -38,11 +33,25 @@ def test_a_socket_that_is_gone_harms_nothing(tmp_path):
     notifier.close()
 
 
-def test_a_cycle_slower_than_the_watchdog_is_refused_at_the_start(tmp_path):
-    watchdog = Notifier({"WATCHDOG_USEC": "120000000"}).watchdog_seconds
-    slow = load_configuration(write_files(tmp_path, 5020, clock="system", interval="90 s"))
-    with pytest.raises(IgrowError, match="at most 60 s"):
-        refuse_cycles_slower_than_the_watchdog(slow, watchdog)
-    refuse_cycles_slower_than_the_watchdog(slow, Notifier({}).watchdog_seconds)
-    lockstep = load_configuration(write_files(tmp_path, 5020, clock="lockstep", interval="5 min"))
-    refuse_cycles_slower_than_the_watchdog(lockstep, watchdog)
+async def test_a_wait_longer_than_the_watchdog_feeds_it_and_then_ends(tmp_path):
+    path = str(tmp_path / "notify")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as server:
+        server.bind(path)
+        notifier = Notifier({"NOTIFY_SOCKET": path, "WATCHDOG_USEC": "150000"})
+        pace = TickPace(0.5)
+        await pace.wait(notifier)  # the first cycle is due at once
+        await pace.wait(notifier)
+        notifier.ready()
+        heard = []
+        while not heard or heard[-1] != "READY=1":
+            heard.append(server.recv(4096).decode())
+        notifier.close()
+    assert heard[:-1]
+    assert set(heard[:-1]) == {"WATCHDOG=1"}
+
+
+async def test_a_wait_that_nobody_watches_is_silent(tmp_path):
+    assert Notifier({}).feed_every == float("inf")
+    pace = TickPace(0.05)
+    for _ in range(3):
+        await pace.wait(Notifier({}))
