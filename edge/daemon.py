@@ -10,11 +10,12 @@ from collections.abc import Coroutine, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
-from edge.configuration import ClockSource, Configuration, load_configuration
+from edge.configuration import Configuration, load_configuration
 from edge.cycle import CycleResult
 from edge.journal import Journal
 from edge.notify import Notifier
 from edge.ports import Plan, Snapshot
+from edge.state_lock import sole_use
 from edge.wiring import Control, Services, build_control, open_services, remember
 from igrow_core.errors import IgrowError
 
@@ -74,7 +75,7 @@ class Daemon:
     async def _due(self) -> bool:
         """Wait for the next cycle; tell whether there is one."""
         assert self._control is not None
-        return await self._unless_stopped(self._control.pace.wait())
+        return await self._unless_stopped(self._control.pace.wait(self._notifier))
 
     async def _unless_stopped(self, work: Coroutine[None, None, None]) -> bool:
         """Await `work`, but not beyond a stop; tell whether it was awaited to its end."""
@@ -207,6 +208,7 @@ class Daemon:
             services.planning.health if services.planning is not None else "",
             schedule.problem if schedule is not None else "",
             services.exchange.health if services.exchange is not None else "",
+            services.status.health,
             self._configuration_problem,
         ]
         rules, points = control.configuration.guard_rules.points, control.cycle.state.points
@@ -252,24 +254,16 @@ def _refuse_what_needs_a_restart(old: Configuration, new: Configuration) -> None
             raise IgrowError(f"{new.path}: {what} changed from {before} to {after}, which needs a restart")
 
 
-def refuse_cycles_slower_than_the_watchdog(configuration: Configuration, watchdog: float | None) -> None:
-    """Raise IgrowError when systemd would restart a daemon that is well."""
-    cycle = configuration.file.cycle
-    interval = cycle.interval.total_seconds()
-    if watchdog is not None and cycle.clock is ClockSource.SYSTEM and 2.0 * interval > watchdog:
-        raise IgrowError(
-            f"{configuration.path}: cycle.interval is {interval:g} s, but systemd's watchdog waits for {watchdog:g} s: "
-            f"an interval of at most {watchdog / 2:g} s, or a WatchdogSec of at least {2 * interval:g} s, is right"
-        )
-
-
 async def run_daemon(path: Path) -> None:
-    """Run until SIGTERM or SIGINT; SIGHUP reads the configuration again. Raises IgrowError for a bad configuration."""
-    configuration, notifier = load_configuration(path), Notifier()
-    refuse_cycles_slower_than_the_watchdog(configuration, notifier.watchdog_seconds)
-    daemon = Daemon(configuration, notifier=notifier)
-    loop = asyncio.get_running_loop()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        loop.add_signal_handler(number, daemon.stop)
-    loop.add_signal_handler(signal.SIGHUP, daemon.reload)
-    await daemon.run()
+    """Run until SIGTERM or SIGINT; SIGHUP reads the configuration again.
+
+    Raises IgrowError for a bad configuration, and where another daemon has the same state folder.
+    """
+    configuration = load_configuration(path)
+    with sole_use(configuration.state_folder):
+        daemon = Daemon(configuration)
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGTERM, signal.SIGINT):
+            loop.add_signal_handler(number, daemon.stop)
+        loop.add_signal_handler(signal.SIGHUP, daemon.reload)
+        await daemon.run()

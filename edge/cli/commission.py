@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import contextlib
 
 from edge.cli.common import add_configuration, configuration_of
 from edge.commission import Commissioning, Console
+from edge.state_lock import sole_use
 
 EXAMPLE = "igrow-edge commission /etc/igrow/daemon.yaml"
 
@@ -20,7 +22,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Walk through; the exit code is 0 when everything was confirmed, else 1."""
+    configuration = configuration_of(options)
     commissioning = Commissioning(
-        configuration_of(options), Console(), fallback_after=options.fallback_after, only_read=options.only_read
+        configuration, Console(), fallback_after=options.fallback_after, only_read=options.only_read
     )
-    return 0 if asyncio.run(commissioning.run()) else 1
+    # A daemon would go on writing, and its heartbeat would keep the PLC from falling back.
+    alone = contextlib.nullcontext() if options.only_read else sole_use(configuration.state_folder)
+    with alone:
+        return 0 if asyncio.run(commissioning.run()) else 1

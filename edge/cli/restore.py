@@ -6,9 +6,10 @@ import argparse
 from pathlib import Path
 
 from edge.cli.common import configuration_of, store_folder
+from edge.state_lock import sole_use
 from edge.store import restore
 
-EXAMPLE = "systemctl stop igrow-edge && igrow-edge restore /etc/igrow/daemon.yaml igrow-backup.tar.gz"
+EXAMPLE = "sudo -u igrow igrow-edge restore /etc/igrow/daemon.yaml igrow-backup.tar.gz"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -19,7 +20,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Put the backup in place."""
-    folder = store_folder(configuration_of(options))
-    restore(options.archive, folder)
+    configuration = configuration_of(options)
+    folder = store_folder(configuration)
+    with sole_use(configuration.state_folder):
+        restore(options.archive, folder)
     print(f"{folder}: restored from {options.archive}")
     return 0

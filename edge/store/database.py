@@ -37,7 +37,7 @@ def open_database(
         connection.execute(f"PRAGMA wal_autocheckpoint={log_pages}")
         connection.execute(f"PRAGMA journal_size_limit={log_pages * page_size}")
         if unclean and (problem := connection.execute("PRAGMA quick_check(1)").fetchone()[0]) != "ok":
-            raise damage(f"{path}: {problem.splitlines()[0]}")
+            raise damage(problem.splitlines()[-1])  # the first line only names the database
         connection.executescript(schema)
     except BaseException:
         connection.close()

@@ -49,8 +49,10 @@ def restore(archive: Path, folder: Path) -> None:
     Raises StoreError: not a backup, damaged, or a store in the way.
     """
     for name in FILES:
-        if (folder / name).exists():
-            raise StoreError(f"{folder / name}: exists; move the old store away first")
+        # A write-ahead log that was left behind would be replayed into the restored file.
+        for path in (folder / name, folder / f"{name}-wal", folder / f"{name}-shm"):
+            if path.exists():
+                raise StoreError(f"{path}: exists; move all of {folder} away first")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder) as scratch:

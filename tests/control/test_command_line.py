@@ -20,6 +20,7 @@ from edge.cli.simulate_plc import make_plant, parse_effect
 from edge.cli.status import lines
 from edge.ports import Plan
 from edge.sources.override import read_leases
+from edge.state_lock import sole_use
 from igrow_core.errors import IgrowError
 
 
@@ -36,7 +37,7 @@ def call(capsys, *arguments: object) -> tuple[int, str, str]:
 def test_every_command_has_help_with_an_example(capsys, command):
     code, out, _ = call(capsys, command, "--help")
     assert code == 0
-    assert f"example:\n  {'systemctl' if command == 'restore' else 'igrow-edge'}" in out
+    assert f"example:\n  {'sudo -u igrow ' if command == 'restore' else ''}igrow-edge {command}" in out
 
 
 def test_a_wrong_configuration_is_one_line_and_exit_code_2(tmp_path, capsys):
@@ -140,6 +141,16 @@ async def test_backup_export_and_restore_go_round(tmp_path, capsys):
     assert {"events.csv", "writes.csv", "telemetry-2026-03-01.csv.gz"} <= names
     assert (tmp_path / "first" / "writes.csv").read_text() == (tmp_path / "second" / "writes.csv").read_text()
     assert "backup.tar.gz" in capsys.readouterr().out
+
+
+def test_a_store_is_restored_only_while_no_daemon_has_it(tmp_path, capsys):
+    path = write_files(tmp_path, 5020)
+    with sole_use(tmp_path / "state"):
+        for arguments in (["restore", path, tmp_path / "backup.tar.gz"], ["run", path], ["commission", path]):
+            code, _, err = call(capsys, *arguments)
+            assert code == 2
+            assert re.fullmatch(r"error: \S*/state: a daemon is running on it; stop it first, .*\n", err)
+    assert "the backup cannot be restored" in call(capsys, "restore", path, tmp_path / "backup.tar.gz")[2]
 
 
 async def test_probe_shows_raw_and_decoded_values(tmp_path, capsys):

@@ -142,12 +142,31 @@ def test_a_backup_of_a_running_store_is_restored_elsewhere(tmp_path: Path) -> No
     store.close()
 
 
+def test_a_restore_refuses_a_log_that_a_moved_store_left_behind(tmp_path: Path) -> None:
+    store = SqliteStore(tmp_path / "store")
+    store.append(START, values(20.0))
+    store.close()
+    archive = backup(tmp_path / "store", tmp_path / "copy.tar.gz")
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "telemetry.db-wal").write_bytes(b"left")
+    with pytest.raises(StoreError, match=r"telemetry\.db-wal: exists; move all of"):
+        restore(archive, tmp_path / "other")
+
+
+def test_only_records_after_a_sequence_number_are_read(tmp_path: Path) -> None:
+    store = SqliteStore(tmp_path)
+    for number in range(5):
+        store.record_event(START, "test", {"number": number})
+    store.close()
+    assert [record.sequence for record in read_records(tmp_path, "event", after=3)] == [5, 4]
+
+
 def test_a_restore_refuses_a_damaged_backup_and_a_store_in_the_way(tmp_path: Path) -> None:
     store = SqliteStore(tmp_path / "store")
     store.append(START, values(20.0))
     store.flush()
     archive = backup(tmp_path / "store", tmp_path / "copy.tar.gz")
-    with pytest.raises(StoreError, match="move the old store away first"):
+    with pytest.raises(StoreError, match="exists; move all of"):
         restore(archive, tmp_path / "store")
     archive.write_bytes(archive.read_bytes()[:-40])
     with pytest.raises(StoreError, match="cannot be restored"):

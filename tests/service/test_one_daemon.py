@@ -1,0 +1,38 @@
+"""One daemon at a time on a state folder, whatever became of the one before."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+from running_daemon import COMMAND, RunningDaemon
+
+
+def command(plant: RunningDaemon, name: str, *arguments: object) -> tuple[int, str]:
+    done = subprocess.run(
+        [*COMMAND, name, str(plant.configuration), *map(str, arguments)], capture_output=True, text=True, check=False
+    )
+    return done.returncode, done.stderr
+
+
+def test_a_second_daemon_and_a_restore_are_refused_until_the_first_is_gone(tmp_path: Path) -> None:
+    plant = RunningDaemon(tmp_path)
+    archive = tmp_path / "backup.tar.gz"
+    try:
+        plant.start()
+        plant.wait_for((plant.state / "status.json").exists)
+        assert command(plant, "backup", archive)[0] == 0
+        for name, *arguments in (("run",), ("restore", archive)):
+            code, said = command(plant, name, *arguments)
+            assert code == 2
+            assert "a daemon is running on it" in said
+            assert said.count("\n") == 1
+        plant.kill()
+        (plant.state / "store").rename(plant.state / "old")
+        assert command(plant, "restore", archive)[0] == 0
+        (plant.state / "status.json").unlink()
+        plant.start()
+        plant.wait_for((plant.state / "status.json").exists)
+        assert plant.stop() == 0
+    finally:
+        plant.close()
