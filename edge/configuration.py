@@ -33,6 +33,8 @@ _SECOND = datetime.timedelta(seconds=1)
 _MINUTE = datetime.timedelta(minutes=1)
 _HOUR = datetime.timedelta(hours=1)
 _DAY = datetime.timedelta(days=1)
+STATUS_PORT = 8420
+"""The one port that the systemd unit lets the daemon listen on (SocketBindAllow)."""
 
 
 class ConfigurationError(IgrowError):
@@ -174,7 +176,7 @@ class PlanningSettings:
 class StatusSettings:
     """The page, the health endpoint and the metrics."""
 
-    port: int = setting(low=0, high=65535, default=8420, help="TCP port on localhost; 0 takes a free one")
+    port: int = setting(low=0, high=65535, default=STATUS_PORT, help="TCP port on localhost; 0 takes a free one")
 
 
 @dataclass(frozen=True)

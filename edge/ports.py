@@ -266,6 +266,10 @@ class Snapshot:
 class StatusService(Protocol):
     """The page, the health endpoint, the metrics and the state file on localhost."""
 
+    @property
+    def health(self) -> str:
+        """Empty when all is well, else one line."""
+
     async def start(self) -> None:
         """Begin to listen; a port that is taken is a problem to report, not a reason to stop."""
 

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Iterator
 
 from edge.cli.common import add_configuration, configuration_of
-from edge.configuration import Configuration
+from edge.configuration import STATUS_PORT, Configuration
 from edge.registers.bus_load import estimate
 from edge.registers.model import SYSTEM_POINTS
 
@@ -52,6 +52,11 @@ def describe(configuration: Configuration) -> Iterator[str]:
     for name in SYSTEM_POINTS:
         if name in ("heartbeat", "plc_fallback") and name not in register_map.points:
             yield f"  note      no point {name}: see docs/commissioning.md for why the PLC should have it"
+    if file.status.port != STATUS_PORT:
+        yield (
+            f"  note      status.port is {file.status.port}: the systemd unit allows {STATUS_PORT} only; "
+            "see docs/installation.md for the drop-in"
+        )
     exchange = configuration.exchange_folder
     yield f"state       {configuration.state_folder}; exchange: {exchange if exchange else 'none'}"
     bundle = configuration.bundle_folder

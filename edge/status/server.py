@@ -50,8 +50,8 @@ class StatusServer:
         """
         self.port = port
         """The port that is listened to; 0 becomes the one that the system chose."""
-        self.problem = ""
-        """Empty while listening, else one line."""
+        self._unreachable = ""
+        self._unwritten = ""
         self._zone = zone
         self._state_file = state_file
         self._written_at = -math.inf
@@ -63,13 +63,18 @@ class StatusServer:
         self._server: asyncio.Server | None = None
         self._open = 0
 
+    @property
+    def health(self) -> str:
+        """Empty while it listens and can leave its file, else one line."""
+        return "; ".join(filter(None, (self._unreachable, self._unwritten)))
+
     async def start(self) -> None:
         """Begin to listen; a port that is taken is a problem to report, not a reason to stop."""
         try:
             self._server = await asyncio.start_server(self._serve, "127.0.0.1", self.port, limit=REQUEST_BYTES)
         except OSError as error:
-            self.problem = f"status page: port {self.port} on localhost: {error.strerror or error}"
-            _log.warning("%s", self.problem)
+            self._unreachable = f"status page: port {self.port} on localhost: {error.strerror or error}"
+            _log.warning("%s", self._unreachable)
             return
         self.port = self._server.sockets[0].getsockname()[1]
 
@@ -97,8 +102,9 @@ class StatusServer:
             # Not synchronised: it is made anew all the time, and a power cut may take it.
             partial.write_text(json.dumps({"port": self.port, "state": plain(self._snapshot)}))
             partial.replace(self._state_file)
+            self._unwritten = ""
         except OSError as error:
-            self.problem = f"status file: {self._state_file}: {error.strerror or error}"
+            self._unwritten = f"status file: {self._state_file}: {error.strerror or error}"
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._open += 1

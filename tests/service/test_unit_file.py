@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from edge.configuration import STATUS_PORT
+
 UNIT = Path(__file__).resolve().parents[2] / "systemd" / "igrow-edge.service"
 
 
@@ -55,6 +57,10 @@ def test_the_watchdog_is_fed_through_notify_and_the_daemon_always_comes_back() -
     assert int(settings["WatchdogSec"][0]) > 0
     assert settings["Restart"] == ["always"]
     assert "StartLimitIntervalSec=0" in UNIT.read_text()
+
+
+def test_the_unit_lets_the_daemon_listen_on_the_default_status_port() -> None:
+    assert service()["SocketBindAllow"] == [f"ipv4:tcp:{STATUS_PORT}"]
 
 
 def test_the_daemon_has_a_user_of_its_own_that_sysusers_makes() -> None:

@@ -173,7 +173,7 @@ async def test_too_many_visitors_are_turned_away_and_the_next_is_served(server: 
 async def test_a_port_that_is_taken_is_a_problem_and_no_reason_to_stop(server: StatusServer) -> None:
     second = StatusServer(server.port)
     await second.start()
-    assert f"port {server.port}" in second.problem
+    assert f"port {server.port}" in second.health
     second.publish(snapshot())
     await second.close()
 
@@ -193,7 +193,7 @@ async def test_the_last_state_is_left_in_a_file_for_when_nobody_listens(tmp_path
 async def test_a_state_file_that_cannot_be_written_is_a_problem_and_no_reason_to_stop(tmp_path) -> None:
     server = StatusServer(0, tmp_path / "absent" / "status.json")
     server.publish(snapshot())
-    assert "status.json" in server.problem
+    assert "status.json" in server.health
 
 
 def test_the_history_is_a_day_of_points_five_minutes_apart() -> None:
