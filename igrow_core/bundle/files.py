@@ -20,8 +20,10 @@ from igrow_core.bundle.manifest import BundleError, Manifest, manifest_from_json
 MANIFEST_FILE = "manifest.json"
 GOLDEN_FILE = "golden.npz"
 GRAPHS = ("simulator", "optimizer", "hindcast", "policy")
-"""The graphs that a bundle can hold, each in a file of its name with the suffix .onnx; the first two it must."""
-REQUIRED_FILES = ("simulator.onnx", "optimizer.onnx", GOLDEN_FILE)
+"""The graphs that a bundle can hold, each in a file of its name with the suffix .onnx."""
+REQUIRED_GRAPHS = ("simulator", "optimizer")
+"""Those that it must hold, with golden values."""
+REQUIRED_FILES = (*(f"{graph}.onnx" for graph in REQUIRED_GRAPHS), GOLDEN_FILE)
 
 LARGEST_FILE = 256 * 2**20
 """Bytes; a gateway with little memory refuses to read more."""

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
 from tiny_bundle import write_tiny_bundle
 
 from igrow_core.bundle import (
+    Bundle,
     BundleError,
+    Golden,
     manifest_from_json,
     manifest_to_json,
     read_bundle,
+    read_golden,
     self_test,
     write_bundle,
 )
+
+DEFAULT_BUNDLE = Path(__file__).resolve().parents[2] / "igrow_core" / "default_bundle"
 
 
 def test_a_bundle_is_read_back_as_it_was_written(tmp_path: Path) -> None:
@@ -60,6 +66,30 @@ def test_a_graph_that_computes_something_else_fails_the_self_test(tmp_path: Path
     bundle = write_tiny_bundle(tmp_path / "bundle", offset=5.0, golden_offset=5.2)
     with pytest.raises(BundleError, match=r"self-test failed: simulator.onnx, output air_temperature is off by"):
         self_test(bundle)
+
+
+def copy_with_golden(bundle: Bundle, folder: Path, golden: Mapping[str, Golden]) -> Bundle:
+    files = {name: (bundle.folder / name).read_bytes() for name in ("simulator.onnx", "optimizer.onnx")}
+    return write_bundle(folder, bundle.manifest, files, golden)
+
+
+@pytest.mark.parametrize("untested", ["simulator", "optimizer"])
+def test_a_graph_that_cannot_be_tested_fails_the_self_test(tmp_path: Path, untested: str) -> None:
+    bundle = write_tiny_bundle(tmp_path / "bundle")
+    golden = read_golden(bundle)
+    without = copy_with_golden(
+        bundle, tmp_path / "without", {name: values for name, values in golden.items() if name != untested}
+    )
+    with pytest.raises(BundleError, match=rf"no golden values for {untested}\.onnx"):
+        self_test(without)
+    empty = copy_with_golden(bundle, tmp_path / "empty", {**golden, untested: Golden(golden[untested].inputs, {})})
+    with pytest.raises(BundleError, match=rf"{untested}\.onnx"):
+        self_test(empty)
+
+
+def test_the_default_bundle_passes_with_all_its_graphs() -> None:
+    tested = {deviation.graph for deviation in self_test(read_bundle(DEFAULT_BUNDLE))}
+    assert tested == {"simulator", "hindcast", "optimizer"}
 
 
 def test_a_bundle_without_an_optimizer_is_refused(tmp_path: Path) -> None:
