@@ -89,7 +89,7 @@ def plans(arguments: argparse.Namespace) -> None:
             from igrow_core.bundle import read_bundle  # noqa: PLC0415 - not every run has a bundle
             from igrow_core.simulator.plan import BundleSimulator  # noqa: PLC0415
 
-            model = BundleSimulator(read_bundle(arguments.bundle))
+            model = BundleSimulator(read_bundle(arguments.bundle), site.greenhouse)
         state = PlanningState(start, plant.measurements())
         forecast = hourly_weather(weather, start, hours)
         recipe = recipe_table(site, start, hours)

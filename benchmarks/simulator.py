@@ -15,6 +15,7 @@ from igrow_core.quantities import SETPOINTS
 from igrow_core.simulator.hybrid import climate
 from igrow_core.simulator.hybrid.parameters import PARAMETERS
 from igrow_core.simulator.plan import STEPS_PER_HOUR, BundleSimulator
+from igrow_core.site import Greenhouse
 from trainer.default_bundle import default_bundle_folder
 
 CANDIDATES, HOURS, ROUNDS = 1000, 48, 5
@@ -38,7 +39,7 @@ def candidates(seed: int) -> np.ndarray[tuple[int, int, int], np.dtype[np.float6
 
 def graph_rate(seed: int) -> float:
     """Strategy-hours per second of simulator.onnx on one thread, the best of a few rounds."""
-    simulator = BundleSimulator(read_bundle(default_bundle_folder()), members=1)
+    simulator = BundleSimulator(read_bundle(default_bundle_folder()), Greenhouse(), members=1)
     setpoints, course = candidates(seed), weather()
     simulator.simulate({}, course, setpoints, START)
     best = np.inf

@@ -18,7 +18,7 @@ from igrow_core.planner.onnx_generation import OnnxGeneration
 from igrow_core.planner.template import for_site
 from igrow_core.quantities import SETPOINTS
 from igrow_core.simulator.plan import BundleSimulator
-from igrow_core.site import Site
+from igrow_core.site import Greenhouse, Site
 from igrow_core.telemetry import Telemetry
 
 HOUR = 3600
@@ -32,7 +32,7 @@ SLOW = ("leaf_area_index", "plant_load", "net_growth", "fruit_fresh_weight")
 
 def make_plan(site: Site, request: PlanRequest) -> Plan:
     """Search for the setpoints over the request's horizon; raises IgrowError where something is missing."""
-    bundle, simulator, generation = _open(request.bundle)
+    bundle, simulator, generation = _open(request.bundle, site.greenhouse)
     start = int(request.time)
     horizon = round(len(next(iter(request.recipe.values()))) * request.step_seconds)
     # The simulator knows whole days; the hours beyond the horizon are planned too, and not used.
@@ -46,6 +46,7 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
         time=np.datetime64(start, "s"),
         initial=present(request.telemetry, start),
         applied=present(request.telemetry.only(name for name in SETPOINTS if name in request.telemetry), start),
+        co2_before=co2_since_planting(site, request.telemetry, start),
     )
     result = optimise(
         simulator,
@@ -101,6 +102,17 @@ def present(log: Telemetry, start: int) -> dict[str, float]:
     return values
 
 
+def co2_since_planting(site: Site, log: Telemetry, start: int) -> float:
+    """Return how much CO2 the crop has probably had, kg m-2, which decides on the price of the next kilogram.
+
+    The log reaches back some days only; the days before it since planting count as those that it holds.
+    """
+    dosing = log.columns.get("co2_dosing", np.empty(0))
+    known = dosing[np.isfinite(dosing)]
+    days = (np.datetime64(start, "s") - np.datetime64(site.crop.planting_date)) / np.timedelta64(1, "D")
+    return float(known.mean() * 24.0 * max(days, 0.0)) if len(known) else 0.0
+
+
 def hourly_recipe(site: Site, request: PlanRequest, hours: int) -> NDArray[np.float64]:
     """Return the recipe (hours, 4) in the order of `SETPOINTS`; a setpoint that the site lacks stands at safe."""
     table = np.empty((hours, len(SETPOINTS)))
@@ -124,7 +136,7 @@ def _covered(course: tuple[float, ...], request: PlanRequest, hours: int) -> int
 
 
 @functools.lru_cache(maxsize=1)
-def _open(folder: Path) -> tuple[Bundle, Simulator, OnnxGeneration]:
+def _open(folder: Path, greenhouse: Greenhouse) -> tuple[Bundle, Simulator, OnnxGeneration]:
     """Open the bundle in force once; a request with another bundle closes it."""
     bundle = read_bundle(folder)
-    return bundle, BundleSimulator(bundle), OnnxGeneration(bundle.graph("optimizer"))
+    return bundle, BundleSimulator(bundle, greenhouse), OnnxGeneration(bundle.graph("optimizer"))

@@ -110,8 +110,8 @@ class Objective:
     site: Site
     time: NDArray[np.datetime64]
     """UTC starts of the hours, (H,)."""
-    co2_before: float = 0.0
-    """kg m-2 of CO2 that the crop has had before."""
+    co2_before: Values | float = 0.0
+    """kg m-2 of CO2 that the crop has had before; one value, or one for each candidate, (B,)."""
 
     def value(self, outcome: Outcome) -> Valuation:
         """Return what the candidates are worth."""

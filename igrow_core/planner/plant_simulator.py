@@ -87,6 +87,8 @@ def run(plant: Plant, setpoints: Values) -> Outcome:
     before = _books(plant)
     for hour in range(setpoints.shape[1]):
         command = {name: setpoints[:, hour, column] for column, name in enumerate(SETPOINTS)}
+        # Actuators are read as means: those of the last hour, when the hours are over.
+        plant.reset_means()
         plant.advance(3600.0, command)
         after = _books(plant)
         for name in _STATES:

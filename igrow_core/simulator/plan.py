@@ -14,6 +14,7 @@ from igrow_core.planner.objective import Outcome
 from igrow_core.quantities import GROWTH, WEATHER
 from igrow_core.simulator.hindcast import SimulatorSettings
 from igrow_core.simulator.hybrid.measurement import PREDICTED
+from igrow_core.site import Greenhouse
 
 Floats = NDArray[np.float64]
 
@@ -45,11 +46,12 @@ _USUAL = {
 class BundleSimulator:
     """Runs simulator.onnx of a bundle; implements `igrow_core.planner.objective.Simulator`."""
 
-    def __init__(self, bundle: Bundle, *, threads: int = 1, members: int | None = None) -> None:
+    def __init__(self, bundle: Bundle, greenhouse: Greenhouse, *, threads: int = 1, members: int | None = None) -> None:
         """Open the graph.
 
         Args:
             bundle: with a `simulator` of the hybrid variant.
+            greenhouse: what the pipes give off, by the site's description; see `_heat_paid`.
             threads: of onnxruntime.
             members: how many of the posterior's draws to run (None: all that the bundle carries; 1: the mean alone).
 
@@ -72,6 +74,7 @@ class BundleSimulator:
         for row, draw in enumerate(draws, start=1):
             self._parameters[row, columns] = draw
         self._parameters = self._parameters[: members or len(self._parameters)]
+        self._heat_paid = _heat_paid(greenhouse, dict(zip(names, self._parameters.T, strict=True)))
 
     def simulate(self, initial: dict[str, float], weather: Floats, setpoints: Floats, start: np.datetime64) -> Outcome:
         """Return what candidates do; see `igrow_core.planner.objective.Simulator`.
@@ -119,7 +122,7 @@ class BundleSimulator:
             air_temperature=member(out["climate_out"][0]),
             air_humidity=member(out["climate_out"][1]),
             air_co2=member(out["climate_out"][2]),
-            heat=member(out["resources"][0]),
+            heat=member(out["resources"][0]) * self._heat_paid[:, None, None],
             electricity=member(out["resources"][1]),
             co2=member(out["resources"][2]),
             net_growth=member(np.diff(net_growth, axis=-1, prepend=before)),
@@ -140,6 +143,18 @@ class BundleSimulator:
     def _clock(self, time: NDArray[np.datetime64]) -> Floats:
         middle = sun.unix_seconds(time) + 1800.0
         return np.stack(sun.position(np, middle, self.settings.latitude, self.settings.longitude), axis=1)
+
+
+def _heat_paid(greenhouse: Greenhouse, parameters: Mapping[str, Floats]) -> Floats:
+    """Return how much heat the pipes give off for each heat that the climate stage's air receives, (members,).
+
+    The fitted transfer of the pipes is what reaches the air; what they radiate to floor and cover is paid too. The
+    site's coefficients tell all that leaves a pipe, the fitted ones what of it the air's balance needs.
+    """
+    share = parameters["holding:grow_share"]
+    received = parameters["parameter:rail_pipe_heat_transfer"] + share * parameters["parameter:grow_pipe_heat_transfer"]
+    given = greenhouse.rail_pipe_heat_transfer + share * greenhouse.grow_pipe_heat_transfer
+    return np.where((given > 0.0) & (received > 0.0), given / np.maximum(received, 1e-9), 1.0)
 
 
 def _known(initial: Mapping[str, float], name: str) -> float:

@@ -29,6 +29,21 @@ def test_rules_fitted_to_a_log_do_what_its_computer_did() -> None:
     assert rules["lamp_capacity"] == usual["lamp_capacity"]
 
 
+@pytest.mark.parametrize(("limit", "found"), [(150.0, (130.0, 170.0)), (1500.0, (1500.0, 1500.0))])
+def test_the_radiation_above_which_lamps_stay_dark_is_read_off_the_log(
+    limit: float, found: tuple[float, float]
+) -> None:
+    log = virtual_log(10, seed=8)
+    asked = np.ones(len(log))
+    power = np.where(log["global_radiation"] < limit, 80.0, 0.0)
+    assert limit > 1000.0 or (power == 0.0).sum() > 50
+    lit = log.with_columns({"lamp_on": asked, "lamp_power": power})
+    record = site_record(lit, SITE, 300.0)
+    rules = fit_actuation([(record, setpoint_columns(lit, record)[0], None)], nominal(SITE))
+    assert rules["lamp_capacity"] == 80.0
+    assert found[0] <= rules["lamp_radiation"] <= found[1]
+
+
 def test_a_log_without_setpoints_has_them_inferred_and_says_which() -> None:
     log = virtual_log(4, seed=9)
     bare = log.only([name for name in log.columns if name not in {"heating_setpoint", "co2_setpoint"}])

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import datetime
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import igrow_core
-from edge.planning.make_plan import hourly_recipe, make_plan, present
+from edge.planning.make_plan import co2_since_planting, hourly_recipe, make_plan, present
 from edge.ports import PlanRequest
 from igrow_core.quantities import SETPOINTS
 from igrow_core.site import Site
@@ -79,3 +81,16 @@ def test_a_recipe_of_any_step_becomes_hours(step: float, steps: int) -> None:
 def test_a_setpoint_that_the_site_lacks_stands_at_its_safe_value() -> None:
     table = hourly_recipe(SITE, request(names=("heating_setpoint", "co2_setpoint")), 24)
     assert (table[:, SETPOINTS.index("lamp_on")] == SITE.limits["lamp_on"].safe).all()
+
+
+def test_the_co2_that_the_crop_has_had_follows_from_the_log_s_days_and_those_since_planting() -> None:
+    planted = datetime.date(2026, 4, 29)
+    days = START / 86400 - (planted - datetime.date(1970, 1, 1)).days
+    site = replace(SITE, crop=replace(SITE.crop, planting_date=planted))
+    dosing = np.where(np.arange(len(log())) % 2 == 0, 0.004, 0.0)
+    dosing[:100] = np.nan
+    dosed = log().with_columns({"co2_dosing": dosing})
+    assert co2_since_planting(site, dosed, START) == pytest.approx(0.002 * 24 * days, rel=0.01)
+    assert co2_since_planting(site, log(), START) == 0.0
+    later = replace(site, crop=replace(site.crop, planting_date=datetime.date(2027, 1, 1)))
+    assert co2_since_planting(later, dosed, START) == 0.0

@@ -82,6 +82,7 @@ def fit_actuation(
     if "lamp_power" in known:
         burning = table["lamp_power"][table["setpoint:lamp_on"] > 0.9]
         rules["lamp_capacity"] = float(np.median(burning)) if len(burning) else 0.0
+        rules["lamp_radiation"] = _lamp_limit(table, rules["lamp_capacity"])
     if "co2_dosing" in known:
         rules["co2_capacity"] = max(float(np.quantile(table["co2_dosing"], 0.999)), 1e-4)
     if "irrigation" in known:
@@ -94,6 +95,19 @@ def fit_actuation(
         elif actuator.endswith("screen"):
             rules |= {f"{prefix}_{part}": 0.0 for part in ("unlit", "lit", "open")}
     return rules
+
+
+def _lamp_limit(table: Mapping[str, Floats], capacity: float) -> float:
+    """Return the radiation in W m-2 above which lamps that were asked for stayed dark; the highest, if none did."""
+    asked = table["setpoint:lamp_on"] > 0.5
+    radiation, burning = table["global_radiation"][asked], table["lamp_power"][asked] > 0.5 * capacity
+    order = np.argsort(radiation)
+    radiation, burning = radiation[order], burning[order]
+    # Below the limit lamps that are dark count as wrong, above it lamps that burn.
+    wrong = np.concatenate([[0], np.cumsum(~burning)]) + burning.sum() - np.concatenate([[0], np.cumsum(burning)])
+    best = len(wrong) - 1 - int(np.argmin(wrong[::-1]))
+    rule = RULES["lamp_radiation"]
+    return rule.high if best == len(radiation) else float(np.clip(radiation[best], rule.low, rule.high))
 
 
 def _samples(

@@ -1,7 +1,8 @@
 """What a policy learns in, a day at a time, each greenhouse under weather of its own.
 
-`DailyGreenhouses` is a batch of mechanistic greenhouses. `SimulatedDays` is a bundle's simulator: some hundred times
-cheaper, and what the paper trains on; whether that carries over to a greenhouse is then to be judged in the other.
+`DailyGreenhouses` are mechanistic greenhouses (`Greenhouses`, which any strategy can lead). `SimulatedDays` is a
+bundle's simulator: some hundred times cheaper, and what the paper trains on; whether that carries over to a
+greenhouse is then to be judged in the other.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from igrow_core.greenhouse.parameters import stack
 from igrow_core.greenhouse.plant import Plant
 from igrow_core.greenhouse.sensors import EXACT
 from igrow_core.greenhouse.weather_table import WeatherTable
-from igrow_core.planner.objective import Objective, Simulator, Valuation
+from igrow_core.planner.objective import Objective, Outcome, Simulator, Valuation
 from igrow_core.planner.plant_simulator import run
 from igrow_core.planner.policy import HOURS, PRESENT, observe
 from igrow_core.planner.template import Setpoints, for_site
@@ -31,6 +32,8 @@ from igrow_core.telemetry import Telemetry, to_grid
 
 Values = NDArray[np.float64]
 DAY = np.timedelta64(86_400, "s")
+BEFORE, AHEAD = 3, 3
+"""Days of weather before the first day, from which a forecast can be made, and beyond the last one."""
 
 
 @dataclass(frozen=True)
@@ -62,21 +65,21 @@ class World(Protocol):
         """Live through a day under setpoints (N, 24, 4), and return what it was worth, arrays (1, N)."""
 
 
-class DailyGreenhouses:
-    """A batch of greenhouses that live through `days` days, one action each day."""
+class Greenhouses:
+    """A batch of mechanistic greenhouses, each under weather of its own, led hour by hour."""
 
     def __init__(self, site: Site, scenario: Scenario, parameters: GreenhouseParameters | None = None) -> None:
         rng = np.random.default_rng(scenario.seed)
-        end = scenario.start + (scenario.days + 1) * DAY
-        self.weather = [
-            generate_weather(scenario.start, end, seed=int(rng.integers(2**31))) for _ in range(scenario.count)
-        ]
+        self.site, self.time = site, scenario.start
+        begin, end = scenario.start - BEFORE * DAY, scenario.start + (scenario.days + AHEAD) * DAY
+        self.weather = [generate_weather(begin, end, seed=int(rng.integers(2**31))) for _ in range(scenario.count)]
         self.weather *= scenario.copies
         base = parameters or GreenhouseParameters()
         varied = [base.varied(rng, relative=scenario.variation) for _ in range(scenario.count)]
         self.count = scenario.count * scenario.copies
-        self.site, self.scenario, self.day = site, scenario, 0
-        self._forecast = np.stack([hourly_weather(table, scenario.start, 24 * scenario.days) for table in self.weather])
+        self._start = scenario.start
+        hours = 24 * (scenario.days + AHEAD)
+        self._hourly = np.stack([hourly_weather(table, scenario.start, hours) for table in self.weather])
         self._plant = Plant(
             stack(varied * scenario.copies),
             WeatherTable(self.weather),
@@ -87,36 +90,52 @@ class DailyGreenhouses:
         )
         self._applied = np.full((self.count, 1, 4), np.nan)
 
-    @property
-    def time(self) -> np.datetime64:
-        """UTC start of the day that comes."""
-        return self.scenario.start + self.day * DAY
+    def measurements(self) -> dict[str, Values]:
+        """Return the present truth by quantity, (N,) each; actuators as means of the last hour."""
+        like = np.zeros(self.count)
+        return {name: like + value for name, value in self._plant.truth({}).items()}
+
+    def coming_weather(self, hours: int) -> Values:
+        """Return the weather that the next hours will bring, (N, hours, 6), up to `AHEAD` days beyond the end."""
+        first = int((self.time - self._start) // np.timedelta64(1, "h"))
+        return self._hourly[:, first : first + hours]
+
+    def applied(self) -> Values:
+        """Return the setpoints of the last hour, (N, 4), NaN before the first."""
+        return self._applied[:, 0]
+
+    def advance(self, setpoints: Setpoints) -> Outcome:
+        """Live through hours under setpoints (N, H, 4) within limits and slew; returns what happened, (1, N, H)."""
+        hours = setpoints.shape[1]
+        template = for_site(self.site, self.time, hours)
+        first = np.where(np.isnan(self._applied), setpoints[:, :1], self._applied)
+        limited = template.limit(np.concatenate([first, setpoints], axis=1), np.full(4, np.nan))[:, 1:]
+        self._applied = limited[:, -1:]
+        self.time = self.time + hours * np.timedelta64(3600, "s")
+        return run(self._plant, limited)
+
+
+class DailyGreenhouses:
+    """Mechanistic greenhouses that live through `days` days, one action each day."""
+
+    def __init__(self, site: Site, scenario: Scenario) -> None:
+        self._houses, self._days, self.day = Greenhouses(site, scenario), scenario.days, 0
 
     @property
     def done(self) -> bool:
         """All days are over."""
-        return self.day >= self.scenario.days
-
-    def forecast(self) -> Values:
-        """Return the weather of the day that comes, (N, 24, 6)."""
-        first = min(self.day, self.scenario.days - 1) * HOURS
-        return self._forecast[:, first : first + HOURS]
+        return self.day >= self._days
 
     def observe(self) -> NDArray[np.float32]:
         """Return the observations of the day that comes, (N, 76)."""
-        truth = self._plant.truth({})
-        like = np.zeros(self.count)
-        return observe(self.site, {name: like + truth[name] for name in PRESENT}, self.forecast(), self.time)
+        houses = self._houses
+        return observe(houses.site, houses.measurements(), houses.coming_weather(HOURS), houses.time)
 
     def step(self, setpoints: Setpoints) -> Valuation:
         """Live through a day under setpoints (N, 24, 4), and return what it was worth, arrays (1, N)."""
-        template = for_site(self.site, self.time, HOURS)
-        first = np.where(np.isnan(self._applied), setpoints[:, :1], self._applied)
-        limited = template.limit(np.concatenate([first, setpoints], axis=1), np.full(4, np.nan))[:, 1:]
-        self._applied = limited[:, -1:]
-        time = self.time + np.arange(HOURS) * np.timedelta64(3600, "s")
+        time = self._houses.time + np.arange(HOURS) * np.timedelta64(3600, "s")
         self.day += 1
-        return Objective(self.site, time).value(run(self._plant, limited))
+        return Objective(self._houses.site, time).value(self._houses.advance(setpoints))
 
 
 class SimulatedDays:

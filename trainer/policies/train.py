@@ -135,8 +135,11 @@ def run(arguments: argparse.Namespace) -> int:
     """Train and write the policy; returns the exit code."""
     torch.set_num_threads(1)
     plan = TrainingPlan(episodes=1000, seconds=60.0 * arguments.minutes)
-    simulator = BundleSimulator(read_bundle(arguments.bundle), members=1) if arguments.bundle else None
-    learner = train(load_site(arguments.site), plan, SacSettings(), arguments.seed, _say, simulator)
+    site = load_site(arguments.site)
+    simulator = None
+    if arguments.bundle:
+        simulator = BundleSimulator(read_bundle(arguments.bundle), site.greenhouse, members=1)
+    learner = train(site, plan, SacSettings(), arguments.seed, _say, simulator)
     arguments.out.write_bytes(export(learner.actor).SerializeToString())
     print(f"{arguments.out} written")
     return 0

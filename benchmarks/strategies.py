@@ -1,0 +1,273 @@
+"""Which strategy earns most: weeks in mechanistic greenhouses, led by what a bundle's simulator advises.
+
+    python -m benchmarks.strategies [--bundle FOLDER] [--policy NAME=policy.onnx ...] [--days 14] [--houses 4]
+
+Every strategy leads the same greenhouses (each differs from the described one, as one house from the next) under the
+same weather, in winter and in spring. None of them has seen greenhouse or weather; all of them plan with the bundle's
+simulator, which is not the greenhouse. For each the table tells what the simulator expected of the coming hours
+whenever setpoints were chosen, and what the greenhouse then obtained, by the same rules of value
+(`igrow_core.planner.objective`). The spread is over greenhouses and seasons, of the gain over the recipe.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.planner import SITE, recipe_table
+from edge.planning.forecast import persistence
+from igrow_core.bundle import read_bundle
+from igrow_core.economics import harvest_income, local_days
+from igrow_core.planner import Objective, Outcome, PlanningState, Simulator, optimise
+from igrow_core.planner.policy import OnnxPolicy
+from igrow_core.planner.template import for_site
+from igrow_core.quantities import SETPOINTS
+from igrow_core.simulator.plan import BundleSimulator
+from igrow_core.site import Site, load_site
+from igrow_core.sun import unix_seconds
+from igrow_core.telemetry import Telemetry
+from trainer.default_bundle import default_bundle_folder
+from trainer.policies.environment import DAY, Greenhouses, Scenario, hourly_weather
+
+Values = NDArray[np.float64]
+
+STARTS = ("2020-01-19T23:00:00", "2020-03-09T23:00:00", "2020-04-19T22:00:00")
+"""Local midnights at which the weeks begin: winter, early spring, spring."""
+SETTLING = 6
+"""Days under the recipe before them."""
+HORIZON = 24
+"""Hours that a strategy looks ahead."""
+FIRST_SEED = 500
+"""Of greenhouses and weather; policies are trained on seeds from a million on, templates on others below."""
+PARTS = ("income", "heat", "electricity", "co2", "upkeep")
+
+
+@dataclass(frozen=True)
+class Situation:
+    """What a strategy knows of one greenhouse when it chooses."""
+
+    time: np.datetime64
+    present: Mapping[str, float]
+    applied: Values
+    forecast: Values
+    """(HORIZON, 6)."""
+    recipe: Values
+    """(HORIZON, 4)."""
+    co2_before: float
+    """kg m-2 since the beginning."""
+    seed: int
+
+
+Strategy = Callable[[Situation], Values]
+"""Returns setpoints (HORIZON, 4)."""
+
+
+@dataclass
+class Book:
+    """What one strategy expected and obtained at each choice, EUR m-2, (houses,), by part of the balance."""
+
+    expected: dict[str, list[Values]] = field(default_factory=dict)
+    obtained: dict[str, list[Values]] = field(default_factory=dict)
+    harvest: list[Values] = field(default_factory=list)
+    seconds: float = 0.0
+
+
+def note(column: dict[str, list[Values]], site: Site, time: np.datetime64, outcome: Outcome, co2: Values) -> None:
+    """Book what an outcome (M, N, H) is worth, by parts, where the crops have had `co2` kg m-2 (N,) before."""
+    hours = time + np.arange(outcome.heat.shape[-1]) * np.timedelta64(3600, "s")
+    worth = Objective(site, hours, co2).value(outcome)
+    for name in PARTS:
+        column.setdefault(name, []).append(getattr(worth.balance, name).mean(axis=0))
+    column.setdefault("harm", []).append(worth.harm.mean(axis=0))
+    column.setdefault("profit", []).append(worth.profit.mean(axis=0))
+
+
+def first_hours(outcome: Outcome, hours: int) -> Outcome:
+    """Return the beginning of an outcome."""
+    return Outcome(**{one.name: getattr(outcome, one.name)[..., :hours] for one in fields(Outcome)})
+
+
+def beside(outcomes: Sequence[Outcome]) -> Outcome:
+    """Return outcomes of one candidate each as one of many."""
+    return Outcome(
+        **{one.name: np.concatenate([getattr(each, one.name) for each in outcomes], axis=1) for one in fields(Outcome)}
+    )
+
+
+def lead(
+    site: Site, scenario: Scenario, strategies: Mapping[str, Strategy], simulator: Simulator, every: int, forecast: str
+) -> dict[str, Book]:
+    """Lead copies of the same greenhouses by each strategy, which chooses anew every `every` hours."""
+    houses = Greenhouses(site, scenario)
+    for _ in range(SETTLING):
+        # A grown crop is set down in the greenhouse; it and the soil need days to fit each other.
+        houses.advance(np.repeat(recipe_table(site, houses.time, 24)[None], houses.count, axis=0))
+    books = {name: Book() for name in strategies}
+    co2 = np.zeros(houses.count)
+    for choice in range((scenario.days - SETTLING) * 24 // every):
+        begin = houses.time
+        present, applied = houses.measurements(), houses.applied()
+        recipe = recipe_table(site, begin, HORIZON)
+        coming = houses.coming_weather(HORIZON)
+        chosen, expected = [], []
+        for place, (name, strategy) in enumerate(strategies.items()):
+            for house in range(scenario.count):
+                row = place * scenario.count + house
+                if forecast == "persistence":
+                    weather = persistence(_past(houses.weather[house], begin), int(unix_seconds(begin)), HORIZON)
+                else:
+                    weather = coming[row]
+                now = {key: float(value[row]) for key, value in present.items()}
+                situation = Situation(begin, now, applied[row], weather, recipe, float(co2[row]), 1000 * choice + house)
+                began = time.monotonic()
+                setpoints = strategy(situation)
+                books[name].seconds += time.monotonic() - began
+                chosen.append(setpoints[:every])
+                expected.append(first_hours(simulator.simulate(now, weather, setpoints[None], begin), every))
+        outcome = houses.advance(np.stack(chosen))
+        for place, book in enumerate(books.values()):
+            part = slice(place * scenario.count, (place + 1) * scenario.count)
+            mine = Outcome(**{one.name: getattr(outcome, one.name)[:, part] for one in fields(Outcome)})
+            note(book.expected, site, begin, beside(expected[part]), co2[part])
+            note(book.obtained, site, begin, mine, co2[part])
+            hours = begin + np.arange(every) * np.timedelta64(3600, "s")
+            picked = mine.fruit_fresh_weight[0]
+            day = local_days(hours, site.time_zone)
+            income = harvest_income(site.prices, day, picked, 0.0 * picked, site.crop.brix)
+            book.harvest.append(income.sum(axis=-1))
+        co2 = co2 + outcome.co2[0].sum(axis=-1)
+        print(f"\r{begin} ", end="", file=sys.stderr, flush=True)
+    print(file=sys.stderr)
+    return books
+
+
+def _past(weather: Telemetry, now: np.datetime64) -> Telemetry:
+    return weather.select(now - 3 * DAY, now)
+
+
+def genetic(site: Site, simulator: Simulator, seeds: Callable[[Situation], list[Values]] = lambda _: []) -> Strategy:
+    """Return the elitist genetic algorithm on the bundle's simulator, as the daemon runs it."""
+
+    def choose(now: Situation) -> Values:
+        state = PlanningState(
+            now.time, now.present, dict(zip(SETPOINTS, now.applied, strict=True)), co2_before=now.co2_before
+        )
+        rng = np.random.default_rng(now.seed)
+        return optimise(simulator, site, state, now.forecast, now.recipe, rng, seeds=seeds(now)).setpoints
+
+    return choose
+
+
+def policy_strategy(site: Site, policy: OnnxPolicy) -> Strategy:
+    """Return the policy as a strategy."""
+    return lambda now: policy.plan(site, now.present, now.forecast, now.time)
+
+
+def best_template(site: Site, simulator: Simulator, count: int = 500) -> Strategy:
+    """Return the one day, of `count` random ones, that is worth most in the simulator over 12 days of other weather."""
+    rng = np.random.default_rng(1)
+    score = np.zeros(count)
+    genes: NDArray[np.float32] = np.zeros((0, 0), dtype=np.float32)
+    for number, begin in enumerate(STARTS):
+        start = np.datetime64(begin)
+        scenario = Scenario(start, 4, 1, seed=FIRST_SEED - 100 + number)
+        weather = Greenhouses(site, scenario).weather[0]
+        for day in range(scenario.days):
+            at = start + day * DAY
+            template = for_site(site, at, HORIZON)
+            if not genes.size:
+                genes = rng.random((count, template.genes), dtype=np.float32)
+            candidates = template.decode(genes, recipe_table(site, at, HORIZON), np.full(4, np.nan))
+            outcome = simulator.simulate({}, hourly_weather(weather, at, HORIZON), candidates, at)
+            hours = at + np.arange(HORIZON) * np.timedelta64(3600, "s")
+            score += Objective(site, hours).value(outcome).score.mean(axis=0)
+    best = genes[[int(score.argmax())]]
+    return lambda now: for_site(site, now.time, HORIZON).decode(best, now.recipe, np.full(4, np.nan))[0]
+
+
+def table(title: str, books: Mapping[str, Sequence[Book]], days: int) -> dict[str, dict[str, float]]:
+    """Print what each strategy expected and obtained in EUR m-2 a day, and return it."""
+    print(f"\n{title}: EUR m-2 a day")
+    heads = ("growth", "heat", "electr.", "CO2", "upkeep", "profit", "gain", "+-", "harm", "harvest", "s/plan")
+    print(f"{'':34s}" + "".join(f"{head:>9s}" for head in heads))
+    result = {}
+
+    def daily(lists: Sequence[Sequence[Values]]) -> Values:
+        """One value for each greenhouse and season."""
+        return np.concatenate([np.sum(one, axis=0) for one in lists]) / days
+
+    first = next(iter(books))
+    for name, each in books.items():
+        row = {}
+        for kind in ("expected", "obtained"):
+            parts = {part: daily([getattr(book, kind)[part] for book in each]) for part in (*PARTS, "profit", "harm")}
+            reference = daily([getattr(book, kind)["profit"] for book in books[first]])
+            gain = parts["profit"] - reference
+            error = gain.std(ddof=1) / np.sqrt(len(gain)) if len(gain) > 1 else float("nan")
+            cells = "".join(f"{parts[part].mean():9.4f}" for part in (*PARTS, "profit"))
+            cells += f"{gain.mean():+9.4f}{error:9.4f}{parts['harm'].mean():9.4f}"
+            if kind == "obtained":
+                costs = sum(parts[part] for part in PARTS if part != "income")
+                harvest = daily([book.harvest for book in each]) - costs
+                plans = sum(len(book.harvest) * book.harvest[0].size for book in each)
+                cells += f"{harvest.mean():9.4f}{sum(book.seconds for book in each) / plans:9.2f}"
+                row["harvest_less_costs"] = float(harvest.mean())
+            print(f"{name if kind == 'expected' else '':24s}{kind:10s}{cells}")
+            row |= {f"{kind}_{part}": float(values.mean()) for part, values in parts.items()}
+            row |= {f"{kind}_gain": float(gain.mean()), f"{kind}_gain_standard_error": float(error)}
+        result[name] = row
+    return result
+
+
+def main() -> int:
+    """Run and print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--bundle", type=Path, default=default_bundle_folder(), help="whose simulator plans")
+    parser.add_argument("--policy", action="append", default=[], metavar="NAME=FILE", help="a policy.onnx to compare")
+    parser.add_argument("--days", type=int, default=14)
+    parser.add_argument("--houses", type=int, default=4, help="greenhouses in each season")
+    parser.add_argument("--every", type=int, default=24, help="hours between choices (K1)")
+    parser.add_argument("--forecast", choices=("persistence", "true"), default="persistence", help="weather ahead")
+    parser.add_argument("--only", nargs="+", help="strategies to run beside the recipe")
+    parser.add_argument("--json", type=Path, help="file for the tables")
+    given = parser.parse_args()
+    site = load_site(SITE)
+    simulator = BundleSimulator(read_bundle(given.bundle), site.greenhouse)
+    strategies: dict[str, Strategy] = {
+        "recipe": lambda now: now.recipe,
+        "best of 500 fixed days": best_template(site, simulator),
+        "genetic algorithm": genetic(site, simulator),
+    }
+    for text in given.policy:
+        name, _, path = text.partition("=")
+        policy = OnnxPolicy(path)
+        strategies[name] = policy_strategy(site, policy)
+    if given.only:
+        strategies = {name: one for name, one in strategies.items() if name in ("recipe", *given.only)}
+    found: dict[str, list[Book]] = {name: [] for name in strategies}
+    result: dict[str, object] = {}
+    for number, start in enumerate(STARTS):
+        begin = np.datetime64(start) - SETTLING * DAY
+        days, copies = SETTLING + given.days, len(strategies)
+        scenario = Scenario(begin, days, given.houses, seed=FIRST_SEED + number, copies=copies)
+        books = lead(site, scenario, strategies, simulator, given.every, given.forecast)
+        for name, book in books.items():
+            found[name].append(book)
+        title = f"{given.days} days from {start[:10]}, {given.houses} greenhouses"
+        result[start] = table(title, {name: [book] for name, book in books.items()}, given.days)
+    result["all"] = table("all seasons", found, given.days)
+    if given.json is not None:
+        given.json.write_text(json.dumps(result, indent=1))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
