@@ -32,6 +32,8 @@ def describe(configuration: Configuration) -> Iterator[str]:
     yield f"site        {site.name} ({site.latitude:g}, {site.longitude:g}), {site.time_zone}"
     tested = "" if register_map.hardware_tested else "; never tested on hardware"
     yield f"registers   {register_map.title}: {len(register_map.points)} points{tested}"
+    for assumption in register_map.check_on_site:
+        yield f"  on site   {assumption}"
     for load in estimate(register_map):
         yield f"  bus       {load}"
     yield f"cycle       each {file.cycle.interval.total_seconds():g} s, clock: {file.cycle.clock.value}"

@@ -202,6 +202,7 @@ class MapFile:
     devices: Mapping[str, DeviceSettings] = setting(help="the Modbus units")
     points: Mapping[str, PointSettings] = setting(help="the values", keys=POINT_NAMES)
     hardware_tested: bool = setting(help="whether it was ever used with the real device", default=False)
+    check_on_site: tuple[str, ...] = setting(help="what the source does not state or the site decides", default=())
 
     def __post_init__(self) -> None:
         self._check_devices()
@@ -223,6 +224,7 @@ class MapFile:
             devices={name: _device(name, device) for name, device in self.devices.items()},
             points={name: point.point(name) for name, point in self.points.items()},
             hardware_tested=self.hardware_tested,
+            check_on_site=self.check_on_site,
             path=path,
         )
 

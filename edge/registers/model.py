@@ -218,6 +218,8 @@ class RegisterMap:
     devices: Mapping[str, Device]
     points: Mapping[str, Point]
     hardware_tested: bool = False
+    check_on_site: tuple[str, ...] = ()
+    """Assumptions that the source does not state, or that the site decides, one line each."""
     path: Path | None = field(default=None, compare=False)
 
     def bus_of(self, point: Point) -> BusSettings:

@@ -33,6 +33,14 @@ def test_every_map_that_we_ship_loads_names_its_source_and_claims_no_hardware_te
     assert all(load.acceptable for load in estimate(register_map))
 
 
+def test_every_template_for_real_equipment_says_what_to_check_on_site() -> None:
+    templates = [path for path in sorted(MAPS.glob("*.yaml")) if path.stem != "virtual-plc"]
+    assert len(templates) >= 4
+    for path in templates:
+        assert "Untested on hardware." in path.read_text()
+        assert load_register_map(path).check_on_site
+
+
 def test_the_virtual_plc_serves_every_quantity_and_every_setpoint_can_be_written() -> None:
     points = load_register_map(MAPS / "virtual-plc.yaml").points
     assert set(QUANTITIES) <= set(points)
