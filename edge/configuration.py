@@ -18,7 +18,9 @@ from zoneinfo import ZoneInfo
 
 from edge.guard import DEFAULT_INTERLOCKS, Bound, GuardRules, Interlock
 from edge.guard.interlocks import SAFE, InterlockError
-from edge.point_rules import point_rules
+from edge.guard.rules import GuardRuleError
+from edge.point_rules import point_rule
+from edge.registers.bus_load import estimate
 from edge.registers.loading import load_register_map
 from edge.registers.model import SYSTEM_POINTS, RegisterMap
 from edge.sensors.rules import SensorRule, default_rule
@@ -27,7 +29,7 @@ from igrow_core.errors import IgrowError
 from igrow_core.local_time import zone
 from igrow_core.quantities import ACTUATORS, QUANTITIES, SETPOINTS
 from igrow_core.site import SetpointLimits, Site, load_site
-from igrow_core.yaml_schema import SettingError, load, setting
+from igrow_core.yaml_schema import SettingError, duration, load, place, setting
 
 _SECOND = datetime.timedelta(seconds=1)
 _MINUTE = datetime.timedelta(minutes=1)
@@ -269,6 +271,9 @@ def load_configuration(path: str | os.PathLike[str]) -> Configuration:
     """
     path = Path(path)
     file = load(path, DaemonFile)
+    for key, name in (("site", file.site), ("register_map", file.register_map)):
+        if not (path.parent / name).is_file():
+            raise ConfigurationError(f"{place(path, key)}: there is no file {path.parent / name}: name one that is there")
     site = load_site(path.parent / file.site)
     register_map = load_register_map(path.parent / file.register_map)
     return put_together(path, file, site, register_map)
@@ -276,25 +281,30 @@ def load_configuration(path: str | os.PathLike[str]) -> Configuration:
 
 def put_together(path: Path, file: DaemonFile, site: Site, register_map: RegisterMap) -> Configuration:
     """Check the parts against each other. Raises ConfigurationError."""
-    points = register_map.points
+    points, site_file = register_map.points, path.parent / file.site
     setpoints = tuple(name for name in SETPOINTS if name in points and points[name].writable)
     missing = [name for name in site.setpoints if name not in setpoints]
     if missing:
         raise ConfigurationError(
-            f"{register_map.path or register_map.title}: the site commands {', '.join(missing)}, which this map has no "
-            "writable point for; add the point, or take it out of `setpoints` in the site's file"
+            f"{place(site_file, 'setpoints')}: the site commands {', '.join(missing)}, which the register map has no "
+            "writable point for: add the point there, or list in `setpoints` only what it can write"
         )
-    clock = file.cycle.clock
-    needed = () if clock is ClockSource.SYSTEM else ("plc_clock",)
-    for name in (*needed, "heartbeat") if clock is ClockSource.LOCKSTEP else needed:
-        if name not in points:
-            raise ConfigurationError(f"{path}: `clock: {clock.value}` needs the point {name} in the register map")
+    _check_clock(path, file.cycle, register_map)
     setpoints = tuple(name for name in setpoints if name in site.setpoints)
     for name in file.guard.points:
         if name not in points or not points[name].writable:
-            raise ConfigurationError(f"{path}: guard.points has {name}, which the register map cannot write")
-    limits = {name: site.limits[name] for name in setpoints} | dict(file.guard.points)
-    rules = point_rules(limits, points, file.guard.non_volatile_daily_budget)
+            raise ConfigurationError(
+                f"{place(path, 'guard', 'points', name)}: the register map cannot write {name}: "
+                "give its point `writable: true`, or leave it out here"
+            )
+    rules = {}
+    for name in (*setpoints, *file.guard.points):
+        limits = file.guard.points.get(name) or site.limits[name]
+        where = (path, "guard", "points", name) if name in file.guard.points else (site_file, "limits", name)
+        try:
+            rules[name] = point_rule(limits, points[name], file.guard.non_volatile_daily_budget)
+        except GuardRuleError as error:
+            raise ConfigurationError(f"{place(*where)}: {error}") from None
     settings = file.guard.interlocks
     interlocks = DEFAULT_INTERLOCKS if settings is None else tuple(entry.interlock() for entry in settings)
     return Configuration(
@@ -306,6 +316,26 @@ def put_together(path: Path, file: DaemonFile, site: Site, register_map: Registe
         sensor_rules=sensor_rules(register_map, file),
         setpoints=setpoints,
     )
+
+
+def _check_clock(path: Path, cycle: CycleSettings, register_map: RegisterMap) -> None:
+    """Raise ConfigurationError for a pace that the registers or the buses cannot keep."""
+    clock = cycle.clock
+    needed = () if clock is ClockSource.SYSTEM else ("plc_clock",)
+    for name in (*needed, "heartbeat") if clock is ClockSource.LOCKSTEP else needed:
+        if name not in register_map.points:
+            raise ConfigurationError(
+                f"{place(path, 'cycle', 'clock')}: `clock: {clock.value}` needs the point {name} in the register map: "
+                "add it there, or follow the `system` clock"
+            )
+    if clock is not ClockSource.SYSTEM:
+        return
+    for load_of_bus in estimate(register_map, cycle=cycle.interval.total_seconds()):
+        if not load_of_bus.acceptable:
+            raise ConfigurationError(
+                f"{place(path, 'cycle', 'interval')}: with a cycle each {duration(cycle.interval)} {load_of_bus}: "
+                "a longer interval, or `poll` periods for points that change slowly"
+            )
 
 
 def sensor_rules(register_map: RegisterMap, file: DaemonFile) -> dict[str, SensorRule]:

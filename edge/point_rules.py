@@ -6,8 +6,6 @@ exactly; between two such values rounding stays between them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from edge.guard.rules import GuardRuleError, PointRule
 from edge.registers.codec import decode, encode
 from edge.registers.model import DataType, Point
@@ -16,14 +14,8 @@ from igrow_core.site import SetpointLimits
 _FLOATS = (DataType.FLOAT32, DataType.FLOAT64)
 
 
-def point_rules(
-    limits: Mapping[str, SetpointLimits], points: Mapping[str, Point], daily_budget: int
-) -> dict[str, PointRule]:
-    """Return the guard's rule of each point in `limits`; raises GuardRuleError for limits that leave nothing."""
-    return {name: _rule(limit, points[name], daily_budget) for name, limit in limits.items()}
-
-
-def _rule(limit: SetpointLimits, point: Point, daily_budget: int) -> PointRule:
+def point_rule(limit: SetpointLimits, point: Point, daily_budget: int) -> PointRule:
+    """Return the guard's rule of a point; raises GuardRuleError for limits that leave nothing of its register."""
     low = _representable(point, max(limit.low, point.low), upward=True)
     high = _representable(point, min(limit.high, point.high), upward=False)
     if not low <= high:

@@ -110,6 +110,21 @@ def parse(text: str, schema: type[T], name: str = "text") -> T:
     return value
 
 
+def place(path: str | os.PathLike[str], *keys: str | int) -> str:
+    """Return `file:line:column` of what `keys` lead to, or of the last one on the way that the file has.
+
+    For a fault that shows only when several files are put together. A file that cannot be read is its own place.
+    """
+    try:
+        node = yaml.compose(Path(path).read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
+    except (OSError, UnicodeDecodeError, yaml.YAMLError):
+        node = None
+    if node is None:
+        return str(path)
+    mark = _find(node, keys).start_mark
+    return f"{path}:{mark.line + 1}:{mark.column + 1}"
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """Return `did you mean X?` for a misspelt name, or the list of what is known."""
     choices = list(known)

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Iterator
 
 from edge.cli.common import add_configuration, configuration_of
-from edge.configuration import STATUS_PORT, Configuration
+from edge.configuration import STATUS_PORT, ClockSource, Configuration
 from edge.registers.bus_load import estimate
 from edge.registers.model import SYSTEM_POINTS
 
@@ -28,15 +28,17 @@ def run(options: argparse.Namespace) -> int:
 def describe(configuration: Configuration) -> Iterator[str]:
     """Yield what the configuration means, for people."""
     site, register_map, file = configuration.site, configuration.register_map, configuration.file
+    interval = file.cycle.interval.total_seconds()
     yield f"{configuration.path}: correct"
     yield f"site        {site.name} ({site.latitude:g}, {site.longitude:g}), {site.time_zone}"
     tested = "" if register_map.hardware_tested else "; never tested on hardware"
     yield f"registers   {register_map.title}: {len(register_map.points)} points{tested}"
     for assumption in register_map.check_on_site:
         yield f"  on site   {assumption}"
-    for load in estimate(register_map):
+    simulated = file.cycle.clock is not ClockSource.SYSTEM
+    for load in estimate(register_map) if simulated else estimate(register_map, cycle=interval):
         yield f"  bus       {load}"
-    yield f"cycle       each {file.cycle.interval.total_seconds():g} s, clock: {file.cycle.clock.value}"
+    yield f"cycle       each {interval:g} s, clock: {file.cycle.clock.value}"
     for name, rule in configuration.guard_rules.points.items():
         parts = [f"{rule.low:g} to {rule.high:g}", f"safe {rule.safe:g}"]
         if rule.slew is not None:

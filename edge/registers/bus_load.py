@@ -12,7 +12,7 @@ HIGHEST_LOAD = 0.5
 """Share of the time above which a bus has no room left for retries, writes and a slow device."""
 
 EVERY_CYCLE = 5.0
-"""Seconds assumed between two reads of a point without a poll period of its own."""
+"""Seconds between two cycles where nobody says: a map alone does not know them."""
 
 TURNAROUND = 0.005
 """Seconds that a device is assumed to think before it answers."""
@@ -60,13 +60,16 @@ def read_time(bus: BusSettings, device: Device, block: Block) -> float:
     return transaction_time(bus, device, 8, 5 + data)
 
 
-def estimate(register_map: RegisterMap) -> tuple[BusLoad, ...]:
-    """Return the load of every bus of the map, reads by their poll periods and the heartbeat's writes."""
+def estimate(register_map: RegisterMap, *, cycle: float | None = None) -> tuple[BusLoad, ...]:
+    """Return the load of every bus of the map, reads by their poll periods and the heartbeat's writes.
+
+    `cycle` is the time in seconds between two control cycles; nothing is read more often.
+    """
     busy: dict[str, float] = defaultdict(float)
     rate: dict[str, float] = defaultdict(float)
     by_period: dict[float, list[Point]] = defaultdict(list)
     for point in register_map.points.values():
-        by_period[point.poll or EVERY_CYCLE].append(point)
+        by_period[point.poll or EVERY_CYCLE if cycle is None else max(point.poll, cycle)].append(point)
     for period, points in by_period.items():
         for block in plan_reads(points, register_map.devices):
             device = register_map.devices[block.device]

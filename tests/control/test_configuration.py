@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from edge.configuration import ConfigurationError, DaemonFile, load_configuration
 from edge.guard.rules import GuardRuleError
-from edge.point_rules import point_rules
+from edge.point_rules import point_rule
 from edge.registers.codec import decode, encode
 from edge.registers.loading import parse_register_map
 from edge.registers.model import DataType, Function, Point
@@ -44,7 +44,7 @@ def test_the_annotated_file_loads_and_shows_the_defaults():
         ("interval: 5 min", "interval: 1 h", "daemon.yaml:6:19: cycle.interval"),
         ("clock: lockstep", "clock: plcc", "daemon.yaml:6:33: cycle.clock"),
         ("value: 700}", "value: 70000}", "co2_setpoint is 70000: 300 to 2000 ppm makes sense"),
-        ("site: site.yaml", "site: sight.yaml", "sight.yaml"),
+        ("site: site.yaml", "site: sight.yaml", "daemon.yaml:2:7: there is no file"),
     ],
 )
 def test_an_error_is_one_line_with_its_place(tmp_path, old, new, message):
@@ -57,14 +57,35 @@ def test_a_setpoint_that_the_map_cannot_write_is_named(tmp_path):
     path = write_files(tmp_path, 5020)
     site = tmp_path / "site.yaml"
     site.write_text(site.read_text().replace("[heating_setpoint, co2_setpoint]", "[heating_setpoint, lamp_on]"))
-    with pytest.raises(ConfigurationError, match="lamp_on, which this map has no"):
+    with pytest.raises(ConfigurationError, match=r"site\.yaml:5:12: .* lamp_on, which the register map has no"):
         load_configuration(path)
 
 
 def test_lockstep_needs_a_clock_and_a_heartbeat(tmp_path):
     without = "\n".join(line for line in MAP.splitlines() if "heartbeat" not in line)
-    with pytest.raises(ConfigurationError, match="needs the point heartbeat"):
+    with pytest.raises(ConfigurationError, match=r"daemon\.yaml:6:33: .* needs the point heartbeat"):
         load_configuration(write_files(tmp_path, 5020, map_text=without))
+
+
+def test_limits_that_do_not_fit_the_register_are_refused_where_they_stand(tmp_path):
+    narrow = MAP.replace("type: uint16, unit: ppm", "type: uint16, low: 1500, high: 2000, unit: ppm")
+    with pytest.raises(ConfigurationError, match=r"site\.yaml:7:17: co2_setpoint: limits 400 to 1000 leave nothing"):
+        load_configuration(write_files(tmp_path, 5020, map_text=narrow))
+
+
+def test_limits_of_a_point_that_cannot_be_written_are_refused_where_they_stand(tmp_path):
+    path = write_files(tmp_path, 5020)
+    path.write_text(path.read_text() + "guard:\n  points:\n    vent_lee: {low: 0, high: 100, safe: 0}\n")
+    with pytest.raises(ConfigurationError, match=r"daemon\.yaml:12:15: the register map cannot write vent_lee"):
+        load_configuration(path)
+
+
+def test_a_cycle_too_fast_for_a_serial_line_is_refused_with_the_numbers(tmp_path):
+    line = "{{transport: rtu, serial_port: /dev/ttyUSB0, baudrate: 1200, timeout: 0.5 s}}"
+    slow = MAP.replace("{{transport: tcp, host: 127.0.0.1, port: {port}, timeout: 0.5 s}}", line)
+    with pytest.raises(ConfigurationError, match=r"daemon\.yaml:6:19: with a cycle each 1 s bus line is busy \d+ %"):
+        load_configuration(write_files(tmp_path, 5020, map_text=slow, clock="system", interval="1 s"))
+    load_configuration(write_files(tmp_path, 5020, map_text=slow, clock="system", interval="10 s"))
 
 
 INTERLOCK = """
@@ -104,10 +125,10 @@ def test_a_register_that_wears_out_gets_the_daily_budget(tmp_path):
 
 
 def test_limits_that_leave_nothing_of_the_register_are_refused():
-    limits = {"co2_setpoint": SetpointLimits(low=400.0, high=1000.0, safe=400.0)}
+    limits = SetpointLimits(low=400.0, high=1000.0, safe=400.0)
     text = MAP.format(port=1).replace("type: uint16, unit: ppm", "type: uint16, low: 1500, high: 2000, unit: ppm")
     with pytest.raises(GuardRuleError, match="leave nothing"):
-        point_rules(limits, parse_register_map(text).points, 48)
+        point_rule(limits, parse_register_map(text).points["co2_setpoint"], 48)
 
 
 @given(
@@ -124,8 +145,7 @@ def test_no_rounding_of_a_register_ever_leaves_the_limits(low, width, kind, frac
     point = Point(
         "heating_setpoint", "plc", Function.HOLDING, 0, data_type, scale=scale, low=5.0, high=40.0, writable=True
     )
-    limits = {"heating_setpoint": SetpointLimits(low=low, high=high, safe=0.5 * (low + high))}
-    rule = point_rules(limits, {"heating_setpoint": point}, 48)["heating_setpoint"]
+    rule = point_rule(SetpointLimits(low=low, high=high, safe=0.5 * (low + high)), point, 48)
     value = rule.low + fraction * (rule.high - rule.low)
     for asked in (rule.low, value, rule.high):
         shown = decode(point, encode(point, asked))
