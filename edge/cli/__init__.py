@@ -35,8 +35,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         prog="igrow-edge",
         description="Run a greenhouse through the Modbus registers of its PLC.",
         epilog="igrow-edge COMMAND --help explains a command, with an example.",
+        formatter_class=lambda prog: argparse.HelpFormatter(prog, max_help_position=20, width=110),
     )
-    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    commands = parser.add_subparsers(title="commands", dest="command", metavar="COMMAND", required=True)
     wanted = next((word for word in given if not word.startswith("-")), None)
     for name, (module_name, summary) in COMMANDS.items():
         command = commands.add_parser(

@@ -37,7 +37,7 @@ def describe(configuration: Configuration) -> Iterator[str]:
         yield f"  on site   {assumption}"
     simulated = file.cycle.clock is not ClockSource.SYSTEM
     for load in estimate(register_map) if simulated else estimate(register_map, cycle=interval):
-        yield f"  bus       {load}"
+        yield f"  {load}"
     yield f"cycle       each {interval:g} s, clock: {file.cycle.clock.value}"
     for name, rule in configuration.guard_rules.points.items():
         parts = [f"{rule.low:g} to {rule.high:g}", f"safe {rule.safe:g}"]
@@ -49,10 +49,14 @@ def describe(configuration: Configuration) -> Iterator[str]:
             parts.append(f"{rule.daily_budget} writes a day")
         yield f"  writes    {name}: {', '.join(parts)}"
     for interlock in configuration.guard_rules.interlocks:
-        at_work = interlock.quantity in register_map.points
-        points = [name for name in interlock.bounds if name in configuration.guard_rules.points]
-        state = "" if at_work and points else " (not at work: this map lacks what it watches or moves)"
-        yield f"  interlock {interlock.name}: {interlock.quantity} moves {', '.join(points) or 'nothing'}{state}"
+        moved = [name for name in interlock.bounds if name in configuration.guard_rules.points]
+        if interlock.quantity not in register_map.points:
+            text = f"NOT AT WORK, as the register map has no {interlock.quantity}"
+        elif not moved:
+            text = f"NOT AT WORK, as nothing that it moves can be written ({', '.join(interlock.bounds)})"
+        else:
+            text = f"{interlock.quantity} moves {', '.join(moved)}"
+        yield f"  interlock {interlock.name}: {text}"
     for name in SYSTEM_POINTS:
         if name in ("heartbeat", "plc_fallback") and name not in register_map.points:
             yield f"  note      no point {name}: see docs/commissioning.md for why the PLC should have it"

@@ -22,16 +22,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     line.add_argument("--serial", metavar="PORT", help="a serial port, such as /dev/ttyUSB0")
     line.add_argument("--map", metavar="FILE", help="the buses of a register map")
     parser.add_argument("--bus", help="which bus of the map (default: its first)")
-    parser.add_argument("--baudrate", type=int, default=19200)
-    parser.add_argument("--parity", choices=[parity.value for parity in Parity], default="even")
+    parser.add_argument("--baudrate", type=int, default=19200, help="of a serial line (default: 19200)")
+    parser.add_argument(
+        "--parity", choices=[parity.value for parity in Parity], default="even", help="of a serial line (default: even)"
+    )
+    parser.add_argument("--stop-bits", type=int, choices=(1, 2), default=1, help="of a serial line (default: 1)")
     parser.add_argument("--timeout", type=float, default=1.0, help="seconds to wait for an answer")
     parser.add_argument("--scan", action="store_true", help="only say which units answer")
     parser.add_argument(
         "--units", default=None, help="unit numbers, such as 1 or 1,4 or 1-16 (default: 1; scan: 1-247)"
     )
-    parser.add_argument("--function", choices=[function.value for function in Function], default="holding")
-    parser.add_argument("--first", type=int, default=0, help="first address, counted from 0")
-    parser.add_argument("--count", type=int, default=16, help="how many addresses")
+    parser.add_argument(
+        "--function", choices=[function.value for function in Function], default="holding", help="(default: holding)"
+    )
+    parser.add_argument("--first", type=int, default=0, help="first address, counted from 0 (default: 0)")
+    parser.add_argument("--count", type=int, default=16, help="how many addresses (default: 16)")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -58,7 +63,7 @@ def _settings(options: argparse.Namespace) -> BusSettings:
     if options.serial:
         return BusSettings(
             "probe", Transport.RTU, serial_port=options.serial, baudrate=options.baudrate,
-            parity=Parity(options.parity), gap=0.03,
+            parity=Parity(options.parity), stop_bits=options.stop_bits, gap=0.03,
         )  # fmt: skip
     host, port = _host_and_port(options.tcp or options.rtu_over_tcp)
     transport = Transport.TCP if options.tcp else Transport.RTU_OVER_TCP

@@ -36,12 +36,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--port", type=int, default=None, help="TCP port (default: the map's; 0 takes a free one)")
     parser.add_argument("--rtu", action="store_true", help="RTU frames inside TCP")
     parser.add_argument("--serial", help="answer on a serial port instead of TCP")
-    parser.add_argument("--baudrate", type=int, default=19200)
-    parser.add_argument("--parity", choices=[parity.value for parity in Parity], default="even")
-    parser.add_argument("--pace", default="realtime", help="realtime, speed=N, lockstep or lockstep=SECONDS")
+    parser.add_argument("--baudrate", type=int, default=19200, help="of the serial port (default: 19200)")
+    parser.add_argument(
+        "--parity",
+        choices=[parity.value for parity in Parity],
+        default="even",
+        help="of the serial port (default: even)",
+    )
+    parser.add_argument(
+        "--pace", default="realtime", help="realtime, speed=N, lockstep or lockstep=SECONDS (default: realtime)"
+    )
     parser.add_argument("--weather", type=Path, help="telemetry file with measured weather (default: generated)")
     parser.add_argument("--start", default=None, help="UTC time (default: the weather file's first, or 2020-01-15)")
-    parser.add_argument("--days", type=float, default=365.0, help="how much weather to generate")
+    parser.add_argument("--days", type=float, default=365.0, help="how much weather to generate (default: 365)")
     parser.add_argument("--seed", type=int, default=1, help="of weather, disturbances and sensor noise")
     parser.add_argument(
         "--spread", type=float, default=0.0, help="how far the plant's parameters lie from the site's, relative"

@@ -60,7 +60,7 @@ def test_check_config_says_what_a_configuration_means(tmp_path, capsys):
     assert code == 0
     assert "heating_setpoint: 12 to 28, safe 18, 4 per hour" in out
     assert re.search(r"bus line is busy \d+ % of the time", out)
-    assert "interlock wind: wind_speed moves nothing (not at work" in out
+    assert "interlock wind: NOT AT WORK, as nothing that it moves can be written (vent_" in out
 
 
 def test_an_override_is_left_for_the_daemon_and_given_back(tmp_path, capsys):
