@@ -91,7 +91,7 @@ class Commissioning:
             await plc.close()
         for line in self._wrong:
             tell(f"NOT PASSED  {line}")
-        tell("all checks were passed" if not self._wrong else f"{len(self._wrong)} checks were not passed")
+        tell("all checks were passed" if not self._wrong else f"checks not passed: {len(self._wrong)}")
         return not self._wrong
 
     async def _line_is_up(self, plc: RegisterPlc) -> bool:

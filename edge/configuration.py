@@ -273,7 +273,9 @@ def load_configuration(path: str | os.PathLike[str]) -> Configuration:
     file = load(path, DaemonFile)
     for key, name in (("site", file.site), ("register_map", file.register_map)):
         if not (path.parent / name).is_file():
-            raise ConfigurationError(f"{place(path, key)}: there is no file {path.parent / name}: name one that is there")
+            raise ConfigurationError(
+                f"{place(path, key)}: there is no file {path.parent / name}: name one that is there"
+            )
     site = load_site(path.parent / file.site)
     register_map = load_register_map(path.parent / file.register_map)
     return put_together(path, file, site, register_map)

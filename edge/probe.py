@@ -85,15 +85,21 @@ def decoded(content: dict[int, int], function: Function) -> Iterator[str]:
                 continue
             orders = _TURNED if width == 1 else tuple(ByteOrder)
             for data_type in types:
-                values = [f"{order.value} {decode_raw(words, data_type, order):.7g}" for order in orders]
+                values = [f"{order.value} {_number(decode_raw(words, data_type, order))}" for order in orders]
                 yield f"         {data_type.value:<8} {'  '.join(values)}"
+
+
+def _number(value: int | float) -> str:
+    """Return an integer with all its digits, and a float with those that a float32 has."""
+    return str(value) if isinstance(value, int) else f"{value:.7g}"
 
 
 async def scan(settings: BusSettings, device_ids: Sequence[int] = range(1, 248)) -> list[str]:
     """Return one line for every unit that answers at all, be it with a refusal. One timeout for each that does not."""
     bus = ModbusBus(settings, rest_step=0.0)
     bus.start()
-    lines = []
+    lines: list[str] = []
+    problem = ""
     try:
         for device_id in device_ids:
             try:
@@ -101,8 +107,9 @@ async def scan(settings: BusSettings, device_ids: Sequence[int] = range(1, 248))
                 lines.append(f"unit {device_id}: answers")
             except RefusedError as error:
                 lines.append(f"unit {device_id}: is there ({error})")
-            except BusError:
+            except BusError as error:
+                problem = f", at last: {error}"
                 await asyncio.sleep(0)
-        return lines or ["no unit answers"]
+        return lines or [f"no unit answers{problem}"]
     finally:
         await bus.close()

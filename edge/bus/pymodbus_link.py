@@ -9,6 +9,8 @@ after the fifth timeout of one. A link carries one exchange at a time; who sees 
 from __future__ import annotations
 
 import asyncio
+import errno
+import os
 import ssl
 from collections.abc import Callable
 from typing import cast
@@ -111,8 +113,7 @@ class PymodbusLink(asyncio.Protocol):
                         lambda: self, settings.host, settings.port, ssl=tls, server_hostname=name
                     )
         except (OSError, TimeoutError, ValueError) as error:
-            reason = str(error) or f"no connection within {settings.timeout:g} s"
-            raise NotConnectedError(f"bus {settings.name}: {reason}") from error
+            raise NotConnectedError(f"bus {settings.name}: {self._reason(error)}") from error
 
     def close(self) -> None:
         """Drop the line; an exchange in progress fails with ConnectionLostError."""
@@ -161,6 +162,23 @@ class PymodbusLink(asyncio.Protocol):
             await asyncio.sleep(quiet_at - now)
             now = self._loop.time()
         self._received = b""
+
+    def _reason(self, error: Exception) -> str:
+        """Return why the line could not be opened, for people."""
+        settings = self._settings
+        if isinstance(error, TimeoutError):
+            return f"no connection to {self._where} within {settings.timeout:g} s"
+        if isinstance(error, OSError) and error.strerror:
+            # What asyncio and pyserial add is for programmers. A name that is not found has a number of its own.
+            number = error.errno or 0
+            words = os.strerror(number) if number in errno.errorcode else error.strerror
+            return f"no connection to {self._where}: {words}"
+        return str(error)
+
+    @property
+    def _where(self) -> str:
+        settings = self._settings
+        return settings.serial_port or f"{settings.host}:{settings.port}"
 
     async def _exchange(self, pdu: ModbusPDU, what: object) -> ModbusPDU:
         transport = self._transport

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import os
 import sys
 from collections.abc import Sequence
 
@@ -35,7 +36,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         prog="igrow-edge",
         description="Run a greenhouse through the Modbus registers of its PLC.",
         epilog="igrow-edge COMMAND --help explains a command, with an example.",
-        formatter_class=lambda prog: argparse.HelpFormatter(prog, max_help_position=20, width=110),
     )
     commands = parser.add_subparsers(title="commands", dest="command", metavar="COMMAND", required=True)
     wanted = next((word for word in given if not word.startswith("-")), None)
@@ -57,6 +57,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except IgrowError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
+    except BrokenPipeError:
+        # Whoever read our output (`head`, a pager) has enough; the interpreter's last flush must not complain either.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
     except OSError as error:
         place = f"{error.filename}: " if error.filename else ""
         print(f"error: {place}{error.strerror or error}", file=sys.stderr)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from datetime import timedelta
 from pathlib import Path
 
 from edge.cli.common import configuration_of, parse_duration, parse_setpoint
 from edge.sources.override import Lease, read_leases, write_leases
 from edge.wiring import override_file
 from igrow_core.errors import IgrowError
+from igrow_core.yaml_schema import duration
 
 EXAMPLE = 'igrow-edge override /etc/igrow/daemon.yaml heating_setpoint=18 --for "2 h"'
 
@@ -42,7 +44,7 @@ def run(options: argparse.Namespace) -> int:
     if problem:
         raise IgrowError(problem)
     for name, lease in leases.items():
-        print(f"{name} = {lease.value:g} for {lease.seconds / 60:.0f} min")
+        print(f"{name} = {lease.value:g} for {duration(timedelta(seconds=round(lease.seconds)))}")
     if not leases:
         print("nothing is overridden")
     return 0

@@ -62,12 +62,12 @@ def _settings(options: argparse.Namespace) -> BusSettings:
         return buses[name]
     if options.serial:
         return BusSettings(
-            "probe", Transport.RTU, serial_port=options.serial, baudrate=options.baudrate,
+            options.serial, Transport.RTU, serial_port=options.serial, baudrate=options.baudrate,
             parity=Parity(options.parity), stop_bits=options.stop_bits, gap=0.03,
         )  # fmt: skip
     host, port = _host_and_port(options.tcp or options.rtu_over_tcp)
     transport = Transport.TCP if options.tcp else Transport.RTU_OVER_TCP
-    return BusSettings("probe", transport, host=host, port=port, baudrate=options.baudrate)
+    return BusSettings(f"{host}:{port}", transport, host=host, port=port, baudrate=options.baudrate)
 
 
 def _host_and_port(text: str) -> tuple[str, int]:

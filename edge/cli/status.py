@@ -72,17 +72,16 @@ def lines(state: Mapping[str, Any]) -> Iterator[str]:
     yield f"{state['site']}: {when}, cycle {state['cycle']}, {link}"
     yield f"decides  {state['source']}: {state['why']}"
     for name, setpoint in state["setpoints"].items():
-        unit = QUANTITIES[name].unit if name in QUANTITIES else ""
         held = "; changed by hand, respected" if setpoint["held_until"] is not None else ""
         yield (
             f"  {name:<18} asked {_number(setpoint['requested'])}, written {_number(setpoint['applied'])}, "
-            f"PLC shows {_number(setpoint['shown'])} {unit} ({setpoint['source'] or 'nobody'}{held})"
+            f"PLC shows {_number(setpoint['shown'])}{_unit(name)} ({setpoint['source'] or 'nobody'}{held})"
         )
     yield "measured"
     for name, value in state["values"].items():
         if name in QUANTITIES and name not in state["setpoints"]:
             note = "" if value["quality"] == "good" else f"  {value['quality']}: {value['why']}"
-            yield f"  {name:<22} {_number(value['value']):>8} {QUANTITIES[name].unit}{note}"
+            yield f"  {name:<22} {_number(value['value']):>8}{_unit(name)}{note}"
     plan = state.get("plan")
     if plan:
         expected, recipe = plan["expected_profit"], plan["recipe_profit"]
@@ -94,12 +93,18 @@ def lines(state: Mapping[str, Any]) -> Iterator[str]:
     for problem in state["problems"]:
         yield f"problem  {problem}"
     for clamp in list(state["clamps"])[:5]:
-        asked, applied = _number(clamp["requested"]), _number(clamp["applied"])
-        yield f"clamp    {clamp['point']}: {asked} -> {applied}, {clamp['reason']}"
+        applied = "nothing" if clamp["applied"] is None else _number(clamp["applied"])
+        yield f"clamp    {clamp['point']}: asked {_number(clamp['requested'])}, applied {applied}: {clamp['reason']}"
 
 
 def _number(value: float | None) -> str:
     return "-" if value is None else f"{value:.4g}"
+
+
+def _unit(name: str) -> str:
+    """Return the unit with a blank before it; nothing for a bare number."""
+    unit = QUANTITIES[name].unit if name in QUANTITIES else "1"
+    return "" if unit == "1" else f" {unit}"
 
 
 def _date(seconds: float) -> str:

@@ -166,6 +166,21 @@ async def test_probe_shows_raw_and_decoded_values(tmp_path, capsys):
     assert "0x4188" in out
 
 
+@pytest.mark.parametrize(
+    ("where", "reason"),
+    [
+        (["--tcp", "127.0.0.1:9"], "no connection to 127.0.0.1:9: Connection refused"),
+        (["--tcp", "nohost.invalid"], "no connection to nohost.invalid:502: "),
+        (["--serial", "/dev/ttyNone"], "no connection to /dev/ttyNone: No such file or directory"),
+    ],
+)
+def test_probe_says_why_a_line_cannot_be_opened(capsys, caplog, where, reason):
+    code, out, _ = call(capsys, "probe", *where, "--timeout", "5")
+    assert code == 0
+    assert out.endswith("not connected\n")
+    assert reason in caplog.text
+
+
 def test_simulate_plc_serves_what_mean_commands_ask_for(tmp_path):
     write_files(tmp_path, 0)
     (tmp_path / "map.yaml").write_text((tmp_path / "map.yaml").read_text().replace("port: 0", "port: 1"))

@@ -24,6 +24,11 @@ def against(*units: CodedUnit, first: int = 0, count: int = 4) -> list[str]:
     return run(main())
 
 
+def test_whole_numbers_are_shown_with_all_their_digits() -> None:
+    words = encode_raw(1_304_186_123, DataType.INT32)
+    assert any("int32    ABCD 1304186123 " in line for line in decoded(dict(enumerate(words)), Function.HOLDING))
+
+
 def test_a_value_is_shown_in_the_byte_order_in_which_it_was_written() -> None:
     for order in ByteOrder:
         words = encode_raw(23.5, DataType.FLOAT32, order)
