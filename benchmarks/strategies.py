@@ -15,7 +15,8 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 
@@ -24,10 +25,12 @@ from numpy.typing import NDArray
 
 from benchmarks.planner import SITE, recipe_table
 from edge.planning.forecast import persistence
+from edge.planning.make_plan import RECENT_DAYS
 from igrow_core.bundle import read_bundle
 from igrow_core.economics import harvest_income, local_days
 from igrow_core.planner import Objective, Outcome, PlanningState, Simulator, optimise
 from igrow_core.planner.policy import OnnxPolicy
+from igrow_core.planner.recent_use import SCALED, Scaled, factors, totals
 from igrow_core.planner.template import for_site
 from igrow_core.quantities import SETPOINTS
 from igrow_core.simulator.plan import BundleSimulator
@@ -63,6 +66,8 @@ class Situation:
     """(HORIZON, 4)."""
     co2_before: float
     """kg m-2 since the beginning."""
+    simulator: Simulator
+    """Corrected by what the last days used and grew."""
     seed: int
 
 
@@ -103,7 +108,13 @@ def beside(outcomes: Sequence[Outcome]) -> Outcome:
 
 
 def lead(
-    site: Site, scenario: Scenario, strategies: Mapping[str, Strategy], simulator: Simulator, every: int, forecast: str
+    site: Site,
+    scenario: Scenario,
+    strategies: Mapping[str, Strategy],
+    simulator: Simulator,
+    every: int,
+    forecast: str,
+    corrected: bool,
 ) -> dict[str, Book]:
     """Lead copies of the same greenhouses by each strategy, which chooses anew every `every` hours."""
     houses = Greenhouses(site, scenario)
@@ -112,12 +123,15 @@ def lead(
         houses.advance(np.repeat(recipe_table(site, houses.time, 24)[None], houses.count, axis=0))
     books = {name: Book() for name in strategies}
     co2 = np.zeros(houses.count)
+    past: list[deque[tuple[dict[str, Values], dict[str, Values]]]] = [
+        deque(maxlen=round(RECENT_DAYS * 24 / every)) for _ in range(houses.count)
+    ]
     for choice in range((scenario.days - SETTLING) * 24 // every):
         begin = houses.time
         present, applied = houses.measurements(), houses.applied()
         recipe = recipe_table(site, begin, HORIZON)
         coming = houses.coming_weather(HORIZON)
-        chosen, expected = [], []
+        chosen, expected, states = [], [], []
         for place, (name, strategy) in enumerate(strategies.items()):
             for house in range(scenario.count):
                 row = place * scenario.count + house
@@ -126,13 +140,19 @@ def lead(
                 else:
                     weather = coming[row]
                 now = {key: float(value[row]) for key, value in present.items()}
-                situation = Situation(begin, now, applied[row], weather, recipe, float(co2[row]), 1000 * choice + house)
+                model = Scaled(simulator, recent(past[row])) if corrected else simulator
+                seed = 1000 * choice + house
+                situation = Situation(begin, now, applied[row], weather, recipe, float(co2[row]), model, seed)
                 began = time.monotonic()
                 setpoints = strategy(situation)
                 books[name].seconds += time.monotonic() - began
-                chosen.append(setpoints[:every])
-                expected.append(first_hours(simulator.simulate(now, weather, setpoints[None], begin), every))
-        outcome = houses.advance(np.stack(chosen))
+                chosen.append(setpoints)
+                states.append(now)
+                expected.append(first_hours(model.simulate(now, weather, setpoints[None], begin), every))
+        outcome = houses.advance(np.stack(chosen)[:, :every])
+        for row, now in enumerate(states):
+            again = first_hours(simulator.simulate(now, coming[row], chosen[row][None], begin), every)
+            past[row].append((totals(again), {name: each[[row]] for name, each in totals(outcome).items()}))
         for place, book in enumerate(books.values()):
             part = slice(place * scenario.count, (place + 1) * scenario.count)
             mine = Outcome(**{one.name: getattr(outcome, one.name)[:, part] for one in fields(Outcome)})
@@ -149,11 +169,19 @@ def lead(
     return books
 
 
+def recent(days: Iterable[tuple[dict[str, Values], dict[str, Values]]]) -> dict[str, float]:
+    """Return the factors of what was expected of the last days and what they used."""
+    found = list(days)
+    return factors(
+        *({name: np.array([float(day[side][name][0]) for day in found]) for name in SCALED} for side in (0, 1))
+    )
+
+
 def _past(weather: Telemetry, now: np.datetime64) -> Telemetry:
     return weather.select(now - 3 * DAY, now)
 
 
-def genetic(site: Site, simulator: Simulator, seeds: Callable[[Situation], list[Values]] = lambda _: []) -> Strategy:
+def genetic(site: Site) -> Strategy:
     """Return the elitist genetic algorithm on the bundle's simulator, as the daemon runs it."""
 
     def choose(now: Situation) -> Values:
@@ -161,7 +189,7 @@ def genetic(site: Site, simulator: Simulator, seeds: Callable[[Situation], list[
             now.time, now.present, dict(zip(SETPOINTS, now.applied, strict=True)), co2_before=now.co2_before
         )
         rng = np.random.default_rng(now.seed)
-        return optimise(simulator, site, state, now.forecast, now.recipe, rng, seeds=seeds(now)).setpoints
+        return optimise(now.simulator, site, state, now.forecast, now.recipe, rng).setpoints
 
     return choose
 
@@ -236,6 +264,7 @@ def main() -> int:
     parser.add_argument("--houses", type=int, default=4, help="greenhouses in each season")
     parser.add_argument("--every", type=int, default=24, help="hours between choices (K1)")
     parser.add_argument("--forecast", choices=("persistence", "true"), default="persistence", help="weather ahead")
+    parser.add_argument("--uncorrected", action="store_true", help="do not correct plans by what the last days used")
     parser.add_argument("--only", nargs="+", help="strategies to run beside the recipe")
     parser.add_argument("--json", type=Path, help="file for the tables")
     given = parser.parse_args()
@@ -244,7 +273,7 @@ def main() -> int:
     strategies: dict[str, Strategy] = {
         "recipe": lambda now: now.recipe,
         "best of 500 fixed days": best_template(site, simulator),
-        "genetic algorithm": genetic(site, simulator),
+        "genetic algorithm": genetic(site),
     }
     for text in given.policy:
         name, _, path = text.partition("=")
@@ -258,7 +287,7 @@ def main() -> int:
         begin = np.datetime64(start) - SETTLING * DAY
         days, copies = SETTLING + given.days, len(strategies)
         scenario = Scenario(begin, days, given.houses, seed=FIRST_SEED + number, copies=copies)
-        books = lead(site, scenario, strategies, simulator, given.every, given.forecast)
+        books = lead(site, scenario, strategies, simulator, given.every, given.forecast, not given.uncorrected)
         for name, book in books.items():
             found[name].append(book)
         title = f"{given.days} days from {start[:10]}, {given.houses} greenhouses"

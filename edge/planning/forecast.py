@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -34,9 +36,7 @@ def persistence(log: Telemetry, start: int, hours: int) -> Values:
     known = np.isfinite(days)
     count = known.sum(axis=0)
     typical = np.where(count > 0, np.where(known, days, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)
-    for column, name in enumerate(NEEDED):
-        if np.isnan(typical[:, column]).any():
-            typical[:, column] = _fill(name, typical, column)
+    typical = without_gaps(typical)
     recent = days[-1, -3:]
     anomaly = np.zeros(len(NEEDED))
     for column, name in enumerate(NEEDED):
@@ -59,19 +59,31 @@ def from_forecast(forecast: Telemetry, log: Telemetry, start: int, hours: int) -
     return np.where(np.isfinite(table), table, persistence(log, start, hours))
 
 
-def hourly(telemetry: Telemetry, start: int, hours: int) -> Values:
-    """Return hourly means from `start` on, (hours, 6), NaN where nothing is known."""
+def hourly(telemetry: Telemetry, start: int, hours: int, names: Sequence[str] = NEEDED) -> Values:
+    """Return hourly means from `start` on, (hours, names), NaN where nothing is known."""
     begin = np.datetime64(start, "s")
     selected = telemetry.select(begin, begin + np.timedelta64(hours * HOUR, "s"))
-    result = np.full((hours, len(NEEDED)), np.nan)
+    result = np.full((hours, len(names)), np.nan)
     # The grid lies on whole hours; the plan may not, so it is moved there and back.
     shift = np.timedelta64(start % HOUR, "s")
     grid = to_grid(Telemetry(selected.time - shift, selected.columns), HOUR)
     rows = (grid.time - (begin - shift)).astype(np.int64) // HOUR
-    for column, name in enumerate(NEEDED):
+    for column, name in enumerate(names):
         if name in grid:
             result[rows, column] = grid[name]
     return result
+
+
+def without_gaps(day: Values) -> Values:
+    """Return the hourly weather of a day, (24, 6), with gaps bridged and what no sensor measures estimated.
+
+    Raises IgrowError where nothing is known of a quantity that cannot be estimated.
+    """
+    whole = day.copy()
+    for column, name in enumerate(NEEDED):
+        if np.isnan(whole[:, column]).any():
+            whole[:, column] = _fill(name, whole, column)
+    return whole
 
 
 def _fill(name: str, typical: Values, column: int) -> Values:
@@ -85,4 +97,4 @@ def _fill(name: str, typical: Values, column: int) -> Values:
     if name == "sky_temperature":
         outdoor = typical[:, NEEDED.index("outdoor_temperature")]
         return np.asarray(0.0552 * (outdoor + 273.15) ** 1.5 - 273.15)
-    raise IgrowError(f"the log of the last {DAYS} days holds no {name}, so no weather can be expected")
+    raise IgrowError(f"the log of the last days holds no {name}, so no weather can be expected")

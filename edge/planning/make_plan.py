@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.planning.forecast import from_forecast, persistence
+from edge.planning.forecast import from_forecast, hourly, persistence, without_gaps
 from edge.ports import Plan, PlanRequest
 from igrow_core.bundle import Bundle, read_bundle
 from igrow_core.errors import IgrowError
 from igrow_core.planner import Budget, PlanningState, Simulator, optimise
 from igrow_core.planner.onnx_generation import OnnxGeneration
+from igrow_core.planner.recent_use import SCALED, Scaled, factors, totals, used_in
 from igrow_core.planner.template import for_site
 from igrow_core.quantities import SETPOINTS
 from igrow_core.simulator.plan import BundleSimulator
@@ -22,6 +23,9 @@ from igrow_core.site import Greenhouse, Site
 from igrow_core.telemetry import Telemetry
 
 HOUR = 3600
+DAY = 24 * HOUR
+RECENT_DAYS = 3
+"""Whole days of the log that plans are corrected by."""
 PRESENT_SECONDS = 2 * HOUR
 """A value of the log that is older says nothing about the present (slow quantities excepted)."""
 VALID_HOURS = 24
@@ -48,8 +52,9 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
         applied=present(request.telemetry.only(name for name in SETPOINTS if name in request.telemetry), start),
         co2_before=co2_since_planting(site, request.telemetry, start),
     )
+    corrected = Scaled(simulator, recent_factors(simulator, site, request.telemetry, start))
     result = optimise(
-        simulator,
+        corrected,
         site,
         state,
         forecast,
@@ -100,6 +105,33 @@ def present(log: Telemetry, start: int) -> dict[str, float]:
         if len(found):
             values[name] = float(column[found[-1]])
     return values
+
+
+def recent_factors(simulator: Simulator, site: Site, log: Telemetry, start: int) -> dict[str, float]:
+    """Return by how much the last whole days of the log departed from what the simulator says of them."""
+    begin = np.datetime64(start, "s")
+    lacking = [name for name in SETPOINTS if name not in log]
+    log = log.with_columns({name: np.full(len(log), site.limits[name].safe) for name in lacking})
+    expected: dict[str, list[float]] = {name: [] for name in SCALED}
+    used: dict[str, list[float]] = {name: [] for name in SCALED}
+    for back in range(1, RECENT_DAYS + 1):
+        morning = start - back * DAY
+        day = log.select(begin - np.timedelta64(back * DAY, "s"), begin - np.timedelta64((back - 1) * DAY, "s"))
+        setpoints = hourly(log, morning, 24, SETPOINTS)
+        if not np.isfinite(setpoints).all():
+            continue
+        try:
+            weather = without_gaps(hourly(log, morning, 24))
+        except IgrowError:
+            continue
+        outcome = simulator.simulate(present(log, morning), weather, setpoints[None], np.datetime64(morning, "s"))
+        for column, values in ((expected, totals(outcome)), (used, used_in(day, site.greenhouse))):
+            for name in SCALED:
+                column[name].append(float(np.mean(values[name])))
+    return factors(
+        {name: np.array(values) for name, values in expected.items()},
+        {name: np.array(values) for name, values in used.items()},
+    )
 
 
 def co2_since_planting(site: Site, log: Telemetry, start: int) -> float:

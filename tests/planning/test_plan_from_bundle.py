@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import datetime
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import igrow_core
-from edge.planning.make_plan import co2_since_planting, hourly_recipe, make_plan, present
+from edge.planning.make_plan import co2_since_planting, hourly_recipe, make_plan, present, recent_factors
 from edge.ports import PlanRequest
+from igrow_core.planner import Outcome
 from igrow_core.quantities import SETPOINTS
 from igrow_core.site import Site
 from igrow_core.telemetry import Telemetry
@@ -81,6 +82,25 @@ def test_a_recipe_of_any_step_becomes_hours(step: float, steps: int) -> None:
 def test_a_setpoint_that_the_site_lacks_stands_at_its_safe_value() -> None:
     table = hourly_recipe(SITE, request(names=("heating_setpoint", "co2_setpoint")), 24)
     assert (table[:, SETPOINTS.index("lamp_on")] == SITE.limits["lamp_on"].safe).all()
+
+
+class OneUnitAnHour:
+    """A simulator by which every hour uses and grows one unit."""
+
+    def simulate(
+        self, initial: dict[str, float], weather: np.ndarray, setpoints: np.ndarray, start: np.datetime64
+    ) -> Outcome:
+        ones = np.ones((1, *setpoints.shape[:2]))
+        return Outcome(**{one.name: ones for one in fields(Outcome)})
+
+
+def test_plans_are_corrected_by_what_the_log_s_last_days_used() -> None:
+    dosed = log().with_columns({"co2_dosing": np.full(len(log()), 1.4)})
+    found = recent_factors(OneUnitAnHour(), SITE, dosed, START)
+    assert 1.2 < found["co2"] < 1.4
+    assert [found[name] for name in ("heat", "electricity", "net_growth")] == [1.0, 1.0, 1.0]
+    short = dosed.select(np.datetime64(START - 20 * 3600, "s"), np.datetime64(START + 1, "s"))
+    assert recent_factors(OneUnitAnHour(), SITE, short, START)["co2"] == 1.0
 
 
 def test_the_co2_that_the_crop_has_had_follows_from_the_log_s_days_and_those_since_planting() -> None:

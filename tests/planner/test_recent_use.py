@@ -1,0 +1,73 @@
+"""Plans are corrected by what the last days used and grew."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from toy_greenhouse import START, ToySimulator
+
+from igrow_core.planner.recent_use import SCALED, Scaled, factors, totals, used_in
+from igrow_core.site import Greenhouse
+from igrow_core.telemetry import Telemetry
+
+
+def days(*values: float) -> dict[str, np.ndarray]:
+    return {name: np.array(values) for name in SCALED}
+
+
+def test_a_simulator_that_was_right_is_left_alone_and_so_is_one_of_which_nothing_is_known() -> None:
+    assert factors(days(2.0, 3.0), days(2.0, 3.0)) == dict.fromkeys(SCALED, 1.0)
+    assert factors(days(), days()) == dict.fromkeys(SCALED, 1.0)
+    assert factors(days(2.0), days(np.nan)) == dict.fromkeys(SCALED, 1.0)
+    assert factors(days(0.0), days(0.0)) == dict.fromkeys(SCALED, 1.0)
+
+
+def test_more_days_that_agree_bring_the_factor_nearer_to_what_they_show() -> None:
+    one = factors(days(1.0), days(1.5))["heat"]
+    three = factors(days(1.0, 1.0, 1.0), days(1.5, 1.5, 1.5))["heat"]
+    assert 1.0 < one < three < 1.5
+    assert factors(days(1.0, 5.0), days(1.5, np.nan))["heat"] == pytest.approx(one), "a day without a meter is no day"
+
+
+def test_no_factor_is_beyond_belief() -> None:
+    assert factors(days(0.01, 0.01), days(9.0, 9.0))["co2"] == 2.0
+    assert factors(days(9.0, 9.0), days(0.01, 0.01))["co2"] == 0.5
+
+
+def test_amounts_are_scaled_and_the_climate_is_not(weather) -> None:
+    setpoints = np.tile([20.0, 600.0, 1.0, 0.5], (2, 48, 1))
+    plain = ToySimulator().simulate({}, weather, setpoints, START)
+    factor = dict(zip(SCALED, (0.5, 1.0, 2.0, 0.8), strict=True))
+    scaled = Scaled(ToySimulator(), factor).simulate({}, weather, setpoints, START)
+    np.testing.assert_array_equal(scaled.air_temperature, plain.air_temperature)
+    before, after = totals(plain), totals(scaled)
+    for name in SCALED:
+        np.testing.assert_allclose(after[name], factor[name] * before[name])
+    assert before["net_growth"].shape == (2,)
+
+
+def test_a_log_tells_what_was_used() -> None:
+    time = START + np.arange(289) * np.timedelta64(300, "s")
+    log = Telemetry(
+        time,
+        {
+            "air_temperature": np.full(289, 20.0),
+            "rail_pipe_temperature": np.full(289, 40.0),
+            "lamp_power": np.full(289, 50.0),
+            "co2_dosing": np.where(np.arange(289) == 7, np.nan, 0.002),
+            "net_growth": np.linspace(1.0, 1.01, 289),
+        },
+    )
+    house = Greenhouse()
+    used = used_in(log, house)
+    assert used["heat"] == pytest.approx(house.rail_pipe_heat_transfer * 20.0 * 86_400 / 1e6)
+    assert used["electricity"] == pytest.approx(1.2)
+    assert used["co2"] == pytest.approx(0.048)
+    assert used["net_growth"] == pytest.approx(0.01)
+
+
+def test_what_a_log_does_not_tell_is_not_guessed() -> None:
+    time = START + np.arange(25) * np.timedelta64(3600, "s")
+    used = used_in(Telemetry(time, {"air_temperature": np.full(25, 20.0)}), Greenhouse())
+    assert np.isnan(list(used.values())).all()
+    assert np.isnan(list(used_in(Telemetry(time[:0], {}), Greenhouse()).values())).all()
