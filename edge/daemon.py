@@ -193,7 +193,11 @@ class Daemon:
         except TimeoutError:
             reached = False
         try:
-            setpoints = "the safe ones were written" if reached else "the PLC does not answer, its own fallback rules"
+            setpoints = (
+                "the safe setpoints were written"
+                if reached
+                else "the PLC does not answer, so its own safe setpoints rule after its timeout"
+            )
             self._journal.event("stopped", setpoints=setpoints)
         finally:
             await control.plc.close()

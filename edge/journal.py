@@ -17,6 +17,7 @@ from edge.guard.readback import Outcome
 from edge.image import Image, Value
 from edge.ports import AlarmRecord, Store, WriteRecord
 from edge.sensors.consequences import CONSEQUENCES
+from edge.sentences import log_event
 from igrow_core.quantities import QUANTITIES
 
 WAITING_ROWS = 20_000
@@ -49,8 +50,7 @@ class Journal:
     def event(self, kind: str, **detail: object) -> None:
         """Write down an event."""
         self._store.record_event(self._time, kind, detail)
-        told = (f"{key.replace('_', ' ')} {_told(value)}" for key, value in detail.items() if value not in ("", None))
-        log.info("%s: %s", kind.replace("_", " "), ", ".join(told))
+        log_event(kind, detail)
 
     def telemetry(self, image: Image) -> None:
         """Write down the values of one image, and those that waited for a date."""
@@ -136,10 +136,6 @@ class Journal:
         record = WriteRecord(self._time, self._monotonic, point, requested, applied, source, reason, outcome)
         self._store.record_write(record)
         return record
-
-
-def _told(value: object) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _number(value: float | None) -> str:

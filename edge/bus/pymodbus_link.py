@@ -169,10 +169,7 @@ class PymodbusLink(asyncio.Protocol):
         if isinstance(error, TimeoutError):
             return f"no connection to {self._where} within {settings.timeout:g} s"
         if isinstance(error, OSError) and error.strerror:
-            # What asyncio and pyserial add is for programmers. A name that is not found has a number of its own.
-            number = error.errno or 0
-            words = os.strerror(number) if number in errno.errorcode else error.strerror
-            return f"no connection to {self._where}: {words}"
+            return f"no connection to {self._where}: {_words(error)}"
         return str(error)
 
     @property
@@ -233,7 +230,7 @@ class PymodbusLink(asyncio.Protocol):
         """Tell those who wait, at once, and the supervisor."""
         if self._transport is not None:
             self._transport = None
-            self._fail(ConnectionLostError(f"the line broke{f' ({exc})' if exc else ''}"))
+            self._fail(ConnectionLostError(f"the line broke{f' ({_words(exc)})' if exc else ''}"))
             self._on_lost()
 
     def data_received(self, data: bytes) -> None:
@@ -295,3 +292,11 @@ def _tls_context(settings: BusSettings) -> ssl.SSLContext:
     if settings.certificate is not None:
         context.load_cert_chain(settings.certificate, settings.private_key)
     return context
+
+
+def _words(error: Exception) -> str:
+    """Return an error's reason without what asyncio and pyserial add for programmers."""
+    if not isinstance(error, OSError) or not error.strerror:
+        return str(error)
+    # A name that is not found has a number of its own.
+    return os.strerror(error.errno or 0) if error.errno in errno.errorcode else error.strerror

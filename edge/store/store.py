@@ -11,6 +11,7 @@ from pathlib import Path
 
 from edge.image import Value
 from edge.ports import AlarmRecord, WriteRecord
+from edge.sentences import log_event
 from edge.store.database import Synchronous, describe
 from edge.store.ledger import NAMES, RESERVE_BYTES, Ledger, Record, read_newest
 from edge.store.packing import Row, pack
@@ -168,6 +169,7 @@ class SqliteStore:
         self._telemetry.reports, self._ledger.reports = [], []
         for text in reports:
             self._ledger.add("event", None, {"kind": "store_repaired", "detail": {"text": text}})
+            log_event("store_repaired", {"text": text})
 
 
 def read_telemetry(folder: Path, start: float, end: float) -> Telemetry:

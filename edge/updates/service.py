@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from edge.ports import ActiveBundle
+from edge.sentences import log_event
 from edge.store.store import StoreError, read_telemetry
 from edge.updates.rules import ReportBox, UpdateRules, UpdateStore
 from edge.updates.shadow import Comparison, Predictor, compare, hindcast_errors
@@ -89,8 +90,7 @@ class BundleUpdates:
         if time is None or self.busy:
             return
         if self._task is not None and (error := self._task.exception()) is not None:
-            _log.error("bundle updates: %s", error)
-            self._store.record_event(time, "update_failed", {"reason": f"{type(error).__name__}: {error}"})
+            self._event(time, "update_failed", {"reason": f"{type(error).__name__}: {error}"})
         self._task = None
         if self._is_due(time):
             self._store.flush()
@@ -181,7 +181,7 @@ class BundleUpdates:
                 self._reject(time, fetched.identity, fetched.identity, str(error), None, {})
             if str(error) != self._last_refusal:
                 self._last_refusal = str(error)
-                self._store.record_event(time, "update_refused", {"reason": str(error)})
+                self._event(time, "update_refused", {"reason": str(error)})
             return
         self._last_refusal = ""
         with self._lock:
@@ -191,7 +191,7 @@ class BundleUpdates:
             return
         with self._lock:
             state.candidate, state.candidate_since = bundle.identity, time
-        self._store.record_event(
+        self._event(
             time,
             "shadow_began",
             {"bundle": bundle.label, "hours": self._rules.shadow_hours, "effects": _effects(bundle)},
@@ -312,7 +312,7 @@ class BundleUpdates:
             "comparison": [] if comparison is None else comparison.table(),
             "live_error": dict(live),
         }
-        self._store.record_event(time, f"bundle_{verdict}", content)
+        self._event(time, f"bundle_{verdict}", content)
         if self._reports is not None:
             try:
                 self._reports.leave_report(time, f"{identity[:8] or 'bundle'}-{verdict}", content)
@@ -342,6 +342,10 @@ class BundleUpdates:
             stored = Telemetry(np.empty(0, dtype="datetime64[s]"), {})
         return to_grid(stored, self._rules.step_seconds)
 
+    def _event(self, time: float | None, kind: str, detail: Mapping[str, object]) -> None:
+        self._store.record_event(time, kind, detail)
+        log_event(kind, detail)
+
     # --- start and order ------------------------------------------------------------------------------------
 
     def _recover(self) -> None:
@@ -354,26 +358,24 @@ class BundleUpdates:
             try:
                 self._bundles[identity] = self._shelf.get(identity)
             except BundleError as error:
-                self._store.record_event(None, "bundle_damaged", {"bundle": identity, "reason": str(error)})
+                self._event(None, "bundle_damaged", {"bundle": identity, "reason": str(error)})
                 setattr(state, role, None)
-        if state.active is None and state.previous is not None:
-            state.active, state.previous = state.previous, None
-            state.watch_since = None
-            self._store.record_event(
-                None, "bundle_went_back", {"bundle": state.active, "reason": "the newer is damaged"}
-            )
+                if role == "active" and state.previous is not None:
+                    state.active, state.previous = state.previous, None
+                    state.watch_since = None
+                    self._event(None, "bundle_went_back", {"bundle": identity, "reason": "it is damaged"})
 
     def _adopt_first(self, folder: Path) -> None:
         try:
             bundle = self._shelf.put_folder(folder)
         except (BundleError, UpdateError) as error:
             self._last_refusal = str(error)
-            self._store.record_event(None, "update_refused", {"reason": str(error)})
+            self._event(None, "update_refused", {"reason": str(error)})
             return
         self._bundles[bundle.identity] = bundle
         self._state.active = bundle.identity
         self._state.last_verdict = f"{bundle.label} installed by the configuration"
-        self._store.record_event(None, "bundle_installed", {"bundle": bundle.label})
+        self._event(None, "bundle_installed", {"bundle": bundle.label})
         with contextlib.suppress(OSError):
             save_state(self._state_file, self._state)
 

@@ -40,11 +40,11 @@ class RunningDaemon:
             f"cycle:\n  interval: 5 min\n  clock: lockstep\nstatus:\n  port: 0\n{extra}"
         )
 
-    def start(self) -> None:
+    def start(self, **environment: str) -> None:
         """Start the daemon; its log goes to a file."""
         log = (self.folder / "daemon.log").open("ab")
         self.daemon = subprocess.Popen(
-            [*COMMAND, "run", str(self.configuration)], stdout=log, stderr=log, env=self._environment
+            [*COMMAND, "run", str(self.configuration)], stdout=log, stderr=log, env={**self._environment, **environment}
         )
         log.close()
 
