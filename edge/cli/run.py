@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import faulthandler
 import logging
 import os
 import sys
@@ -33,6 +34,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the daemon."""
     set_up_logging(verbose=options.verbose)
+    # The watchdog ends a daemon that hangs with SIGABRT; the journal then shows where it hung.
+    faulthandler.enable()
     asyncio.run(run_daemon(options.configuration))
     return 0
 

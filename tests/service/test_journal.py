@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import signal
 from pathlib import Path
 
 import pytest
@@ -28,6 +29,19 @@ def test_every_line_of_the_journal_has_a_priority_and_no_line_is_a_programmers(t
     assert any(line.startswith("<6>recipe decides, before it none: ") for line in lines)
     assert lines[-1].startswith("<6>stopped: the PLC does not answer")
     assert not any("Traceback" in line or "Errno" in line for line in lines)
+
+
+def test_a_daemon_that_the_watchdog_ends_leaves_the_place_where_it_hung(tmp_path: Path) -> None:
+    plant = RunningDaemon(tmp_path)
+    try:
+        plant.start()
+        plant.wait_for((plant.state / "status.json").exists)
+        assert plant.daemon is not None
+        plant.daemon.send_signal(signal.SIGABRT)  # what systemd sends when WatchdogSec is over
+        assert plant.daemon.wait(60) == -signal.SIGABRT
+    finally:
+        plant.close()
+    assert "in run_daemon" in (tmp_path / "daemon.log").read_text()
 
 
 @pytest.mark.parametrize("kind", SENTENCES)
