@@ -41,7 +41,7 @@ def test_a_daemon_that_the_watchdog_ends_leaves_the_place_where_it_hung(tmp_path
         assert plant.daemon.wait(60) == -signal.SIGABRT
     finally:
         plant.close()
-    assert "in run_daemon" in (tmp_path / "daemon.log").read_text()
+    assert "edge/cli/run.py" in (tmp_path / "daemon.log").read_text()
 
 
 @pytest.mark.parametrize("kind", SENTENCES)
