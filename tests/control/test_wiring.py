@@ -7,6 +7,10 @@ import urllib.request
 
 from daemon_bench import Plant, free_port, running, until, write_files
 
+from edge.configuration import load_configuration
+from edge.status import StatusServer
+from edge.wiring import open_services
+
 
 async def test_the_page_shows_the_time_of_the_site(tmp_path):
     port = free_port()
@@ -37,3 +41,10 @@ async def test_a_status_port_that_is_taken_is_told_where_the_state_is_left(tmp_p
     await plant.down()
     state = json.loads((tmp_path / "state" / "status.json").read_text())["state"]
     assert any(problem.startswith(f"status page: port {number} on localhost") for problem in state["problems"])
+
+
+def test_health_is_lost_after_three_intervals_without_a_cycle(tmp_path):
+    services = open_services(load_configuration(write_files(tmp_path, 5020, interval="5 min")))
+    services.close()
+    assert isinstance(services.status, StatusServer)
+    assert services.status._late_after == 900.0
