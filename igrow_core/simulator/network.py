@@ -19,6 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from igrow_core.simulator.leaf_picking import LeafPicking
+
 Array = Any
 """An array of the namespace `xp`."""
 Weights = NDArray[np.float32]
@@ -90,12 +92,14 @@ class LightFormula:
 
 @dataclass(frozen=True)
 class NetworkSimulator:
-    """The three stages and the light formula: all that a free run needs."""
+    """The three stages, the light formula and the picking of leaves: all that a free run needs."""
 
     climate: Stage
     growth: Stage
     harvest: Stage
     light: LightFormula
+    picking: LeafPicking | None = None
+    """How leaves are picked; None where nobody does."""
 
 
 def initial_memory(xp: Any, stage: Stage, drivers: Array) -> Array:
@@ -154,7 +158,7 @@ def network_output(xp: Any, stage: Stage, inputs: Array) -> Array:
     """Return the network's last layer (..., s) for scaled inputs; SiLU(z) = z / 2 (1 + tanh(z / 2))."""
     values = inputs
     for index, (matrix, bias) in enumerate(zip(stage.matrices, stage.biases, strict=True)):
-        values = values @ matrix + bias
+        values = xp.tensordot(values, xp.asarray(matrix), axes=1) + bias
         if index < len(stage.matrices) - 1:
             half = 0.5 * values
             values = half * (1.0 + xp.tanh(half))

@@ -1,20 +1,160 @@
-"""Free runs of the network simulator in numpy, hour by hour: many seasons side by side."""
+"""Free runs of the network simulator: an hour of all stages, a day of them, and whole seasons side by side."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from igrow_core.simulator.leaf_picking import pick
 from igrow_core.simulator.network import HOURS, NetworkSimulator, Stage, advance, initial_memory
 
 Values = NDArray[np.float64]
+Array = Any
+"""An array of the namespace `xp`."""
+
+
+@dataclass(frozen=True)
+class Carried:
+    """What one step of a run hands to the next; float32, `...` is the batch."""
+
+    climate: Array
+    """(..., s) in the order of the stage's states, as are `growth` and `harvest`."""
+    climate_memory: Array
+    """(..., m) filters of the climate's drivers, as are the other memories of theirs."""
+    growth: Array
+    growth_memory: Array
+    harvest: Array
+    harvest_memory: Array
+    thermal_time: Array
+    """(..., 1) degC d since the first hour."""
+    crop_age: Array
+    """(..., 1) days since the first hour."""
+    pickings: Array
+    """(..., 1) how often leaves were picked."""
 
 
 def day_ends(hours: int) -> NDArray[np.int64]:
     """Return the last row of each day of 24 rows, the last day cut where the run ends."""
     return np.minimum(np.arange(HOURS, hours + HOURS, HOURS), hours) - 1
+
+
+def run_hour(
+    xp: Any, simulator: NetworkSimulator, carried: Carried, known: Mapping[str, Array], hour: Array
+) -> tuple[Carried, dict[str, Array]]:
+    """Run climate and growth for one hour.
+
+    Parameters
+    ----------
+    known
+        Name -> (..., 1): every driver of the climate stage but the leaf area, over the hour that ends.
+    hour
+        (..., 1) hour of the day at its end.
+
+    Returns
+    -------
+    (carried, values)
+        What the next hour needs (the harvest as it was), and name -> (..., 1) of all states, par, thermal_time and
+        crop_age at the end of the hour.
+    """
+    climate = simulator.climate
+    leaves = simulator.growth.states.index("leaf_area_index")
+    values = dict(known) | {"leaf_area_index": carried.growth[..., leaves : leaves + 1]}
+    drivers = xp.concat([values[name] for name in climate.drivers], axis=-1)
+    state, memory = advance(xp, climate, carried.climate, drivers, carried.climate_memory, hour)
+    values |= {name: state[..., column : column + 1] for column, name in enumerate(climate.states)}
+    values["par"] = simulator.light.par(xp, known["global_radiation"], known["lamp_on"])
+    return grow_hour(xp, simulator, replace(carried, climate=state, climate_memory=memory), values, hour)
+
+
+def grow_hour(
+    xp: Any, simulator: NetworkSimulator, carried: Carried, values: Mapping[str, Array], hour: Array
+) -> tuple[Carried, dict[str, Array]]:
+    """Run growth for one hour under a climate that is known; see `run_hour`, whose second half it is."""
+    growth = simulator.growth
+    leaves = growth.states.index("leaf_area_index")
+    values = dict(values)
+    values["thermal_time"] = carried.thermal_time + values["air_temperature"] / HOURS
+    values["crop_age"] = carried.crop_age + 1.0 / HOURS
+    drivers = xp.concat([values[name] for name in growth.drivers], axis=-1)
+    state, memory = advance(xp, growth, carried.growth, drivers, carried.growth_memory, hour)
+    values |= {name: state[..., column : column + 1] for column, name in enumerate(growth.states)}
+    pickings = carried.pickings
+    if simulator.picking is not None:
+        before = carried.growth[..., leaves : leaves + 1]
+        since = (values["thermal_time"], values["crop_age"])
+        gone, pickings = pick(xp, simulator.picking, before, *since, hour, pickings)
+        values["leaf_area_index"] = values["leaf_area_index"] - gone
+        state = xp.concat([values[name] for name in growth.states], axis=-1)
+    following = replace(
+        carried,
+        growth=state,
+        growth_memory=memory,
+        thermal_time=values["thermal_time"],
+        crop_age=values["crop_age"],
+        pickings=pickings,
+    )
+    return following, values
+
+
+def run_day(
+    xp: Any, simulator: NetworkSimulator, carried: Carried, known: Mapping[str, Array], hour: Array
+) -> tuple[Carried, dict[str, Array]]:
+    """Run 24 hours of climate and growth and the day's harvest.
+
+    Parameters
+    ----------
+    known
+        Name -> (..., 24), see `run_hour`.
+    hour
+        (..., 24) hour of the day at each hour's end.
+
+    Returns
+    -------
+    (carried, values)
+        What the next day needs, and name -> (..., 24) as from `run_hour`; the states of the harvest are (..., 1), at
+        the end of the day.
+    """
+    hours: list[dict[str, Array]] = []
+    for row in range(HOURS):
+        now = {name: values[..., row : row + 1] for name, values in known.items()}
+        carried, values = run_hour(xp, simulator, carried, now, hour[..., row : row + 1])
+        hours.append(values)
+    names = [name for name in hours[0] if name not in known]
+    day = {name: xp.concat([values[name] for values in hours], axis=-1) for name in names}
+    stage = simulator.harvest
+    means = {name: xp.mean(day[name], axis=-1, keepdims=True) for name in stage.drivers}
+    state, memory = run_harvest(xp, stage, carried.harvest, carried.harvest_memory, means)
+    day |= {name: state[..., column : column + 1] for column, name in enumerate(stage.states)}
+    return replace(carried, harvest=state, harvest_memory=memory), day
+
+
+def run_harvest(xp: Any, stage: Stage, state: Array, memory: Array, means: Mapping[str, Array]) -> tuple[Array, Array]:
+    """Return the harvest (..., s) and its filters after a day; `means` is name -> (..., 1), the means of its hours."""
+    drivers = xp.concat([means[name] for name in stage.drivers], axis=-1)
+    return advance(xp, stage, state, drivers, memory)
+
+
+def begin(simulator: NetworkSimulator, known: Mapping[str, Values]) -> Carried:
+    """Return where runs stand at their first hour; `known` is name -> (runs, hours), see `free_run`."""
+    light = simulator.light.par(np, known["global_radiation"][:, 0], known["lamp_on"][:, 0])
+    zero = np.zeros((light.size, 1), dtype=np.float32)
+    first = {name: values[:, 0] for name, values in known.items()}
+    first |= {"par": light, "thermal_time": zero[:, 0], "crop_age": zero[:, 0]}
+
+    def columns(names: Sequence[str]) -> NDArray[np.float32]:
+        return np.stack([first[name] for name in names], axis=-1).astype(np.float32)
+
+    stages = (simulator.climate, simulator.growth, simulator.harvest)
+    states = [columns(stage.states) for stage in stages]
+    memories = [initial_memory(np, stage, columns(stage.drivers)) for stage in stages]
+    return Carried(
+        states[0], memories[0], states[1], memories[1], states[2], memories[2],
+        thermal_time=zero, crop_age=zero, pickings=zero,
+    )  # fmt: skip
 
 
 def free_run(simulator: NetworkSimulator, known: Mapping[str, Values], hour: Values) -> dict[str, Values]:
@@ -30,46 +170,56 @@ def free_run(simulator: NetworkSimulator, known: Mapping[str, Values], hour: Val
 
     Returns
     -------
-    Name -> (runs, hours) of every state, of par and of thermal_time (degC d since the first hour). The harvest
-    stage runs by days of 24 rows; within a day its value is the one at the end of the day before.
+    Name -> (runs, hours) of every state, of par, thermal_time (degC d since the first hour) and crop_age (d). The
+    harvest stage runs by days of 24 rows; within a day its value is the one at the end of the day before.
     """
-    climate, growth = simulator.climate, simulator.growth
-    light = simulator.light.par(np, known["global_radiation"], known["lamp_on"])
-    runs, hours = light.shape
-    result = {name: np.empty((runs, hours)) for name in (*climate.states, *growth.states)}
-    result |= {
-        "par": light,
-        "thermal_time": np.zeros((runs, hours)),
-        "crop_age": np.tile(np.arange(hours) / HOURS, (runs, 1)),
-    }
-    for name in (*climate.states, *growth.states):
+    given = [name for name in dict.fromkeys((*simulator.climate.drivers, "global_radiation", "lamp_on"))
+             if name != "leaf_area_index"]  # fmt: skip
+    drivers = {name: known[name].astype(np.float32)[..., None] for name in given}
+    runs, hours = known["global_radiation"].shape
+    carried = begin(simulator, known)
+    names = (*simulator.climate.states, *simulator.growth.states)
+    result = {name: np.empty((runs, hours)) for name in (*names, "par", "thermal_time", "crop_age")}
+    for name in names:
         result[name][:, 0] = known[name][:, 0]
-
-    def at(stage: Stage, row: int) -> NDArray[np.float32]:
-        values = []
-        for name in stage.drivers:
-            if name == "leaf_area_index":
-                values.append(result[name][:, max(row - 1, 0)])
-            else:
-                values.append((result if name in result else known)[name][:, row])
-        return np.stack(values, axis=-1).astype(np.float32)
-
-    def state_of(stage: Stage) -> NDArray[np.float32]:
-        return np.stack([result[name][:, 0] for name in stage.states], axis=-1).astype(np.float32)
-
-    climate_state, growth_state = state_of(climate), state_of(growth)
-    climate_memory = initial_memory(np, climate, at(climate, 0))
-    growth_memory = initial_memory(np, growth, at(growth, 0))
+    light = simulator.light.par(np, known["global_radiation"][:, 0], known["lamp_on"][:, 0])
+    result["par"][:, 0], result["thermal_time"][:, 0], result["crop_age"][:, 0] = light, 0.0, 0.0
     for row in range(1, hours):
         now = np.full((runs, 1), hour[row], dtype=np.float32)
-        climate_state, climate_memory = advance(np, climate, climate_state, at(climate, row), climate_memory, now)
-        for index, name in enumerate(climate.states):
-            result[name][:, row] = climate_state[:, index]
-        result["thermal_time"][:, row] = result["thermal_time"][:, row - 1] + result["air_temperature"][:, row] / HOURS
-        growth_state, growth_memory = advance(np, growth, growth_state, at(growth, row), growth_memory, now)
-        for index, name in enumerate(growth.states):
-            result[name][:, row] = growth_state[:, index]
-    result |= _harvest(simulator.harvest, result, known)
+        carried, values = run_hour(np, simulator, carried, {name: drivers[name][:, row] for name in given}, now)
+        for name, column in result.items():
+            column[:, row] = values[name][:, 0]
+    return result | _harvest(simulator, result, known)
+
+
+def free_growth(
+    simulator: NetworkSimulator, climate: Mapping[str, Values], start: Mapping[str, float], hour: Values
+) -> dict[str, Values]:
+    """Run growth alone from the first hour under a climate that is known.
+
+    Parameters
+    ----------
+    climate
+        Name -> (runs, hours) of the growth stage's drivers but crop_age and thermal_time; and global_radiation and
+        lamp_on.
+    start
+        The states of growth and harvest at the first hour.
+
+    Returns
+    -------
+    Name -> (runs, hours) of the states of growth.
+    """
+    runs, hours = climate["air_temperature"].shape
+    first = {name: np.full((runs, 1), value) for name, value in start.items()}
+    given = [name for name in simulator.growth.drivers if name not in ("crop_age", "thermal_time")]
+    carried = begin(simulator, {**climate, **first})
+    columns = {name: climate[name].astype(np.float32)[..., None] for name in given}
+    result = {name: np.tile(first[name], (1, hours)) for name in simulator.growth.states}
+    for row in range(1, hours):
+        now = np.full((runs, 1), hour[row], dtype=np.float32)
+        carried, values = grow_hour(np, simulator, carried, {name: columns[name][:, row] for name in given}, now)
+        for name, column in result.items():
+            column[:, row] = values[name][:, 0]
     return result
 
 
@@ -82,7 +232,10 @@ def daily_drivers(names: Sequence[str], columns: Mapping[str, Values]) -> Values
     return np.stack(means, axis=-1)
 
 
-def _harvest(stage: Stage, result: Mapping[str, Values], known: Mapping[str, Values]) -> dict[str, Values]:
+def _harvest(
+    simulator: NetworkSimulator, result: Mapping[str, Values], known: Mapping[str, Values]
+) -> dict[str, Values]:
+    stage = simulator.harvest
     drivers = daily_drivers(stage.drivers, result).astype(np.float32)
     state = np.stack([known[name][:, 0] for name in stage.states], axis=-1).astype(np.float32)
     memory = initial_memory(np, stage, drivers[:, 0])

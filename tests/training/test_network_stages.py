@@ -106,7 +106,27 @@ def test_torch_and_numpy_give_the_same_run(trained) -> None:
     for t in range(1, HOURS):
         now = np.full((len(start), 1), hour[t], dtype=np.float32)
         state, memory = advance(np, stage, state, drivers[:, t].astype(np.float32), memory, now)
-        assert np.abs((state - torch_run[:, t]) / stage.state_scale).max() < 1e-3
+        assert np.abs((state - torch_run[:, t]) / stage.state_scale).max() < 1e-4
+
+
+def test_steps_made_by_hand_are_added_and_not_learned() -> None:
+    columns, hour = seasons(2)
+    drivers, states = columns["heating_setpoint"][..., None], columns["air_temperature"][..., None]
+    valid = np.ones(states.shape[:2], dtype=bool)
+    jumps = np.zeros_like(states)
+    jumps[:, 100::50] = -7.0
+    fallen = states + np.cumsum(jumps, axis=1)
+    low = replace(AIR, low=(-1e3,))
+    plain = StageData(drivers, states, hour, valid)
+    by_hand = StageData(drivers, fallen, hour, valid, jumps=jumps)
+    np.testing.assert_allclose(untrained(low, by_hand, 1).increment_scale, untrained(low, plain, 1).increment_scale)
+    start = untrained(low, by_hand, 1)
+    idle = replace(start, matrices=(start.matrices[0], 0 * start.matrices[1]))
+    plan = TrainingPlan(updates=((4, 1),), batch=16, learning_rate=0.0)
+    lines: list[str] = []
+    still = np.cumsum(jumps, axis=1) + 20.0
+    train_stage(idle, StageData(drivers, still, hour, valid, jumps=jumps), plan, lines.append)
+    assert lines[0].endswith("loss 0"), "steps that are known must cost a network that stands still nothing"
 
 
 def test_windows_start_where_they_are_told_with_filters_that_know_the_past(trained) -> None:

@@ -1,8 +1,9 @@
 """Virtual tomato seasons of Wageningen's simulator, as Cao et al. (2022) published them: one Parquet file.
 
 All seasons share a length and a clock; each is one row of every array. The pre-processing is the paper's:
-leaf area and plant load smoothed, net growth summed, two days masked on which the simulator did not follow
-the requested settings.
+plant load smoothed, net growth summed, two days masked on which the simulator did not follow the requested settings.
+The leaf area, which the paper smooths too, stays as it is here, with the picking of leaves in it; `smooth` is applied
+where it is scored.
 """
 
 from __future__ import annotations
@@ -14,14 +15,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.signal import savgol_filter
 
 from igrow_core.errors import IgrowError
+from trainer.training.leaf_picking import smooth
 
 FAULTY_DAYS = (15, 75)
 """Days of 24 rows, counted from 0, on which the settings that worked differ from the requested ones."""
-SMOOTHING_WINDOW = 999
-SMOOTHING_ORDER = 2
 
 Values = NDArray[np.float64]
 
@@ -63,18 +62,12 @@ class Seasons:
         return Seasons(tuple(self.names[row] for row in index), self.time, columns, self.valid)
 
 
-def smooth(values: Values) -> Values:
-    """Return (seasons, hours) as the paper smooths leaf area and plant load: Savitzky-Golay, never negative."""
-    window = min(SMOOTHING_WINDOW, values.shape[1] - 1 + values.shape[1] % 2)
-    smoothed: Values = np.maximum(savgol_filter(values, window, SMOOTHING_ORDER, axis=1), 0.0)
-    return smoothed
-
-
 def read_seasons(path: Path) -> Seasons:
     """Read a file in the format of trajectories.parquet, or the folder that holds one.
 
-    `net_growth` (kg m-2, cumulative) is made from the rate; `ventilation_offset` (K) is how far the vents'
-    setpoint stands above the heating setpoint, a setting that is the same in all published seasons.
+    `net_growth` (kg m-2, cumulative) is made from the rate; `ventilation_offset` (K) is how far the vents' setpoint
+    stands above the heating setpoint. Both setpoints move with ramps and sun, their difference does not: it is a
+    setting, hour by hour the same in all published seasons, however warm or cold they are.
 
     Raises TrajectoryFileError where the file is absent, lacks a column, or its seasons differ in length or time.
     """
@@ -96,10 +89,9 @@ def read_seasons(path: Path) -> Seasons:
         for name in table.columns
         if name not in ("trajectory", "time")
     }
-    columns["leaf_area_index"] = smooth(columns["leaf_area_index"])
     columns["plant_load"] = smooth(columns["plant_load"])
-    columns["net_growth"] = np.cumsum(columns["net_growth_rate"], axis=1) * 3600.0
     columns["ventilation_offset"] = columns["ventilation_setpoint_realised"] - columns["heating_setpoint_realised"]
+    columns["net_growth"] = np.cumsum(columns["net_growth_rate"], axis=1) * 3600.0
     valid = np.ones(time.size, dtype=bool)
     for day in FAULTY_DAYS:
         valid[day * 24 : (day + 1) * 24] = False

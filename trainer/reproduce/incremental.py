@@ -23,13 +23,14 @@ from numpy.typing import NDArray
 from igrow_core.errors import IgrowError
 from igrow_core.local_time import to_local
 from igrow_core.simulator.network import NetworkSimulator, Stage
+from igrow_core.simulator.network_run import free_growth
 from igrow_core.telemetry import Telemetry, to_grid
 from trainer.readers import agc2019
 from trainer.readers.wur2020 import Seasons, read_seasons
 from trainer.reproduce.scores import SCORED, score
 from trainer.reproduce.table1 import run_freely, split_seasons
 from trainer.training.simulator import Layouts, derived, hourly_data, train_simulator
-from trainer.training.stage import StageData, TrainingPlan, run_stage, run_windows, train_stage, untrained
+from trainer.training.stage import StageData, TrainingPlan, run_windows, train_stage, untrained
 
 Values = NDArray[np.float64]
 
@@ -81,10 +82,9 @@ def hourly_run(telemetry: Telemetry, seasons: Seasons, simulator: NetworkSimulat
         columns[name] = values[np.where(last < 0, int(np.argmax(known)), last)][None]
     light = simulator.light.par(np, columns["global_radiation"], columns["lamp_on"])
     full = derived({**columns, "par": light})
-    growth = simulator.growth
-    start = np.array([[seasons.columns[name][0, 0] for name in growth.states]])
-    drivers = np.stack([full[name] for name in growth.drivers], axis=-1)
-    full["leaf_area_index"] = run_stage(growth, drivers, seasons.hour, start)[..., 0]
+    crop = (*simulator.growth.states, *simulator.harvest.states)
+    start = {name: float(seasons.columns[name][0, 0]) for name in crop}
+    full["leaf_area_index"] = free_growth(simulator, full, start, seasons.hour)["leaf_area_index"]
     data = hourly_data(stage, full, seasons.hour, good[None])
     return RealRun(data, int(np.flatnonzero(good)[-1]) // WEEK + 1)
 

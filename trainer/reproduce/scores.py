@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from igrow_core.simulator.network_run import day_ends
+from trainer.training.leaf_picking import smooth
 
 Values = NDArray[np.float64]
 
@@ -47,8 +48,14 @@ def r2(truth: Values, predicted: Values) -> Values:
 
 
 def score(truth: Mapping[str, Values], predicted: Mapping[str, Values], valid: NDArray[np.bool_]) -> dict[str, Score]:
-    """Return the scores of all quantities; columns are (runs, hours), hours that are not `valid` do not count."""
+    """Return the scores of all quantities; columns are (runs, hours), hours that are not `valid` do not count.
+
+    The leaf area is smoothed on both sides, as the paper scores it: the trend, not the day of each picking.
+    """
     scores = {}
+    truth, predicted = (
+        {**columns, "leaf_area_index": smooth(columns["leaf_area_index"])} for columns in (truth, predicted)
+    )
     for name in SCORED:
         rows = np.flatnonzero(valid)
         if name == "fruit_fresh_weight":

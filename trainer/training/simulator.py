@@ -15,6 +15,7 @@ from igrow_core.quantities import QUANTITIES
 from igrow_core.simulator.network import HOURS, LightFormula, NetworkSimulator, Stage
 from igrow_core.simulator.network_run import daily_drivers, day_ends
 from trainer.training.ensemble import merge
+from trainer.training.leaf_picking import fit_picking, followed, picked_area
 from trainer.training.stage import Report, StageData, StageLayout, TrainingPlan, train_stage, untrained
 
 Values = NDArray[np.float64]
@@ -57,11 +58,13 @@ CLIMATE = layout(
     (128, 128),
     clock=True,
 )
-GROWTH = layout("growth", ("leaf_area_index", "plant_load", "net_growth"), GROWTH_DRIVERS, (24.0, 240.0), (64, 64))
+GROWTH = layout(
+    "growth", ("leaf_area_index", "plant_load", "net_growth"), GROWTH_DRIVERS, (24.0, 240.0, 720.0), (64, 64)
+)
 HARVEST = layout("harvest", ("fruit_fresh_weight",), HARVEST_DRIVERS, (5.0, 20.0), (32, 32), step=24.0)
 
-CLIMATE_PLAN = TrainingPlan(updates=((4, 14000), (16, 7000), (48, 3000)))
-GROWTH_PLAN = TrainingPlan(updates=((4, 2000), (24, 1000), (120, 500)))
+CLIMATE_PLAN = TrainingPlan(updates=((4, 10000), (16, 5000), (48, 1200)))
+GROWTH_PLAN = TrainingPlan(updates=((4, 3000), (24, 1500), (120, 400)), decay=0.3)
 HARVEST_PLAN = TrainingPlan(updates=((4, 1000), (30, 600)), batch=128)
 
 
@@ -107,7 +110,12 @@ def hourly_data(
             values = np.concatenate([values[:, :1], values[:, :-1]], axis=1)
         drivers.append(values)
     states = np.stack([columns[name] for name in stage.states], axis=-1)
-    return StageData(np.stack(drivers, axis=-1), states, hour, np.broadcast_to(valid, states.shape[:2]).copy())
+    jumps = None
+    if "leaf_area_index" in stage.states:
+        jumps = np.zeros_like(states)
+        jumps[..., stage.states.index("leaf_area_index")] = -picked_area(columns["leaf_area_index"])
+    known = np.broadcast_to(valid, states.shape[:2]).copy()
+    return StageData(np.stack(drivers, axis=-1), states, hour, known, jumps=jumps)
 
 
 def daily_data(stage: StageLayout | Stage, columns: Mapping[str, Values]) -> StageData:
@@ -159,10 +167,11 @@ def train_simulator(
     # Growth learns from the light that it will be given in a free run.
     formula = light.par(np, columns["global_radiation"], columns["lamp_on"])
     full = derived({**columns, "par": formula})
+    crop = {**full, "leaf_area_index": followed(full["leaf_area_index"])}
     stages = (
         (chosen.climate, hourly_data(chosen.climate, full, hour, valid), chosen.climate_plan),
-        (chosen.growth, hourly_data(chosen.growth, full, hour, valid), chosen.growth_plan),
-        (chosen.harvest, daily_data(chosen.harvest, full), chosen.harvest_plan),
+        (chosen.growth, hourly_data(chosen.growth, crop, hour, valid), chosen.growth_plan),
+        (chosen.harvest, daily_data(chosen.harvest, crop), chosen.harvest_plan),
     )
     tasks = [
         (untrained(stage, data, seed + member), data, replace(plan, seed=seed + member))
@@ -182,7 +191,8 @@ def train_simulator(
     climate, growth, harvest = (
         merge(trained[first : first + chosen.members]) for first in range(0, len(tasks), chosen.members)
     )
-    return NetworkSimulator(climate, growth, harvest, light)
+    picking = fit_picking(full["leaf_area_index"], full["thermal_time"], hour)
+    return NetworkSimulator(climate, growth, harvest, light, picking)
 
 
 def _train_alone(stage: Stage, data: StageData, plan: TrainingPlan) -> Stage:

@@ -69,6 +69,8 @@ class StageData:
     """(runs, steps); a false one counts neither as target nor as a window's start."""
     weight: Values = field(default_factory=lambda: np.ones(1))
     """(runs,) or (1,): how often a run is drawn, relative to the others."""
+    jumps: Values | None = None
+    """(runs, steps, s) by which a hand moved the states in each step (leaves picked); not learned, but added."""
 
 
 def filtered(stage: Stage | StageLayout, drivers: Values) -> Values:
@@ -93,7 +95,8 @@ def untrained(layout: StageLayout, data: StageData, seed: int) -> Stage:
     generator = np.random.default_rng(seed)
     features = raw_features(layout, data.drivers, data.hour)[data.valid]
     states = data.states[data.valid]
-    increments = np.diff(data.states, axis=1)[data.valid[:, 1:] & data.valid[:, :-1]]
+    moved = np.diff(data.states, axis=1) - (0.0 if data.jumps is None else data.jumps[:, 1:])
+    increments = moved[data.valid[:, 1:] & data.valid[:, :-1]]
     count, outputs = features.shape[-1] + len(layout.states), len(layout.states)
     matrices: list[Weights] = []
     biases: list[Weights] = []
@@ -143,19 +146,24 @@ class StageModule(torch.nn.Module):
         """Return states in units of their spread."""
         return torch.tensor(((states - self.stage.state_offset) / self.stage.state_scale).astype(np.float32))
 
-    def forward(self, features: torch.Tensor, state: torch.Tensor) -> torch.Tensor:
-        """Run freely: scaled features (batch, steps, f) and start (batch, s) -> scaled states (batch, steps, s)."""
+    def forward(self, features: torch.Tensor, state: torch.Tensor, jumps: torch.Tensor | None = None) -> torch.Tensor:
+        """Run freely: scaled features (batch, steps, f) and start (batch, s) -> scaled states (batch, steps, s).
+
+        `jumps` (batch, steps, s) are added to the states after their step.
+        """
         inner = features.shape[-1]
         prepared = (features @ self.matrices[0][:inner] + self.biases[0]).unbind(1)
         state_matrix = self.matrices[0][inner:]
         outputs = []
-        for known in prepared:
+        for step, known in enumerate(prepared):
             values = torch.addmm(known, state, state_matrix)
             for matrix, bias in zip(list(self.matrices)[1:], list(self.biases)[1:], strict=True):
                 values = torch.addmm(bias, torch.nn.functional.silu(values), matrix)
             if any(self.stage.cumulative):
                 values = torch.where(self.cumulative, torch.nn.functional.softplus(values), values)
             state = torch.minimum(torch.maximum(state + self.increment * values, self.low), self.high)
+            if jumps is not None:
+                state = state + jumps[:, step]
             outputs.append(state)
         return torch.stack(outputs, dim=1)
 
@@ -181,6 +189,7 @@ def train_stage(stage: Stage, data: StageData, plan: TrainingPlan, report: Repor
     known = data.valid & np.isfinite(data.states).all(axis=-1)
     counts = torch.tensor((data.valid[..., None] & np.isfinite(data.states)).astype(np.float32))
     states = module.scaled_states(np.nan_to_num(data.states))
+    jumps = None if data.jumps is None else torch.tensor((data.jumps / stage.state_scale).astype(np.float32))
     optimizer = torch.optim.AdamW(module.parameters(), plan.learning_rate, weight_decay=plan.decay)
     total = sum(updates for _, updates in plan.updates)
     done = 0
@@ -206,7 +215,7 @@ def train_stage(stage: Stage, data: StageData, plan: TrainingPlan, report: Repor
             start, target, count = states[run[:, 0], rows[:, 0]], states[run, rows[:, 1:]], counts[run, rows[:, 1:]]
             if plan.state_noise:
                 start = start + plan.state_noise * torch.randn(start.shape)
-            predicted = module(features[run, rows[:, 1:]], start)
+            predicted = module(features[run, rows[:, 1:]], start, None if jumps is None else jumps[run, rows[:, 1:]])
             loss = (((predicted - target) ** 2) * count).sum() / count.sum().clamp(min=1.0)
             optimizer.zero_grad()
             loss.backward()
