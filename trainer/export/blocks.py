@@ -42,7 +42,12 @@ def trace(name: str, formula: Formula, inputs: Sequence[str]) -> Block:
         formula: pure and elementwise, or of matrix products with constants.
         inputs: names of what it may read; the block keeps those that its outputs depend on.
     """
-    arguments = {key: ndx.argument(shape=("batch",), dtype=ndx.float32) for key in inputs}
+    return trace_shaped(name, formula, dict.fromkeys(inputs, ("batch",)))
+
+
+def trace_shaped(name: str, formula: Formula, inputs: Mapping[str, tuple[str | int, ...]]) -> Block:
+    """Trace a formula over arrays of the shapes given by name into a block; see `trace`."""
+    arguments = {key: ndx.argument(shape=shape, dtype=ndx.float32) for key, shape in inputs.items()}
     results = dict(formula(ndx, arguments))
     if not results:
         raise ValueError(f"block {name} returns nothing")
@@ -50,6 +55,8 @@ def trace(name: str, formula: Formula, inputs: Sequence[str]) -> Block:
         {f"in_{key}": value for key, value in arguments.items()},
         {f"out_{key}": value for key, value in results.items()},
     )
+    for node in model.graph.node:
+        _einsum_to_product(node)
     read = {tensor for node in model.graph.node for tensor in node.input}
     kept = [key for key in inputs if f"in_{key}" in read]
     function = helper.make_function(
@@ -61,6 +68,13 @@ def trace(name: str, formula: Formula, inputs: Sequence[str]) -> Block:
         [helper.make_opsetid("", OPSET)],
     )
     return Block(name, tuple(kept), tuple(results), function)
+
+
+def _einsum_to_product(node: NodeProto) -> None:
+    """Make a product of two matrices, which ndonnx writes as an Einsum, the operator that runtimes are fast at."""
+    if node.op_type == "Einsum" and node.attribute[0].s == b"ab,bc->ac":
+        node.op_type = "MatMul"
+        del node.attribute[:]
 
 
 def open_model(model: ModelProto) -> Any:

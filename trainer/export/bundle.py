@@ -85,7 +85,7 @@ def write_hybrid_bundle(folder: Path, model: HybridModel, *, created: datetime, 
         igrow_version=version("igrow"),
         variant="hybrid",
         opset=OPSET,
-        graphs=_signatures(planning) | {"optimizer": _plain_signature(graphs["optimizer"])},
+        graphs=_signatures(planning) | {"optimizer": plain_signature(graphs["optimizer"])},
         training_span=model.training_span,
         effects=model.effects,
         parameters={
@@ -221,7 +221,7 @@ def _signatures(blocks: plan.PlanBlocks) -> dict[str, GraphSignature]:
     }
 
 
-def _plain_signature(model: ModelProto) -> GraphSignature:
+def plain_signature(model: ModelProto) -> GraphSignature:
     """Return the names of a graph's inputs and outputs, whose entries are no quantities."""
     return GraphSignature(
         tuple(Tensor(one.name) for one in model.graph.input), tuple(Tensor(one.name) for one in model.graph.output)
@@ -298,7 +298,7 @@ def _golden_inputs(
             "seconds": np.array([300.0]),
             "parameters": parameters(blocks.climate.parameters),
         },
-        "optimizer": _optimizer_inputs(settings, genes, random),
+        "optimizer": optimizer_inputs(settings, genes, random),
     }
     return {
         graph: {name: np.ascontiguousarray(array, dtype=np.float32) for name, array in tensors.items()}
@@ -306,9 +306,11 @@ def _golden_inputs(
     }
 
 
-def _optimizer_inputs(
+def optimizer_inputs(
     settings: EvolutionSettings, genes: int, random: np.random.Generator
 ) -> dict[str, NDArray[np.float32]]:
+    """Return random inputs of the optimizer's graph for the self-test."""
+
     def population(count: int) -> NDArray[np.float32]:
         return random.random((count, genes), dtype=np.float32)
 

@@ -23,8 +23,9 @@ def evaluate(
 ) -> dict[str, Score]:
     """Run every season of `data` (a file in the format of trajectories.parquet) with the networks of `bundle`.
 
-    `bundle` is a folder with network.npz, or that file. Returns and prints the scores without the two faulty days,
-    prints those over every hour too, and writes both as JSON to `out` where given.
+    `bundle` is a bundle of the network variant, a folder of results that holds one, or a file of networks. Returns
+    and prints the scores without the two faulty days, prints those over every hour too, and writes both as JSON to
+    `out` where given.
     """
     simulator, seasons = load_simulator(bundle), read_seasons(data)
     predicted = run_freely(simulator, seasons)
@@ -48,7 +49,7 @@ def evaluate(
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Add the arguments of `evaluate`."""
-    parser.add_argument("--bundle", type=Path, required=True, help="folder with network.npz, or the file")
+    parser.add_argument("--bundle", type=Path, required=True, help="network bundle, or the folder of table1")
     parser.add_argument("--data", type=Path, required=True, help="a file in the format of trajectories.parquet")
     parser.add_argument("--out", type=Path, help="write the scores to this JSON file")
 

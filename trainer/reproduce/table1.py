@@ -14,21 +14,25 @@ import time
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from igrow_core.errors import IgrowError
 from igrow_core.simulator.network import NetworkSimulator
 from igrow_core.simulator.network_run import free_run
+from trainer.export.network import write_network_bundle
 from trainer.readers.wur2020 import Seasons, TrajectoryFileError, read_seasons
 from trainer.reproduce.scores import PUBLISHED_BASELINE, PUBLISHED_INCREMENTAL, SCORED, Score, score
-from trainer.training.checkpoint import save_simulator
+from trainer.training.checkpoint import BUNDLE_FOLDER
 from trainer.training.simulator import Layouts, train_simulator, with_setting_drivers
 
+SITE = "wur2020"
 SETTINGS = ("ventilation_offset", "lamp_radiation_limit")
 """Settings of the virtual greenhouse computer: inputs of the published seasons, the same in all of them."""
-LAYOUTS = with_setting_drivers(Layouts(), *SETTINGS)
+LAYOUTS = with_setting_drivers(Layouts(members=2), *SETTINGS)
 
 
 @dataclass(frozen=True)
@@ -77,12 +81,14 @@ def run(
     workers: int = 1,
     report: Callable[[str], None] = print,
 ) -> Table:
-    """Train, run the held-out seasons and write table1.json, table1.png and network.npz to `out`.
+    """Train, run the held-out seasons and write table1.json, table1.png and the folder `bundle` to `out`.
 
     Learns from training and selection seasons and holds out the test; with `choose` learns from the training seasons
     and holds out the selection.
     """
     begin = time.monotonic()
+    if (out / BUNDLE_FOLDER).exists():
+        raise IgrowError(f"{out / BUNDLE_FOLDER} exists already; name a new folder")
     seasons = read_seasons(folder)
     if len(seasons.names) < 4:
         raise TrajectoryFileError(f"{folder}: {len(seasons.names)} seasons; at least 4 are needed to hold some out")
@@ -90,8 +96,13 @@ def run(
     rows = split.training if choose else np.concatenate([split.training, split.selection])
     learned, held_out = seasons.select(rows), seasons.select(split.selection if choose else split.test)
     simulator = train_simulator(learned.columns, seasons.hour, seasons.valid, layouts, seed, report, workers)
-    out.mkdir(parents=True, exist_ok=True)
-    save_simulator(out, simulator)
+    write_network_bundle(
+        out / BUNDLE_FOLDER,
+        simulator,
+        site=SITE,
+        created=datetime.now(UTC),
+        training_range={name: (float(values.min()), float(values.max())) for name, values in learned.columns.items()},
+    )
     predicted = run_freely(simulator, held_out)
     mean = {name: values.mean(axis=0, keepdims=True) for name, values in learned.columns.items()}
     table = Table(
@@ -148,7 +159,7 @@ def plot(path: Path, truth: Seasons, predicted: dict[str, NDArray[np.float64]]) 
 def add_arguments(parser: ArgumentParser) -> None:
     """Add the arguments of `reproduce table1`."""
     parser.add_argument("--data", type=Path, required=True, help="folder with trajectories.parquet, or the file")
-    parser.add_argument("--out", type=Path, required=True, help="folder for table1.json, table1.png and network.npz")
+    parser.add_argument("--out", type=Path, required=True, help="folder for table1.json, table1.png and the bundle")
     parser.add_argument("--seed", type=int, default=7, help="of the split, the weights and the windows (7)")
     parser.add_argument("--workers", type=int, default=2, help="processes that train side by side (2)")
     parser.add_argument("--choose", action="store_true", help="hold out the selection seasons, not the test")
