@@ -2,6 +2,7 @@
 
 later     fitted on the first weeks, tested on all later ones
 weekly    refitted before each test week, as a site in operation is (K2 = 7 days)
+metered   heat, electricity and CO2 that plans are charged for, told from the actuators, against the meters
 across    fitted on the other compartments, tested on this one; and with its first 7 days for calibration
 """
 
@@ -19,10 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.ensemble import HistGradientBoostingRegressor
 
+from igrow_core.economics import local_days
 from igrow_core.errors import IgrowError
+from igrow_core.planner.recent_use import used_in
 from igrow_core.simulator.hybrid.nominal import nominal, site_record
 from igrow_core.simulator.hybrid.record import Record
 from igrow_core.simulator.uncertainty import ErrorGrowth
+from igrow_core.telemetry import Telemetry
 from trainer.calibration.actuation import setpoint_columns
 from trainer.calibration.evaluation import Errors, errors_of, summarise
 from trainer.calibration.forecast import Predictor, combined, remembering
@@ -216,6 +220,40 @@ def across(houses: Sequence[Greenhouse], every: float) -> dict[str, object]:
     return tables
 
 
+def metered(log: Log) -> dict[str, object]:
+    """Daily use as `recent_use.used_in` tells it from a log, against the data set's own meters."""
+    if log.site is None or log.resources is None:
+        raise IgrowError(f"{log.name}: no meters are read from this data set")
+    telemetry, table = log.telemetry, log.resources
+    local = local_days(telemetry.time, log.site.time_zone)
+    meters = {
+        "heat": ("MJ m-2", table["heat"]),
+        "electricity": ("kWh m-2", table["electricity_peak"] + table["electricity_off_peak"]),
+        "co2": ("kg m-2", table["co2"]),
+    }
+    used: dict[str, list[float]] = {name: [] for name in meters}
+    for day in table.day:
+        rows = local == day
+        of_day = Telemetry(telemetry.time[rows], {name: values[rows] for name, values in telemetry.columns.items()})
+        found = used_in(of_day, log.site.greenhouse)
+        for name in meters:
+            used[name].append(found[name])
+    print(f"\n{log.name}: told from the actuators, metered, difference of the sums, median day's difference")
+    result: dict[str, object] = {}
+    for name, (unit, measured) in meters.items():
+        told = np.array(used[name])
+        both = np.isfinite(told) & np.isfinite(measured)
+        worth = both & (measured > 0.05 * np.nanmean(measured))
+        median = float(np.median(np.abs(told - measured)[worth] / measured[worth]))
+        sums = float(told[both].sum()), float(measured[both].sum())
+        print(
+            f"  {name + ' (' + unit + ')':24s} {sums[0]:10.4g} {sums[1]:10.4g} "
+            f"{100 * (sums[0] / sums[1] - 1):+7.1f} % {100 * median:7.1f} %  ({both.sum()} days)"
+        )
+        result[name] = {"told": sums[0], "metered": sums[1], "median_day": median, "days": int(both.sum())}
+    return result
+
+
 def print_coverage(parts: Sequence[object]) -> None:
     print("\ncoverage of 90 % intervals")
     pooled: dict[tuple[str, str], list[tuple[float, float]]] = {}
@@ -247,22 +285,25 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("data", type=Path, help="folder of the data set")
     parser.add_argument("compartments", nargs="*", help="names; none: all that have a climate file")
-    parser.add_argument("--tables", nargs="+", choices=("later", "weekly", "across"), default=["later"])
+    parser.add_argument("--tables", nargs="+", choices=("later", "weekly", "across", "metered"), default=["later"])
     parser.add_argument("--every", type=float, default=11_100.0, help="seconds between starts of test runs")
     parser.add_argument("--refit", type=int, default=1, help="weeks between refits of the table weekly")
     parser.add_argument("--json", type=Path, help="file for the tables")
     given = parser.parse_args()
     try:
         names = given.compartments or challenge.compartments(given.data, "GreenhouseClimate", "Greenhouse_climate")
-        houses = [Greenhouse(open_log(given.data, name)) for name in names] or [Greenhouse(open_log(given.data))]
+        logs = [open_log(given.data, name) for name in names] or [open_log(given.data)]
+        result: dict[str, object] = {}
+        if "metered" in given.tables:
+            result["metered"] = {log.name: metered(log) for log in logs}
+        houses = [Greenhouse(log) for log in logs] if set(given.tables) != {"metered"} else []
     except IgrowError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
-    result: dict[str, object] = {}
     for table in given.tables:
         if table == "across":
             result["across"] = across(houses, given.every)
-        else:
+        elif table != "metered":
             result[table] = {
                 house.log.name: later(house, given.every)
                 if table == "later"

@@ -55,7 +55,9 @@ def used_in(log: Telemetry, greenhouse: Greenhouse) -> dict[str, float]:
 
     Heat is what leaves the pipes by the site's coefficients; growth is the difference of its last and first value.
     """
-    hours = float((log.time[-1] - log.time[0]) / np.timedelta64(1, "s")) / 3600.0 if len(log) > 1 else np.nan
+    # Each of n rows stands for a step, but from the first to the last there are n - 1.
+    whole = len(log) / (len(log) - 1.0) if len(log) > 1 else np.nan
+    hours = whole * float((log.time[-1] - log.time[0]) / np.timedelta64(1, "s")) / 3600.0 if len(log) > 1 else np.nan
     nothing = np.full(len(log), np.nan)
 
     def column(name: str) -> Values:
@@ -77,7 +79,7 @@ def used_in(log: Telemetry, greenhouse: Greenhouse) -> dict[str, float]:
         "heat": total(pipes) * 3.6e-3,
         "electricity": total(column("lamp_power")) * 1e-3,
         "co2": total(column("co2_dosing")),
-        "net_growth": float(grown[-1] - grown[0]) if counted else float("nan"),
+        "net_growth": whole * float(grown[-1] - grown[0]) if counted else float("nan"),
     }
 
 
