@@ -28,12 +28,14 @@ from igrow_core.simulator.hybrid.record import Record
 from igrow_core.simulator.uncertainty import ErrorGrowth
 from igrow_core.telemetry import Telemetry
 from trainer.calibration.actuation import setpoint_columns
-from trainer.calibration.evaluation import Errors, errors_of, summarise
-from trainer.calibration.forecast import Predictor, combined, remembering
+from trainer.calibration.evaluation import Errors, errors_of, starts_within, summarise
+from trainer.calibration.forecast import Predictor, remembering
 from trainer.calibration.posterior import prior
 from trainer.calibration.site_model import SiteModel, adapt, fit_site, from_few_days
 from trainer.calibration.split import weeks
 from trainer.calibration.totals import coverage, daily_totals
+from trainer.export.plan import RANGED
+from trainer.model import known_range
 from trainer.readers import challenge
 from trainer.readers.log import Log
 from trainer.readers.open_log import open_log
@@ -72,7 +74,7 @@ def predictors(house: Greenhouse, model: SiteModel) -> Predictors:
         by_setpoints = remembering(model.closed_predictor(house.record, house.setpoints))
         found["hybrid, setpoints"] = (by_setpoints, model.closed_growth)
         if model.combinations:
-            both = combined(house.record, by_actuators, by_setpoints, model.combinations)
+            both = model.combined_predictor(house.record, house.setpoints, by_actuators, by_setpoints)
             found["hybrid, combined"] = (remembering(both), model.combined_growth)
     return found
 
@@ -171,6 +173,7 @@ def later(house: Greenhouse, every: float) -> dict[str, object]:
     )
     table = show(title, found)
     print_coverage([coverage(house.record, ways, rows, None, every)])
+    print_range(house, model, ways["hybrid, setpoints"][0], fit, rows, every)
     print_totals([daily_totals(house.record, house.setpoints, model, rows)])
     return table
 
@@ -263,6 +266,44 @@ def print_coverage(parts: Sequence[object]) -> None:
     for (driven, key), values in pooled.items():
         inside, number = np.sum(np.array(values), axis=0)
         print(f"  {driven:10s} {key:28s} {inside / max(number, 1):.3f}")
+
+
+def print_range(house: Greenhouse, model: SiteModel, predict: Predictor, fit: Mask, rows: Mask, every: float) -> None:
+    """Tell whether runs outside the training range are worse: by both measures, the error of 24 h runs.
+
+    `bounds` is what a bundle's graph tells planning: the largest excess over the bounds of single quantities
+    (`trainer.model.known_range`). `TrainingRange` sees combinations that never occurred too.
+    """
+    record = house.record
+    known = {**record.inputs, **record.measured, **house.setpoints}
+    bounds = known_range({name: known[name][fit] for name in RANGED})
+    excess = {
+        "bounds": np.max(
+            [np.maximum(low - known[name], known[name] - high) / (high - low) for name, (low, high) in bounds.items()],
+            axis=0,
+        ),
+        "TrainingRange": model.range.excess(np, {name: known[name] for name in model.range.names}),
+    }
+    steps = round(86_400.0 / record.step)
+    starts = starts_within(record, rows, steps, max(1, round(every / record.step)))
+    ahead = starts + 1 + np.arange(steps)[:, None]
+    errors = {
+        name: np.nanmean(np.abs(values - record.measured[name][ahead]), axis=0)
+        for name, values in predict(starts, steps).items()
+        if name in record.measured
+    }
+    print("\nerror of 24 h runs by the share of their rows outside the training range")
+    for measure, values in excess.items():
+        share = np.nanmean(values[ahead] > 0.0, axis=0)
+        for title, chosen in (
+            ("none", share == 0.0),
+            ("up to 20 %", (share > 0.0) & (share <= 0.2)),
+            ("more", share > 0.2),
+        ):
+            cells = "".join(
+                f"{name} {np.nanmean(error[chosen]):8.3g}  " for name, error in errors.items() if chosen.any()
+            )
+            print(f"  {measure:14s} {title:10s} {chosen.sum():5d} runs  {cells}")
 
 
 def print_totals(parts: Sequence[object]) -> None:

@@ -106,25 +106,6 @@ def fit_combination(
     return result
 
 
-def combined(
-    record: Record, by_actuators: Predictor, by_setpoints: Predictor, combinations: Mapping[str, Combination]
-) -> Predictor:
-    """Return the combined predictor."""
-
-    def predict(starts: NDArray[np.int64], steps: int) -> dict[str, Floats]:
-        one, other = by_actuators(starts, steps), by_setpoints(starts, steps)
-        usual_one = usual_error(record, by_actuators, starts, steps)
-        usual_other = usual_error(record, by_setpoints, starts, steps)
-        place = cells(record, starts, steps)
-        return {
-            name: (1.0 - how.setpoints_weight[place]) * (one[name] + how.actuators_share[place] * usual_one[name])
-            + how.setpoints_weight[place] * (other[name] + how.setpoints_share[place] * usual_other[name])
-            for name, how in combinations.items()
-        }
-
-    return predict
-
-
 def remembering(predict: Predictor) -> Predictor:
     """Return the predictor with a memory of what it was asked, for tables that ask the same twice."""
     known: dict[tuple[bytes, int], Mapping[str, Floats]] = {}

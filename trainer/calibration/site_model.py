@@ -15,10 +15,11 @@ from igrow_core.simulator.hybrid.disturbance import DisturbanceModel, missing_fl
 from igrow_core.simulator.hybrid.record import Record
 from igrow_core.simulator.uncertainty import ErrorGrowth, TrainingRange, error_growth, training_range
 from trainer.calibration.actuation import fit_actuation, refine_actuation
+from trainer.calibration.correction import Correction, all_runs, apply_correction, fit_correction
 from trainer.calibration.disturbance import fit_disturbance
 from trainer.calibration.evaluation import evaluate, run_fluxes, starts_within
 from trainer.calibration.fit import calibrate
-from trainer.calibration.forecast import Combination, combined, fit_combination
+from trainer.calibration.forecast import Combination, Predictor, fit_combination, remembering
 from trainer.calibration.posterior import Posterior
 from trainer.calibration.remainder import Remainder, fit_remainder
 
@@ -36,8 +37,9 @@ RANGE_DRIVERS = (
     "lamp_on",
 )
 """What the training range watches: weather, climate and setpoints of a plan."""
-_INDEPENDENT = 3.0
-"""Independent errors that a day is worth, for the width of intervals."""
+_INDEPENDENT = {24.0: 3.0, 168.0: 1.0}
+"""Length of runs in hours -> independent errors that a day is worth, for the width of intervals: within a day morning,
+noon and night differ; of runs of a week the errors last from day to day, and one a day is generous."""
 _PENALTIES = (0.03, 0.1, 0.3, 1.0)
 
 
@@ -57,6 +59,8 @@ class SiteModel:
     """By quantity, of runs driven by setpoints."""
     combinations: Mapping[str, Combination]
     """By quantity, how forecasts combine both ways to run."""
+    correction: Correction
+    """What combined forecasts still miss."""
     combined_growth: Mapping[str, ErrorGrowth]
     """By quantity, of combined forecasts."""
     range: TrainingRange
@@ -92,10 +96,18 @@ class SiteModel:
         return predict
 
     def combined_predictor(
-        self, record: Record, setpoints: Mapping[str, Floats]
-    ) -> Callable[[NDArray[np.int64], int], Mapping[str, Floats]]:
-        """Return `predict(starts, steps)`: both ways to run combined, their usual errors taken off."""
-        return combined(record, self.predictor(record), self.closed_predictor(record, setpoints), self.combinations)
+        self, record: Record, setpoints: Mapping[str, Floats], by_actuators: Predictor, by_setpoints: Predictor
+    ) -> Predictor:
+        """Return `predict(starts, steps)`: both ways to run combined, what they usually miss taken off.
+
+        `by_actuators` and `by_setpoints` are this model's `predictor` and `closed_predictor` of the same record.
+        """
+
+        def predict(starts: NDArray[np.int64], steps: int) -> Mapping[str, Floats]:
+            runs = all_runs(record, by_actuators, by_setpoints, self.combinations, starts, steps)
+            return apply_correction(record, setpoints, self.correction, runs, starts)
+
+        return predict
 
 
 def fit_site(
@@ -139,21 +151,32 @@ def fit_site(
         name: np.concatenate([_driver(part[0], part[1], name)[part[2]] for part in parts]) for name in RANGE_DRIVERS
     }
     model = SiteModel(
-        posterior, effects, remainder, disturbance, rules, {}, {}, {}, {}, training_range(_complete(table))
+        posterior, effects, remainder, disturbance, rules, {}, {}, {}, {}, {}, training_range(_complete(table))
     )
     model = replace(model, growth=_growth([(part[0], part[3], model.predictor(part[0])) for part in parts]))
     if not actuation:
         return model
     closed = [(part[0], part[3], model.closed_predictor(part[0], part[1])) for part in parts]
-    record, selection, by_setpoints = closed[0]
+    record, selection, _ = closed[0]
     steps = round(86_400.0 / record.step)
     starts = starts_within(record, selection, steps, round(10_500.0 / record.step))
     model = replace(model, closed_growth=_growth(closed))
     if len(starts) == 0:
         return model
-    by_actuators = model.predictor(record)
+    by_actuators, by_setpoints = remembering(model.predictor(record)), remembering(closed[0][2])
     model = replace(model, combinations=fit_combination(record, by_actuators, by_setpoints, starts, steps))
-    return replace(model, combined_growth=_growth([(record, selection, model.combined_predictor(record, parts[0][1]))]))
+    setpoints, fit = parts[0][1:3]
+
+    def corrected(rows: NDArray[np.bool_]) -> SiteModel:
+        begin = starts_within(record, rows, steps, round(10_500.0 / record.step))
+        if len(begin) == 0:
+            return model
+        runs = all_runs(record, by_actuators, by_setpoints, model.combinations, begin, steps)
+        return replace(model, correction=fit_correction(record, setpoints, runs, begin))
+
+    # The doubt is that of a correction which has not seen the selection weeks; the one in use has seen all.
+    doubted = corrected(fit).combined_predictor(record, setpoints, by_actuators, by_setpoints)
+    return replace(corrected(fit | selection), combined_growth=_growth([(record, selection, doubted)]))
 
 
 def adapt(model: SiteModel, record: Record, rows: NDArray[np.bool_], widening: float = 1.5) -> SiteModel:
@@ -169,7 +192,7 @@ def from_few_days(record: Record, rows: NDArray[np.bool_], knowledge: Posterior)
     """Return a model of a site of which there are few days and nothing else: parameters, and usual disturbances."""
     posterior = calibrate([(record, rows)], knowledge, {})
     table = {name: _driver(record, {}, name)[rows] for name in RANGE_DRIVERS}
-    return SiteModel(posterior, {}, None, DisturbanceModel(), {}, {}, {}, {}, {}, training_range(_complete(table)))
+    return SiteModel(posterior, {}, None, DisturbanceModel(), {}, {}, {}, {}, {}, {}, training_range(_complete(table)))
 
 
 def _choose_remainder(
@@ -218,11 +241,12 @@ def _growth(
                 if quantity in record.measured:
                     error = record.measured[quantity][following] - predicted
                     sun = record.inputs["global_radiation"][following]
-                    pooled.setdefault(quantity, []).append((lead[keep], error[keep], sun[keep], days))
+                    independent = _INDEPENDENT[hours] * days
+                    pooled.setdefault(quantity, []).append((lead[keep], error[keep], sun[keep], independent))
     growth = {}
     for quantity, pieces in pooled.items():
         parts_of_growth = [
-            error_growth(error, lead, sun, independent=_INDEPENDENT * days) for lead, error, sun, days in pieces
+            error_growth(error, lead, sun, independent=independent) for lead, error, sun, independent in pieces
         ]
         first = parts_of_growth[0]
         later = [one for one in parts_of_growth[1:] if one.hours[0] > first.hours[-1]]
