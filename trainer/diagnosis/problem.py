@@ -19,6 +19,7 @@ from trainer.diagnosis.linearisation import Floats, Linearisation
 from trainer.diagnosis.prior import Prior
 from trainer.diagnosis.split import Split
 
+HOUR = 3600.0
 ROUNDS = 3
 """Alternations between parameters and the colour of the disturbances."""
 
@@ -53,10 +54,27 @@ class Problem:
     """The known and the usual misfits as errors, not whitened, (known + usual, 3, r, steps)."""
 
 
-def counted_rows(line: Linearisation, balances: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Tell which rows have an error in every balance at hand, (r, steps)."""
-    rows: NDArray[np.bool_] = np.all(line.runs.weight[list(balances)], axis=0)
-    return rows
+def hourly(values: Floats, step: float) -> Floats:
+    """Return means over hours along the last axis, (..., steps) to (..., hours).
+
+    Within the hour a greenhouse answers to a flux as its fast masses do (leaves, cover, the sensor's housing), which
+    the balances do not have; the mean of an hour hardly depends on them.
+
+    Args:
+        values: by step.
+        step: its length, s.
+    """
+    block = max(1, round(HOUR / step))
+    hours = values.shape[-1] // block
+    means: Floats = values[..., : hours * block].reshape(*values.shape[:-1], hours, block).mean(axis=-1)
+    return means
+
+
+def counted_hours(line: Linearisation, balances: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Tell which hours have an error in every balance at hand in each of their rows, (r, hours)."""
+    rows = np.all(line.runs.weight[list(balances)], axis=0)
+    counted: NDArray[np.bool_] = hourly(rows.astype(np.float64), line.record.step) > 1.0 - 1e-9
+    return counted
 
 
 def recalibrate(
@@ -78,23 +96,24 @@ def recalibrate(
     line, runs = start, start.runs
     balances = tuple(row for row in range(3) if runs.weight[row].mean() > 0.2)
     fitted = split.fit[runs.day][:, None]
-    observed = counted_rows(line, balances)
-    whitening = _noise(line.errors + misfit, balances, observed, fitted)
+    observed = counted_hours(line, balances)
+    step = line.record.step
+    whitening = _noise(hourly(line.errors + misfit, step), balances, observed, fitted)
     for _ in range(rounds):
         columns = linearisation.parameter_columns(line, names, prior.spread)
-        stack = np.concatenate([(line.errors + misfit)[None], columns])[:, list(balances)] * observed
+        stack = hourly(np.concatenate([(line.errors + misfit)[None], columns])[:, list(balances)], step) * observed
         flat = (whitening(stack) * fitted).reshape(len(stack), -1)
         products = flat @ flat.T
         # The prior's mean is where the search began, not where this round stands.
-        shift = np.array([parameters[name] - prior.mean[name] for name in names])
+        away = np.array([parameters[name] - prior.mean[name] for name in names])
         matrix = products[1:, 1:] + prior.precision
-        right = -products[1:, 0] - prior.precision @ shift
+        right = -products[1:, 0] - prior.precision @ away
         change = np.linalg.solve(matrix, right)
         parameters = prior.clip(
-            {name: parameters[name] + float(step) for name, step in zip(names, change, strict=True)}
+            {name: parameters[name] + float(part) for name, part in zip(names, change, strict=True)}
         )
         line = linearisation.linearise(line.record, runs, parameters, line.effects)
-        whitening = _noise(line.errors + misfit, balances, observed, fitted, whitening)
+        whitening = _noise(hourly(line.errors + misfit, step), balances, observed, fitted, whitening)
     return line, whitening, balances
 
 
@@ -156,7 +175,7 @@ def prepare(
     misfit = expected[0] if known else np.zeros_like(line.shown)
     line, whitening, balances = recalibrate(line, split, prior, misfit)
     chosen = list(balances)
-    observed = counted_rows(line, balances)
+    observed = counted_hours(line, balances)
     base = linearisation.parameter_columns(line, prior.names, prior.spread)
     found = candidates.candidate_columns(line, without)
     names, pattern = drivers.pattern_columns(line, longitude)
@@ -170,7 +189,7 @@ def prepare(
         expected[1 if known else 0 :],
     ]
     edges = np.cumsum([0] + [len(part) for part in parts])
-    white = np.concatenate([whitening(part[:, chosen] * observed) for part in parts])
+    white = np.concatenate([whitening(hourly(part[:, chosen], record.step) * observed) for part in parts])
     products = gram.daily_products(white, runs.day, split.days)
     spans = [range(int(edges[k]), int(edges[k + 1])) for k in range(1, len(parts))]
     parameter, candidate, ageing, patterned, first_known, usually = spans

@@ -16,7 +16,7 @@ from igrow_core.effects import EFFECTS
 from trainer.diagnosis import linearisation
 from trainer.diagnosis.activation import ActiveTerm, activate
 from trainer.diagnosis.linearisation import Floats, Linearisation
-from trainer.diagnosis.problem import Problem, counted_rows, recalibrate
+from trainer.diagnosis.problem import Problem, counted_hours, hourly, recalibrate
 from trainer.diagnosis.search import Fit
 from trainer.diagnosis.structure import SPREAD
 
@@ -69,8 +69,9 @@ def refine(problem: Problem, fit: Fit, terms: Sequence[ActiveTerm], before: Sequ
             problem.expected,
             np.stack(slopes),
         ]
-        rows = counted_rows(line, balances) & problem.split.fit[line.runs.day][:, None]
-        stack = np.concatenate([whitening(part[:, list(balances)] * rows) for part in columns])
+        hours = counted_hours(line, balances) & problem.split.fit[line.runs.day][:, None]
+        length = line.record.step
+        stack = np.concatenate([whitening(hourly(part[:, list(balances)], length) * hours) for part in columns])
         daily = stack.transpose(2, 0, 1, 3).reshape(len(line.runs.day), len(stack), -1)
         products = np.matmul(daily, daily.transpose(0, 2, 1))
         total = products.sum(axis=0)
@@ -180,8 +181,8 @@ def _regimes(line: Linearisation, residual: Floats, slope: Floats, amplitude: fl
 
     Args:
         line: of the refitted model.
-        residual: whitened, after the fit, (b, r, steps).
-        slope: whitened, of the amplitude, (b, r, steps).
+        residual: whitened, after the fit, (b, r, hours).
+        slope: whitened, of the amplitude, (b, r, hours).
         amplitude: as fitted on all rows.
     """
     rows = line.runs.rows - 1
@@ -202,10 +203,11 @@ def _regimes(line: Linearisation, residual: Floats, slope: Floats, amplitude: fl
     whole = float(np.sum(slope**2))
     found = {}
     for name, mask in masks.items():
-        curvature = float(np.sum((slope * mask) ** 2))
+        inside = hourly(mask.astype(np.float64), line.record.step) > 0.5
+        curvature = float(np.sum((slope * inside) ** 2))
         # A regime in which the effect hardly shows tells nothing of it.
         if curvature > 0.02 * whole:
-            change = -float(np.sum(slope * residual * mask)) / curvature
+            change = -float(np.sum(slope * residual * inside)) / curvature
             found[name] = (amplitude + change, curvature**-0.5)
     return found
 

@@ -57,6 +57,8 @@ _PASCAL_PER_CONTENT = 1.36e5
 _DRYING_SHARE = 0.6
 """Share of the evaporation's answer to warmer air that lasts over a step; moister air takes back the rest. It is what
 brings steps of 5 to 30 minutes closest to those of one (tests/simulator/test_step_length.py)."""
+_STOMATA_HALF_OPEN = 6.0
+"""Short-wave radiation at which the stomata of a canopy are half open, W m-2 (Stanghellini 1987: 3 for one leaf)."""
 _EXTINCTION = 0.7
 """Extinction of radiation in a tomato canopy (Stanghellini 1987)."""
 
@@ -83,14 +85,25 @@ def derive(xp: Any, state: Values, inputs: Drivers, parameters: Values, lamp_eff
     )
     sun = xp.maximum(inputs["global_radiation"], 0.0 * inputs["global_radiation"])
     radiation_inside = parameters["transmissivity"] * shade * sun
-    par = radiation_inside * _PAR_PER_GLOBAL + lamp_efficacy * inputs["lamp_power"]
+    sun_par = radiation_inside * _PAR_PER_GLOBAL
+    par = sun_par + lamp_efficacy * inputs["lamp_power"]
     deficit = air.vapour_pressure_deficit(xp, temperature, vapour)
     canopy = 1.0 - xp.exp(-_EXTINCTION * inputs["leaf_area_index"])
     radiation_on_crop = radiation_inside + parameters["lamp_radiation_share"] * inputs["lamp_power"]
     night = parameters["transpiration_night_share"]
-    day_share = night + (1.0 - night) * radiation_on_crop / (radiation_on_crop + 20.0)
+    day_share = night + (1.0 - night) * radiation_on_crop / (radiation_on_crop + _STOMATA_HALF_OPEN)
     response = 0.001 * parameters["transpiration_deficit"] * inputs["leaf_area_index"] * day_share
-    evaporation = parameters["transpiration_radiation"] * canopy * radiation_on_crop + response * deficit
+    screens = (1.0 - 0.01 * parameters["energy_screen_saving"] * inputs["energy_screen"]) * (
+        1.0 - 0.01 * parameters["blackout_screen_saving"] * inputs["blackout_screen"]
+    )
+    outdoor = inputs["outdoor_temperature"]
+    surroundings = outdoor + parameters["sky_share"] * (inputs["sky_temperature"] - outdoor)
+    # A crop that radiates to a cold cover is colder than the air, and evaporates less than the air's deficit says.
+    long_wave_loss = parameters["crop_long_wave_loss"] * screens * (temperature - surroundings)
+    evaporation = (
+        parameters["transpiration_radiation"] * canopy * (radiation_on_crop - long_wave_loss) + response * deficit
+    )
+    evaporation = xp.maximum(evaporation, zero)
     ppm = air.co2_fraction(temperature, co2)
     assimilation = (
         parameters["assimilation_maximum"]
@@ -123,7 +136,11 @@ def derive(xp: Any, state: Values, inputs: Drivers, parameters: Values, lamp_eff
         "vapour_deficit": deficit,
         "ventilation": ventilation,
         "air_blocked": blocked,
+        "screens": screens,
+        "surroundings": surroundings,
         "transpiration": evaporation / air.LATENT_HEAT,
+        "sun_transpiration": parameters["transpiration_radiation"] * canopy * radiation_inside / air.LATENT_HEAT,
+        "sun_share_of_par": sun_par / (par + 1e-3),
         "transpiration_response": response * deficit / (deficit + 1.0),
         "assimilation": assimilation,
         "rail_pipe_excess": xp.maximum(inputs["rail_pipe_temperature"] - temperature, zero),
@@ -164,17 +181,14 @@ def balances(
     exchange = leakage * drivers["air_blocked"] + drivers["ventilation"] + added.get("air_exchange", 0.0)
     light = 1.0 - added.get("light_loss", 0.0)
 
-    screens = (1.0 - 0.01 * parameters["energy_screen_saving"] * drivers["energy_screen"]) * (
-        1.0 - 0.01 * parameters["blackout_screen_saving"] * drivers["blackout_screen"]
-    )
+    screens = drivers["screens"]
     cover = screens * (
         parameters["cover_heat_transfer"] + parameters["cover_wind_heat_transfer"] * drivers["wind_speed"]
     )
-    surroundings = outdoor + parameters["sky_share"] * (drivers["sky_temperature"] - outdoor)
     rail = parameters["rail_pipe_heat_transfer"] * drivers["rail_pipe_excess"]
     grow = parameters["grow_pipe_heat_transfer"] * drivers["grow_pipe_excess"]
     sun = drivers["radiation_inside"] * light
-    transpiration = drivers["transpiration"]
+    transpiration = drivers["transpiration"] - (1.0 - light) * drivers["sun_transpiration"]
     to_mass = parameters["mass_heat_transfer"] * (temperature - mass)
     heat = (
         rail
@@ -182,7 +196,7 @@ def balances(
         + (parameters["lamp_heat_share"] + parameters["lamp_radiation_share"]) * drivers["lamp_power"]
         + parameters["solar_heat_share"] * sun
         - air.LATENT_HEAT * transpiration
-        - cover * (temperature - surroundings)
+        - cover * (temperature - drivers["surroundings"])
         - exchange * _VOLUMETRIC_HEAT * (temperature - outdoor)
         - to_mass
         + added.get("heat", 0.0)
@@ -210,7 +224,8 @@ def balances(
 
     outdoor_co2 = air.co2_concentration(outdoor, drivers["outdoor_co2"])
     respiration = parameters["respiration"] / 3.6e6 * xp.exp(0.0693147 * (temperature - 20.0))
-    assimilation = drivers["assimilation"] * light + added.get("assimilation", 0.0)
+    lit = 1.0 - (1.0 - light) * drivers["sun_share_of_par"]
+    assimilation = drivers["assimilation"] * lit + added.get("assimilation", 0.0)
     co2_flux = (
         parameters["dosing_share"] * drivers["co2_dosing"] / 3600.0
         - exchange * (co2 - outdoor_co2)

@@ -237,6 +237,16 @@ _ROWS = (
         "Baille et al. (1994)",
     ),
     (
+        "crop_long_wave_loss",
+        "W m-2 K-1",
+        1.0,
+        0.5,
+        0.0,
+        6.0,
+        "heat that the crop radiates to an unscreened cover, per kelvin between the air and what the cover sees",
+        "Stanghellini (1987)",
+    ),
+    (
         "condensation_transfer",
         "m s-1",
         0.002,
