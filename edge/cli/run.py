@@ -34,8 +34,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the daemon."""
     set_up_logging(verbose=options.verbose)
-    # The watchdog ends a daemon that hangs with SIGABRT; the journal then shows where it hung.
-    faulthandler.enable()
+    # The watchdog ends a daemon that hangs with SIGABRT; standard error, and so the journal, then shows where it hung.
+    faulthandler.enable(2)
     asyncio.run(run_daemon(options.configuration))
     return 0
 
