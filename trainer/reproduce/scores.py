@@ -50,7 +50,7 @@ def r2(truth: Values, predicted: Values) -> Values:
 def score(truth: Mapping[str, Values], predicted: Mapping[str, Values], valid: NDArray[np.bool_]) -> dict[str, Score]:
     """Return the scores of all quantities; columns are (runs, hours), hours that are not `valid` do not count.
 
-    The leaf area is smoothed on both sides, as the paper scores it: the trend, not the day of each picking.
+    The leaf area is smoothed on both sides, over all hours, as the paper scores it: the trend, not each picking.
     """
     scores = {}
     truth, predicted = (
