@@ -43,23 +43,30 @@ def main() -> int:
 
         return learn()
     seasons = options.season or ["winter", "spring"]
-    references = {}
-    for season in seasons:
-        print(f"calibrating on the reference log of {season}", file=sys.stderr)
-        references[season] = reference(season)
-    cases = draw(options.what, options.cases, {season: one.unit for season, one in references.items()})
     outcomes: list[Outcome] = []
     with ProcessPoolExecutor(options.processes) as pool:
-        for season in seasons:
-            own = [case for case in cases if case.season == season]
-            print(f"simulating {len(own)} logs of {season}", file=sys.stderr)
-            logs = simulate_cases(season, own, references[season].unit, options.days)
-            jobs = [(case, log, references[season]) for case, log in zip(own, logs, strict=True)]
-            for outcome in pool.map(_judge, jobs):
-                outcomes.append(outcome)
-                print(
-                    f"{outcome.case.name}: {outcome.case.causes} -> {outcome.verdict} {outcome.found}", file=sys.stderr
-                )
+        print(f"calibrating on the reference logs of {', '.join(seasons)}", file=sys.stderr)
+        references = dict(zip(seasons, pool.map(reference, seasons), strict=True))
+        cases = draw(options.what, options.cases, {season: one.unit for season, one in references.items()})
+        own = {season: [case for case in cases if case.season == season] for season in seasons}
+        print(f"simulating {len(cases)} logs", file=sys.stderr)
+        simulated = pool.map(
+            simulate_cases,
+            seasons,
+            own.values(),
+            [references[season].unit for season in seasons],
+            [options.days] * len(seasons),
+        )
+        jobs = [
+            (case, log, references[season])
+            for season, logs in zip(seasons, simulated, strict=True)
+            for case, log in zip(own[season], logs, strict=True)
+        ]
+        for number, outcome in enumerate(pool.map(_judge, jobs), 1):
+            outcomes.append(outcome)
+            case = outcome.case
+            said = f"{case.name}: {case.causes} -> {outcome.verdict} {outcome.found}"
+            print(f"{number} of {len(jobs)}: {said}", file=sys.stderr)
     if options.json:
         options.json.write_text("".join(json.dumps(asdict(one)) + "\n" for one in outcomes), encoding="utf-8")
     print(f"{len(outcomes)} cases, {options.days} days, seeds of {options.what}")

@@ -21,38 +21,40 @@ SMALLEST_GAIN = 13.0
 """Log-likelihood below which a pattern is no cause: a wrong structure makes as much."""
 LARGEST_P_VALUE = 0.005
 BETTER = 1.6
-"""A pattern that gains so many times what all names together gain replaces them."""
+"""A pattern that gains so many times what the name gains replaces it."""
 LEFT = 0.5
-"""Share of the names' gain that a pattern may still add beside them."""
+"""Share of the gain of the names found before that a pattern must add beside them: a form that is not quite the
+catalogue's leaves traces."""
 MOST_PATTERNS = 3
 
 
 @dataclass(frozen=True)
 class Adequacy:
-    """The names that stand, and what remains beside them."""
+    """The name that stands, or what remains where none does."""
 
     selected: Selected
     remainder: tuple[Hypothesis, ...] | None
     """Patterns that fit what no candidate explains; None where nothing remains."""
     pattern_gain: float
-    """Of the best single pattern instead of the names."""
-    left_gain: float
-    """Of the best pattern beside the names."""
+    """Of the best single pattern instead of the name."""
 
 
-def judge(problem: Problem, chain: Sequence[Selected], rng: np.random.Generator) -> Adequacy:
-    """Judge the longest model of a chain against patterns."""
+def judge(problem: Problem, chain: Sequence[Selected], explained: float, rng: np.random.Generator) -> Adequacy:
+    """Judge the longest model of a chain against patterns.
+
+    Args:
+        problem: that it was found in.
+        chain: from no name to the best one.
+        explained: log-likelihood that the names found before, now part of the model, have gained.
+        rng: for the flips.
+    """
     none, named = chain[0], chain[-1]
     gained = named.fit.solution.gain - none.fit.solution.gain
     instead = _best(problem, none.fit, rng)
-    beside = _best(problem, named.fit, rng) if named.hypotheses else instead
-    instead_gain = instead.gain if instead else 0.0
-    beside_gain = beside.gain if beside else 0.0
-    if instead is not None and instead_gain > max(SMALLEST_GAIN, BETTER * gained):
-        return Adequacy(none, _patterns(problem, none.fit, rng), instead_gain, beside_gain)
-    if beside is not None and beside_gain > max(SMALLEST_GAIN, LEFT * gained):
-        return Adequacy(named, _patterns(problem, named.fit, rng), instead_gain, beside_gain)
-    return Adequacy(named, None, instead_gain, beside_gain)
+    gain = instead.gain if instead else 0.0
+    if gain > max(SMALLEST_GAIN, BETTER * gained, LEFT * explained):
+        return Adequacy(none, _patterns(problem, none.fit, rng), gain)
+    return Adequacy(named, None, gain)
 
 
 def _best(problem: Problem, fit: Fit, rng: np.random.Generator) -> Hypothesis | None:

@@ -9,7 +9,6 @@ import numpy as np
 
 from igrow_core.effects import EFFECTS
 from igrow_core.errors import IgrowError
-from igrow_core.simulator.hybrid.climate import ActiveEffects
 from igrow_core.simulator.hybrid.record import Record
 from igrow_core.site import Site
 from igrow_core.telemetry import Telemetry
@@ -125,18 +124,12 @@ def diagnose(
         return _data_fault(site, telemetry, screened), None
     record, _ = runner.open_record(screened.telemetry, site, deployed)
     split = split_days(record, site.longitude)
-    active = activate(record, deployed.effects)
-    prepared = problem.prepare(
-        record, split, deployed.prior, active, site.longitude, deployed.known_misfit, usual.installed(), without
-    )
-    null = structure.null_model(prepared)
-    chain = selection.forward(prepared, null, rng)
-    judged = judge(prepared, chain, rng)
-    estimated = _refined(prepared, judged, estimate(prepared, judged.selected, rng), deployed)
+    search = _search(record, split, site, deployed, frozenset(without), rng)
+    prepared = search.problem
 
-    stages, kept, weighed = _correct(record, split, site, deployed, prepared, judged, estimated, active)
+    stages, kept, weighed = _correct(record, split, site, deployed, search)
     errors = _errors(record, split, stages)
-    verdict, findings = _verdict(prepared, judged, kept)
+    verdict, findings = _verdict(search, kept)
     last = stages["corrected"]
     model = CorrectedModel(last.parameters, last.deviation, last.terms, last.remainder, dict(deployed.known_misfit))
     diagnosis = Diagnosis(
@@ -154,14 +147,60 @@ def diagnose(
     )
     shown = {name: day for name, stage in stages.items() if (day := stage.runs(record, split)) is not None}
     return diagnosis, Evidence(
-        record, split, prepared, tuple(chain), tuple(weighed), shown, model, deployed.free_run_prior
+        record, split, prepared, search.chain, tuple(weighed), shown, model, deployed.free_run_prior
     )
 
 
+@dataclass(frozen=True)
+class _Search:
+    """What a search found."""
+
+    problem: Problem
+    """Of the deployed model."""
+    chain: tuple[Selected, ...]
+    """Of its first round: no name, and the best one."""
+    found: tuple[Estimated, ...]
+    remaining: Problem
+    """Of the last round: all that was found is in its model."""
+    judged: Adequacy
+    """Of the last round."""
+
+
+def _search(
+    record: Record,
+    split: Split,
+    site: Site,
+    deployed: Deployed,
+    without: frozenset[str],
+    rng: np.random.Generator,
+) -> _Search:
+    """Look for one cause after the other, each in a model that has those before it.
+
+    A large effect moves the model far from where the search linearised it; further causes and what remains can
+    be told only after it has been put in.
+    """
+    rounds: list[tuple[Problem, tuple[Selected, ...]]] = []
+    found: list[Estimated] = []
+    while True:
+        terms = (*deployed.effects, *(one.term for one in found))
+        problem_now = problem.prepare(
+            record, split, deployed.prior, activate(record, terms), site.longitude, deployed.known_misfit,
+            usual.installed(), without,
+        )  # fmt: skip
+        null = structure.null_model(problem_now)
+        chain = tuple(selection.forward(problem_now, null, rng, 0 if len(found) == selection.MOST_TERMS else 1))
+        rounds.append((problem_now, chain))
+        judged = judge(problem_now, chain, sum(one.gain for one in found), rng)
+        new = estimate(problem_now, judged.selected, rng)
+        if new:
+            new = _refined(problem_now, judged, [*found, *new], deployed)
+        if len(new) <= len(found):
+            return _Search(*rounds[0], tuple(found), problem_now, judged)
+        found = new
+
+
 def _refined(prepared: Problem, judged: Adequacy, estimated: list[Estimated], deployed: Deployed) -> list[Estimated]:
-    """Return the terms at their refitted sizes and shapes; a size that turns round drops its term."""
-    if not estimated:
-        return []
+    """Return all terms at sizes and shapes refitted together, or none where one turns round or runs to its bound."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):
             found = refine.refine(prepared, judged.selected.fit, [one.term for one in estimated], deployed.effects)
@@ -171,25 +210,24 @@ def _refined(prepared: Problem, judged: Adequacy, estimated: list[Estimated], de
     if not all(np.isfinite(one.term.amplitude) and np.isfinite(one.deviation) for one in found):
         return estimated
     better = [with_refined(one, two) for one, two in zip(estimated, found, strict=True)]
-    return [one for one in better if one.term.amplitude != 0.0]
+    return better if all(_plausible(one.term) for one in better) else []
+
+
+def _plausible(term: ActiveTerm) -> bool:
+    bounds = EFFECTS[term.effect].amplitude
+    inside = bounds.low < term.amplitude < bounds.high
+    return inside and term.amplitude != 0.0
 
 
 def _correct(
-    record: Record,
-    split: Split,
-    site: Site,
-    deployed: Deployed,
-    prepared: Problem,
-    judged: Adequacy,
-    estimated: Sequence[Estimated],
-    active: ActiveEffects,
+    record: Record, split: Split, site: Site, deployed: Deployed, search: _Search
 ) -> tuple[dict[str, Stage], list[Estimated], list[Estimated]]:
     """Fit the model with each term in turn, and keep those that stand on unseen days.
 
     Returns the stages by name, the terms that were kept, and all of them with their size and skill.
     """
-    runs, knowledge = prepared.line.runs, deployed.free_run_prior
-    parameters, deviation = freefit.fit(record, runs, split, knowledge, active)
+    runs, knowledge = search.problem.line.runs, deployed.free_run_prior
+    parameters, deviation = freefit.fit(record, runs, split, knowledge, activate(record, deployed.effects))
     stages = {
         "deployed": Stage(dict(deployed.parameters), dict(deployed.standard_deviation), deployed.effects),
         "recalibrated": Stage(parameters, deviation, deployed.effects),
@@ -197,7 +235,7 @@ def _correct(
     current = stages["recalibrated"]
     kept: list[Estimated] = []
     weighed: list[Estimated] = []
-    for one in estimated:
+    for one in search.found:
         terms = (*current.terms, one.term)
         # Where the effect takes over what recalibration had put into the parameters, the fit starts there.
         begin = {name: value + one.shift.get(name, 0.0) for name, value in current.parameters.items()}
@@ -214,8 +252,8 @@ def _correct(
         if _stands(one, kept):
             kept.append(one)
             current = trial
-    if judged.remainder:
-        current = _with_remainder(record, split, site, prepared, judged, knowledge, current)
+    if search.judged.remainder:
+        current = _with_remainder(record, split, site, search, knowledge, current)
     return {**stages, "corrected": current}, kept, weighed
 
 
@@ -233,18 +271,18 @@ def _stands(one: Estimated, kept: Sequence[Estimated]) -> bool:
 
 
 def _with_remainder(
-    record: Record, split: Split, site: Site, prepared: Problem, judged: Adequacy, knowledge: Prior, current: Stage
+    record: Record, split: Split, site: Site, search: _Search, knowledge: Prior, current: Stage
 ) -> Stage:
     """Return the stage with a bounded remainder on outside drivers, if that helps on unseen days."""
-    assert judged.remainder is not None
+    assert search.judged.remainder is not None
     amplitudes = {
         (one.cause.channel, one.cause.when): float(np.clip(one.amplitude, -LARGEST_REMAINDER, LARGEST_REMAINDER))
-        for one in judged.remainder
+        for one in search.judged.remainder
         if isinstance(one.cause, Pattern)
     }
     added = pattern_fluxes(record, site.longitude, amplitudes)
     effects = activate(record, current.terms)
-    fitted = freefit.fit(record, prepared.line.runs, split, knowledge, effects, current.parameters, added)
+    fitted = freefit.fit(record, search.problem.line.runs, split, knowledge, effects, current.parameters, added)
     remainder = {f"{channel}:{when}": amplitude for (channel, when), amplitude in amplitudes.items()}
     trial = Stage(*fitted, current.terms, remainder, added)
     before, after = current.runs(record, split), trial.runs(record, split)
@@ -253,10 +291,10 @@ def _with_remainder(
     return trial
 
 
-def _verdict(prepared: Problem, judged: Adequacy, kept: Sequence[Estimated]) -> tuple[Verdict, tuple[Finding, ...]]:
+def _verdict(search: _Search, kept: Sequence[Estimated]) -> tuple[Verdict, tuple[Finding, ...]]:
     findings = tuple(wording.finding(one) for one in sorted(kept, key=lambda one: -one.effect_to_noise))
-    if judged.remainder is not None:
-        return "unexplained", (*findings, wording.remainder(prepared, judged))
+    if search.judged.remainder is not None:
+        return "unexplained", (*findings, wording.remainder(search.judged))
     if not findings:
         return "nothing", ()
     return ("ambiguous" if any(len(one.rivals) > 1 for one in findings) else "named"), findings

@@ -20,7 +20,7 @@ from trainer.diagnosis.selection import Hypothesis, Selected
 NORMAL_90 = 1.645
 INFLATION = 1.3
 """Of the standard deviation of an amplitude, for the structure that no covariance knows (fitted on tuning cases)."""
-FORM_DOUBT = 0.25
+FORM_DOUBT = 0.3
 """Relative standard deviation of an amplitude beside it: the truth is not quite of the catalogue's form, nor is the
 simulator's response quite the greenhouse's (fitted on tuning cases)."""
 RIVAL_GAIN = 4.0

@@ -20,7 +20,7 @@ from trainer.diagnosis.problem import Problem, counted_hours, hourly, recalibrat
 from trainer.diagnosis.search import Fit
 from trainer.diagnosis.structure import SPREAD
 
-STEPS = 3
+STEPS = 6
 SHAPE_SPREAD = 0.12
 """Prior deviation of a shape about the value that the search found, as a share of its range."""
 

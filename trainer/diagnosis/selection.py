@@ -17,7 +17,7 @@ from trainer.diagnosis.search import Fit, Model
 
 MOST_TERMS = 3
 BEAM = 3
-SMALLEST_GAIN = 7.5
+SMALLEST_GAIN = 9.0
 """Log-likelihood that a term must add on the fit days."""
 LARGEST_P_VALUE = 0.005
 """Of the day-block max-T test, the price of searching paid."""

@@ -22,7 +22,7 @@ from trainer.diagnosis.drivers import Pattern
 from trainer.diagnosis.problem import Problem, candidate_key, pattern_key
 
 FILE = "usual_misfit.json"
-DIRECTIONS = 12
+DIRECTIONS = 16
 
 
 def directions(problems: Sequence[Problem], count: int = DIRECTIONS) -> list[dict[str, float]]:

@@ -6,7 +6,6 @@ from igrow_core.effects import EFFECTS
 from trainer.diagnosis.adequacy import Adequacy
 from trainer.diagnosis.drivers import BALANCES_OF, UNIT_FLUX, Pattern
 from trainer.diagnosis.estimate import Estimated
-from trainer.diagnosis.problem import Problem
 from trainer.diagnosis.result import Finding, Interval
 
 UNITS = {"heat": "W m-2", "vapour": "kg m-2 s-1", "co2": "kg m-2 s-1", "air_exchange": "m s-1", "light_loss": "1"}
@@ -62,7 +61,7 @@ def separating_test(rivals: tuple[str, ...]) -> str:
     return "; or ".join(dict.fromkeys(EFFECTS[name].separating_test for name in rivals[:3]))
 
 
-def remainder(problem: Problem, judged: Adequacy) -> Finding:
+def remainder(judged: Adequacy) -> Finding:
     """Return the finding for what no candidate explains."""
     assert judged.remainder is not None
     balances: dict[str, None] = {}
