@@ -18,7 +18,7 @@ from igrow_core.simulator.plan import STEPS_PER_HOUR, BundleSimulator
 from igrow_core.site import Greenhouse
 from trainer.default_bundle import default_bundle_folder
 
-CANDIDATES, HOURS, ROUNDS = 1000, 48, 5
+CANDIDATES, HOURS, ROUNDS = 1000, 48, 20
 START = np.datetime64("2020-03-01T00:00:00")
 
 
