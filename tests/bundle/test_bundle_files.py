@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -85,6 +86,15 @@ def test_a_graph_that_cannot_be_tested_fails_the_self_test(tmp_path: Path, untes
     empty = copy_with_golden(bundle, tmp_path / "empty", {**golden, untested: Golden(golden[untested].inputs, {})})
     with pytest.raises(BundleError, match=rf"{untested}\.onnx"):
         self_test(empty)
+
+
+@pytest.mark.parametrize("unlisted", ["simulator", "optimizer"])
+def test_a_graph_that_the_manifest_leaves_out_fails_the_self_test(tmp_path: Path, unlisted: str) -> None:
+    bundle = write_tiny_bundle(tmp_path / "bundle")
+    listed = {name: graph for name, graph in bundle.manifest.graphs.items() if name != unlisted}
+    shorter = dataclasses.replace(bundle, manifest=dataclasses.replace(bundle.manifest, graphs=listed))
+    with pytest.raises(BundleError, match=rf"does not list {unlisted}\.onnx"):
+        self_test(shorter)
 
 
 def test_the_default_bundle_passes_with_all_its_graphs() -> None:
