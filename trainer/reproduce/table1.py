@@ -1,10 +1,10 @@
 """Table 1 of Cao et al. (2022): whole virtual seasons run freely from their first hour, R2 per quantity.
 
 Seasons are split by trajectory into training, selection and test. What was chosen (drivers, architecture, number of
-updates) was chosen with `--choose`, which trains on the training seasons and scores the selection; the table trains
-on both and scores the test seasons, which are read for nothing else. All seasons of this data set
-share one weather year, so beside the networks stands the simplest predictor of all: the mean of the training
-seasons, hour by hour, which knows neither setpoints nor the state.
+updates) was chosen on the selection seasons, which `--choose` scores after training on the training seasons; the table
+trains on both and scores the test seasons. All seasons of this data set share one weather year, so beside the networks
+stands the simplest predictor of all: the mean of the training seasons, hour by hour, which knows neither setpoints nor
+the state.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from trainer.training.simulator import Layouts, train_simulator, with_setting_dr
 SITE = "wur2020"
 SETTINGS = ("ventilation_offset", "lamp_radiation_limit")
 """Settings of the virtual greenhouse computer: inputs of the published seasons, the same in all of them."""
-LAYOUTS = with_setting_drivers(Layouts(members=2), *SETTINGS)
+LAYOUTS = with_setting_drivers(Layouts(members=4), *SETTINGS)
 
 
 @dataclass(frozen=True)

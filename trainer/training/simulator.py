@@ -63,8 +63,8 @@ GROWTH = layout(
 )
 HARVEST = layout("harvest", ("fruit_fresh_weight",), HARVEST_DRIVERS, (5.0, 20.0), (32, 32), step=24.0)
 
-CLIMATE_PLAN = TrainingPlan(updates=((4, 10000), (16, 5000), (48, 1200)))
-GROWTH_PLAN = TrainingPlan(updates=((4, 3000), (24, 1500), (120, 400)), decay=0.3)
+CLIMATE_PLAN = TrainingPlan(updates=((4, 10000), (16, 5000), (48, 1500)))
+GROWTH_PLAN = TrainingPlan(updates=((4, 4000), (24, 2000), (120, 600)), decay=0.3)
 HARVEST_PLAN = TrainingPlan(updates=((4, 1000), (30, 600)), batch=128)
 
 
