@@ -178,11 +178,14 @@ def later(house: Greenhouse, every: float) -> dict[str, object]:
     return table
 
 
-def weekly(house: Greenhouse, every: float, refit: int, first: int = 8) -> dict[str, object]:
+def weekly(
+    house: Greenhouse, every: float, refit: int, chosen: Sequence[int] | None, first: int = 8
+) -> dict[str, object]:
     found: dict[str, list[Mapping[tuple[str, str], Errors]]] = {}
     covered, totals = [], []
     count = int(house.week[-1]) + 1
-    for test in range(first, count, refit):
+    tested = [week for week in range(first, count, refit) if chosen is None or week + 1 in chosen]
+    for test in tested:
         fit = (house.week >= test - 8) & (house.week < test - 2)
         selection = (house.week >= test - 2) & (house.week < test)
         model = house.fit(fit, selection)
@@ -194,7 +197,8 @@ def weekly(house: Greenhouse, every: float, refit: int, first: int = 8) -> dict[
         covered.append(coverage(house.record, ways, rows, begin, every))
         totals.append(daily_totals(house.record, house.setpoints, model, rows, begin))
         print(f"week {test + 1} of {count} done", file=sys.stderr)
-    table = show(f"{house.log.name}, weekly: refitted every {refit} weeks, weeks {first + 1}-{count} test", found)
+    names = ", ".join(str(week + 1) for week in tested)
+    table = show(f"{house.log.name}, weekly: refitted every {refit} weeks; tested on weeks {names}", found)
     print_coverage(covered)
     print_totals(totals)
     return table
@@ -329,6 +333,7 @@ def main() -> int:
     parser.add_argument("--tables", nargs="+", choices=("later", "weekly", "across", "metered"), default=["later"])
     parser.add_argument("--every", type=float, default=11_100.0, help="seconds between starts of test runs")
     parser.add_argument("--refit", type=int, default=1, help="weeks between refits of the table weekly")
+    parser.add_argument("--test-weeks", nargs="+", type=int, help="of the table weekly; none: all from the ninth on")
     parser.add_argument("--json", type=Path, help="file for the tables")
     given = parser.parse_args()
     try:
@@ -348,7 +353,7 @@ def main() -> int:
             result[table] = {
                 house.log.name: later(house, given.every)
                 if table == "later"
-                else weekly(house, given.every, given.refit)
+                else weekly(house, given.every, given.refit, given.test_weeks)
                 for house in houses
             }
     if given.json is not None:
