@@ -111,7 +111,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("out/demo"), help="folder for everything; emptied first")
     parser.add_argument("--effect", default=EFFECT, help=f"NAME=SIZE of what no model knows (default {EFFECT})")
     parser.add_argument("--start", default="2020-02-01", help="first day of plant time, UTC")
-    parser.add_argument("--seed", type=int, default=3, help="of weather, plant, disturbances and noise")
+    parser.add_argument("--seed", type=int, default=1, help="of weather, plant, disturbances and noise")
     parser.add_argument("--weather", type=Path, help="telemetry file or data set with measured weather")
     options = parser.parse_args()
     out = options.out.resolve()

@@ -112,7 +112,7 @@ def test_a_published_bundle_is_shadowed_and_adopted_while_the_daemon_controls(si
     site.running.remove(daemon)
     daemon.send_signal(signal.SIGTERM)
     assert daemon.wait(60) == 0
-    assert "safe ones were written" in site.log("run")
+    assert "the safe setpoints were written" in site.log("run")
 
     day = concatenate([read_csv(path) for path in site.days()])
     commanded = day["heating_setpoint"]
