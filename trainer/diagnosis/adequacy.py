@@ -17,7 +17,7 @@ from trainer.diagnosis.problem import Problem
 from trainer.diagnosis.search import Fit
 from trainer.diagnosis.selection import Hypothesis, Selected
 
-SMALLEST_GAIN = 13.0
+SMALLEST_GAIN = 16.0
 """Log-likelihood below which a pattern is no cause: a wrong structure makes as much."""
 LARGEST_P_VALUE = 0.005
 BETTER = 1.6

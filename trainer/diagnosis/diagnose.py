@@ -200,7 +200,7 @@ def _search(
 
 
 def _refined(prepared: Problem, judged: Adequacy, estimated: list[Estimated], deployed: Deployed) -> list[Estimated]:
-    """Return all terms at sizes and shapes refitted together, or none where one turns round or runs to its bound."""
+    """Return all terms refitted together, or none where one turns round or a further one runs to its bound."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):
             found = refine.refine(prepared, judged.selected.fit, [one.term for one in estimated], deployed.effects)
@@ -210,13 +210,13 @@ def _refined(prepared: Problem, judged: Adequacy, estimated: list[Estimated], de
     if not all(np.isfinite(one.term.amplitude) and np.isfinite(one.deviation) for one in found):
         return estimated
     better = [with_refined(one, two) for one, two in zip(estimated, found, strict=True)]
-    return better if all(_plausible(one.term) for one in better) else []
+    return better if all(one.term.amplitude != 0.0 for one in better) and _inside(better[1:]) else []
 
 
-def _plausible(term: ActiveTerm) -> bool:
-    bounds = EFFECTS[term.effect].amplitude
-    inside = bounds.low < term.amplitude < bounds.high
-    return inside and term.amplitude != 0.0
+def _inside(further: Sequence[Estimated]) -> bool:
+    """Tell whether terms after the first lie inside their bounds: one that runs there only mops up what is left."""
+    bounds = ((one.term.amplitude, EFFECTS[one.effect].amplitude) for one in further)
+    return all(amplitude < bound.high and (bound.low == 0.0 or amplitude > bound.low) for amplitude, bound in bounds)
 
 
 def _correct(
