@@ -149,7 +149,9 @@ class TelemetryFile:
 def read_file(path: Path, start: int, end: int) -> Telemetry:
     """Read a telemetry file that another thread or process may be writing; raises sqlite3.Error."""
     with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=5.0)) as connection:
-        return _read(connection, start, end)
+        # A store that is just being made has its file before its tables.
+        made = connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'rows'").fetchone()
+        return _read(connection, start, end) if made else concatenate([])
 
 
 def salvage(damaged: Path, connection: sqlite3.Connection, *, tries: int = 4096) -> int:

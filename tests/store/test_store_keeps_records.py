@@ -192,3 +192,8 @@ def test_an_export_gives_a_telemetry_file_for_each_day_and_a_table_of_each_kind_
 def test_an_export_of_a_folder_without_a_store_says_so(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="no store here"):
         export(tmp_path, tmp_path / "out")
+
+
+def test_a_store_that_is_just_being_made_has_no_rows_yet(tmp_path: Path) -> None:
+    (tmp_path / "telemetry.db").touch()
+    assert len(read_telemetry(tmp_path, 0.0, 8e9)) == 0
