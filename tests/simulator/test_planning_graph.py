@@ -21,8 +21,6 @@ WARM = np.tile([20.0, 400.0, 0.0, 0.0], (1, 24, 1))
 @pytest.fixture(scope="module")
 def bundle() -> Bundle:
     folder = Path(igrow_core.__file__).parent / "default_bundle"
-    if not folder.is_dir():
-        pytest.skip("the default bundle is not built: make bundle")
     return read_bundle(folder)
 
 
