@@ -27,6 +27,7 @@ from trainer.diagnosis.selection import Selected
 from trainer.diagnosis.split import Split, split_days
 
 LEAST_DAYS = 7
+MOST_CAUSES = 3
 SMALLEST_ENR = 0.15
 """A cause that moves a 24 h forecast by less is not worth a name."""
 SMALLEST_SKILL = -0.05
@@ -160,8 +161,6 @@ class _Search:
     chain: tuple[Selected, ...]
     """Of its first round: no name, and the best one."""
     found: tuple[Estimated, ...]
-    remaining: Problem
-    """Of the last round: all that was found is in its model."""
     judged: Adequacy
     """Of the last round."""
 
@@ -179,7 +178,7 @@ def _search(
     A large effect moves the model far from where the search linearised it; further causes and what remains can
     be told only after it has been put in.
     """
-    rounds: list[tuple[Problem, tuple[Selected, ...]]] = []
+    first: tuple[Problem, tuple[Selected, ...]] | None = None
     found: list[Estimated] = []
     while True:
         terms = (*deployed.effects, *(one.term for one in found))
@@ -188,14 +187,15 @@ def _search(
             usual.installed(), without,
         )  # fmt: skip
         null = structure.null_model(problem_now)
-        chain = tuple(selection.forward(problem_now, null, rng, 0 if len(found) == selection.MOST_TERMS else 1))
-        rounds.append((problem_now, chain))
+        more = len(found) < MOST_CAUSES
+        chain = selection.best_cause(problem_now, null, rng) if more else selection.no_cause(problem_now, null)
+        first = first or (problem_now, chain)
         judged = judge(problem_now, chain, sum(one.gain for one in found), rng)
         new = estimate(problem_now, judged.selected, rng)
         if new:
             new = _refined(problem_now, judged, [*found, *new], deployed)
         if len(new) <= len(found):
-            return _Search(*rounds[0], tuple(found), problem_now, judged)
+            return _Search(*first, tuple(found), judged)
         found = new
 
 

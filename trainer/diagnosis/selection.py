@@ -1,4 +1,4 @@
-"""Forward selection of up to three terms with a small beam, over all effects, shapes and beginnings."""
+"""The best cause over all effects, shapes and beginnings, with the price of searching paid."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from trainer.diagnosis.gram import Floats, Term, day_losses
 from trainer.diagnosis.problem import Problem
 from trainer.diagnosis.search import Fit, Model
 
-MOST_TERMS = 3
-BEAM = 3
+REFITTED = 3
+"""Best causes of a scan that are fitted to be compared."""
 SMALLEST_GAIN = 9.0
 """Log-likelihood that a term must add on the fit days."""
 LARGEST_P_VALUE = 0.005
@@ -52,11 +52,6 @@ class Selected:
 
     hypotheses: tuple[Hypothesis, ...]
     fit: Fit
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """Names of the effects in order of selection."""
-        return tuple(one.effect for one in self.hypotheses)
 
 
 def onset_days(problem: Problem) -> list[int | None]:
@@ -115,43 +110,19 @@ def _best(
     return list(found.values())
 
 
-def forward(
-    problem: Problem,
-    null: Model,
-    rng: np.random.Generator,
-    most_terms: int = MOST_TERMS,
-) -> list[Selected]:
-    """Return the chain of best models, from none to at most `most_terms` terms, each in the bounds of its effect."""
-    start = Selected((), search.fit(problem.grams, null))
-    chain = [start]
-    beam = [start]
-    onsets = onset_days(problem)
-    for _ in range(most_terms):
-        grown: list[Selected] = []
-        for parent in beam:
-            ranked = score_candidates(problem, parent.fit, onsets, rng)
-            taken = 0
-            for hypothesis in ranked:
-                if hypothesis.effect in parent.effects:
-                    continue
-                if hypothesis.gain < SMALLEST_GAIN or hypothesis.p_value > LARGEST_P_VALUE:
-                    continue
-                grown.append(_grow(problem, parent, hypothesis))
-                taken += 1
-                if taken == BEAM:
-                    break
-        grown = [one for one in grown if _within_bounds(one)]
-        if not grown:
-            break
-        grown.sort(key=lambda one: -one.fit.solution.gain)
-        beam = _distinct(grown)[:BEAM]
-        chain.append(beam[0])
-    return chain
+def no_cause(problem: Problem, null: Model) -> tuple[Selected]:
+    """Return the chain that holds the model without a cause alone."""
+    return (Selected((), search.fit(problem.grams, null)),)
 
 
-def _grow(problem: Problem, parent: Selected, hypothesis: Hypothesis) -> Selected:
-    model = parent.fit.model.with_term(hypothesis.term)
-    return Selected((*parent.hypotheses, hypothesis), search.fit(problem.grams, model))
+def best_cause(problem: Problem, null: Model, rng: np.random.Generator) -> tuple[Selected, ...]:
+    """Return the model without a cause and, where one passes the test, that with the best, within its bounds."""
+    (none,) = no_cause(problem, null)
+    ranked = score_candidates(problem, none.fit, onset_days(problem), rng)
+    passed = [one for one in ranked if one.gain >= SMALLEST_GAIN and one.p_value <= LARGEST_P_VALUE]
+    grown = [Selected((one,), search.fit(problem.grams, null.with_term(one.term))) for one in passed[:REFITTED]]
+    grown = [one for one in grown if _within_bounds(one)]
+    return (none, max(grown, key=lambda one: one.fit.solution.gain)) if grown else (none,)
 
 
 def _within_bounds(selected: Selected) -> bool:
@@ -160,17 +131,6 @@ def _within_bounds(selected: Selected) -> bool:
         if not bounds.low <= amplitude <= bounds.high or (bounds.low == 0.0 and amplitude <= 0.0):
             return False
     return True
-
-
-def _distinct(selected: Sequence[Selected]) -> list[Selected]:
-    seen: set[frozenset[str]] = set()
-    kept: list[Selected] = []
-    for one in selected:
-        names = frozenset(one.effects)
-        if names not in seen:
-            seen.add(names)
-            kept.append(one)
-    return kept
 
 
 def losses_by_day(problem: Problem, fit: Fit) -> Floats:
