@@ -1,6 +1,6 @@
-"""The hybrid climate stage as blocks: `derive`, one block an effect, `relax`; and the wiring of one step.
+"""The hybrid climate stage as blocks: `derive`, one block an effect, `relax`; `climate_wiring.py` calls them.
 
-Tensor names inside a step carry their group: ``state:air_temperature``, ``input:wind_speed``,
+What a block reads carries its group: ``state:air_temperature``, ``input:wind_speed``,
 ``parameter:transmissivity``, ``effect:lamp_heat:share``.
 """
 
@@ -16,7 +16,7 @@ from igrow_core.simulator.hybrid import climate
 from igrow_core.simulator.hybrid.climate import memory_name
 from igrow_core.simulator.hybrid.measurement import PREDICTED
 from igrow_core.simulator.hybrid.parameters import PARAMETERS
-from trainer.export.blocks import Block, Wiring, grouped, trace
+from trainer.export.blocks import Block, grouped, tags, trace
 
 CONSTANTS = ("mean_height", "lamp_efficacy")
 """Site constants that travel with the parameters."""
@@ -68,8 +68,8 @@ def climate_blocks(effects: Sequence[str]) -> ClimateBlocks:
     chosen = [EFFECTS[name] for name in effects]
     read = {driver for effect in chosen for driver in effect.drivers}
     inputs = (*climate.INPUTS, *(name for name in _EXOGENOUS if name in read))
-    anything = [*CONSTANTS, *_tag("parameter", PARAMETERS)]
-    derive = trace("climate", _derive_formula, [*_tag("state", climate.STATES), *_tag("input", inputs), *anything])
+    anything = [*CONSTANTS, *tags("parameter", PARAMETERS)]
+    derive = trace("climate", _derive_formula, [*tags("state", climate.STATES), *tags("input", inputs), *anything])
     drivers = (*inputs, *derive.outputs, "mean_height")
     blocks = tuple(_effect_blocks(effect, drivers) for effect in chosen)
     channels = sorted({key for one in blocks if one.effect.kind == "process" for key in one.contribution.outputs})
@@ -77,15 +77,15 @@ def climate_blocks(effects: Sequence[str]) -> ClimateBlocks:
         "balances",
         _relax_formula,
         [
-            *_tag("state", climate.STATES),
-            *_tag("driver", drivers),
-            *_tag("added", channels),
-            *_tag("parameter", PARAMETERS),
+            *tags("state", climate.STATES),
+            *tags("driver", drivers),
+            *tags("added", channels),
+            *tags("parameter", PARAMETERS),
             "seconds",
         ],
     )
     memories = tuple(memory_name(one.effect.name) for one in blocks if one.memory)
-    names = [*CONSTANTS, *_tag("parameter", PARAMETERS)]
+    names = [*CONSTANTS, *tags("parameter", PARAMETERS)]
     for effect in chosen:
         names += [effect_parameter(effect.name, parameter.name) for parameter in effect.parameters]
         names += [effect_parameter(effect.name, "onset")] if "elapsed_days" in effect.drivers else []
@@ -94,7 +94,7 @@ def climate_blocks(effects: Sequence[str]) -> ClimateBlocks:
         inputs,
         (*climate.STATES, *memories),
         tuple(names),
-        tuple(_tag("added", channels)),
+        tuple(tags("added", channels)),
         derive,
         relax,
         from_measured,
@@ -105,173 +105,6 @@ def climate_blocks(effects: Sequence[str]) -> ClimateBlocks:
 def effect_parameter(effect: str, parameter: str) -> str:
     """Return the name under which a parameter of an effect stands in the graph's parameter input."""
     return f"effect:{effect}:{parameter}"
-
-
-def wire_step(
-    wiring: Wiring,
-    blocks: ClimateBlocks,
-    state: Mapping[str, str],
-    inputs: Mapping[str, str],
-    parameters: Mapping[str, str],
-    *,
-    seconds: str,
-    day: str,
-) -> tuple[dict[str, str], dict[str, str]]:
-    """Wire one step of the stage; returns the tensors of the following state and of this step's drivers.
-
-    Args:
-        wiring: takes the nodes.
-        blocks: from `climate_blocks`.
-        state: tensor of each of `blocks.states`.
-        inputs: tensor of each of `blocks.inputs`.
-        parameters: tensor of each of `blocks.parameters`.
-        seconds: tensor (1,), length of the step.
-        day: tensor (1,), days since the bundle's reference time, for effects that age.
-    """
-    drivers = wire_drivers(wiring, blocks, state, inputs, parameters)
-    added, following = wire_effects(wiring, blocks, drivers, state, parameters, seconds=seconds, day=day)
-    tensors = (
-        {f"state:{name}": state[name] for name in climate.STATES}
-        | {f"driver:{name}": tensor for name, tensor in drivers.items()}
-        | added
-        | dict(parameters)
-        | {"seconds": seconds}
-    )
-    return following | wiring.call(blocks.relax, tensors), drivers
-
-
-def wire_effects(
-    wiring: Wiring,
-    blocks: ClimateBlocks,
-    drivers: Mapping[str, str],
-    state: Mapping[str, str],
-    parameters: Mapping[str, str],
-    *,
-    seconds: str,
-    day: str,
-) -> tuple[dict[str, str], dict[str, str]]:
-    """Wire the active effects; returns what they add, as ``added:channel``, and their following memories."""
-    added: dict[str, list[str]] = {}
-    following: dict[str, str] = {}
-    for one in blocks.effects:
-        tensors = _effect_tensors(wiring, one, drivers, state, parameters, day)
-        if one.effect.kind == "process":
-            for channel, tensor in wiring.call(one.contribution, tensors).items():
-                added.setdefault(channel, []).append(tensor)
-        if one.memory:
-            following[memory_name(one.effect.name)] = wiring.call(one.memory, tensors | {"seconds": seconds})["memory"]
-    return {f"added:{channel}": wiring.total(parts) for channel, parts in added.items()}, following
-
-
-def wire_drivers(
-    wiring: Wiring,
-    blocks: ClimateBlocks,
-    state: Mapping[str, str],
-    inputs: Mapping[str, str],
-    parameters: Mapping[str, str],
-) -> dict[str, str]:
-    """Wire the drivers; where the pipe sensors are known to be off, they are corrected first."""
-    drivers = wire_derived(wiring, blocks, state, inputs, parameters)
-    for one in blocks.effects:
-        if one.effect.name == "pipe_temperature_offset":
-            errors = wiring.call(one.contribution, _effect_tensors(wiring, one, drivers, state, parameters, ""))
-            corrected = {name: wiring.add("Sub", [inputs[name], error])[0] for name, error in errors.items()}
-            drivers = wire_derived(wiring, blocks, state, dict(inputs) | corrected, parameters)
-    return drivers
-
-
-def wire_measured(
-    wiring: Wiring,
-    blocks: ClimateBlocks,
-    drivers: Mapping[str, str],
-    state: Mapping[str, str],
-    parameters: Mapping[str, str],
-    day: str,
-) -> dict[str, str]:
-    """Wire what the sensors would show, faults included, by quantity."""
-    errors = wire_errors(wiring, blocks, drivers, state, parameters, day)
-    return {
-        name: wiring.total([drivers[name], errors[name]]) if name in errors else drivers[name] for name in PREDICTED
-    }
-
-
-def wire_errors(
-    wiring: Wiring,
-    blocks: ClimateBlocks,
-    drivers: Mapping[str, str],
-    state: Mapping[str, str],
-    parameters: Mapping[str, str],
-    day: str,
-) -> dict[str, str]:
-    """Wire the errors of the climate sensors known to be off, by quantity."""
-    parts: dict[str, list[str]] = {}
-    for one in blocks.effects:
-        if one.effect.kind == "sensor" and set(one.contribution.outputs) <= set(PREDICTED):
-            tensors = _effect_tensors(wiring, one, drivers, state, parameters, day)
-            for name, error in wiring.call(one.contribution, tensors).items():
-                parts.setdefault(name, []).append(error)
-    return {name: wiring.total(errors) for name, errors in parts.items()}
-
-
-def wire_rest(
-    wiring: Wiring,
-    blocks: ClimateBlocks,
-    measured: Mapping[str, str],
-    inputs: Mapping[str, str],
-    parameters: Mapping[str, str],
-    day: str,
-) -> dict[str, str]:
-    """Wire the state that agrees with a measured climate: floor as warm as the air, memories at rest."""
-    state = wiring.call(blocks.from_measured, measured)
-    state["mass_temperature"] = state["air_temperature"]
-    drivers = wire_derived(wiring, blocks, state, inputs, parameters)
-    for one in blocks.effects:
-        if one.start:
-            # A memory at rest does not depend on the memory; the tensor only fills the block's signature.
-            tensors = _effect_tensors(wiring, one, drivers, state | _no_memory(one), parameters, day)
-            state[memory_name(one.effect.name)] = wiring.call(one.start, tensors)["memory"]
-    return state
-
-
-def _no_memory(one: EffectBlocks) -> dict[str, str]:
-    return {memory_name(one.effect.name): ""}
-
-
-def wire_derived(
-    wiring: Wiring,
-    blocks: ClimateBlocks,
-    state: Mapping[str, str],
-    inputs: Mapping[str, str],
-    parameters: Mapping[str, str],
-) -> dict[str, str]:
-    """Wire the drivers of a state and its inputs."""
-    tensors = (
-        {f"state:{name}": state[name] for name in climate.STATES}
-        | {f"input:{name}": inputs[name] for name in blocks.inputs}
-        | dict(parameters)
-    )
-    return dict(inputs) | {"mean_height": parameters["mean_height"]} | wiring.call(blocks.derive, tensors)
-
-
-def _effect_tensors(
-    wiring: Wiring,
-    one: EffectBlocks,
-    drivers: Mapping[str, str],
-    state: Mapping[str, str],
-    parameters: Mapping[str, str],
-    day: str,
-) -> dict[str, str]:
-    name = one.effect.name
-    tensors = {f"driver:{driver}": drivers[driver] for driver in one.effect.drivers if driver in drivers}
-    tensors |= {
-        parameter.name: parameters[effect_parameter(name, parameter.name)] for parameter in one.effect.parameters
-    }
-    if one.memory:
-        tensors["memory"] = state[memory_name(name)]
-    if "elapsed_days" in one.effect.drivers:
-        (elapsed,) = wiring.add("Sub", [day, parameters[effect_parameter(name, "onset")]])
-        (tensors["driver:elapsed_days"],) = wiring.add("Relu", [elapsed])
-    return tensors
 
 
 def _effect_blocks(effect: Effect, drivers: Sequence[str]) -> EffectBlocks:
@@ -298,7 +131,7 @@ def _effect_blocks(effect: Effect, drivers: Sequence[str]) -> EffectBlocks:
         assert effect.memory is not None
         return {"memory": effect.memory.start(xp, read, values)}
 
-    inputs = [*_tag("driver", effect.drivers), *(parameter.name for parameter in effect.parameters)]
+    inputs = [*tags("driver", effect.drivers), *(parameter.name for parameter in effect.parameters)]
     if effect.memory is None:
         return EffectBlocks(effect, trace(effect.name, contribution, inputs), None, None)
     inputs.append("memory")
@@ -330,7 +163,3 @@ def _state_formula(xp: Any, arrays: Mapping[str, Any]) -> Mapping[str, Any]:
         "vapour_concentration": air.vapour_concentration(xp, temperature, arrays["air_humidity"]),
         "co2_concentration": air.co2_concentration(temperature, arrays["air_co2"]),
     }
-
-
-def _tag(group: str, names: Sequence[str] | Mapping[str, Any]) -> list[str]:
-    return [f"{group}:{name}" for name in names]

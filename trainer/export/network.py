@@ -14,20 +14,19 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import ndonnx as ndx
 import numpy as np
 from numpy.typing import NDArray
-from onnx import ModelProto, helper
+from onnx import ModelProto
 
 from igrow_core.bundle import Bundle, Golden, GraphSignature, Manifest, Tensor, run_graph, write_bundle
 from igrow_core.planner.evolution import EvolutionSettings
 from igrow_core.quantities import QUANTITIES
-from igrow_core.simulator.network import HOURS, NetworkSimulator, Stage
+from igrow_core.simulator.network import HOURS, NetworkSimulator
 from igrow_core.simulator.network_run import Carried, begin, run_harvest, run_hour
-from trainer.export.blocks import OPSET, Block, Wiring, open_model, trace_shaped
+from trainer.export.blocks import OPSET, Block, Shape, open_model, trace_shaped, traceable
 from trainer.export.bundle import optimizer_inputs, plain_signature
-from trainer.export.hindcast import finished_model, float_tensor
 from trainer.export.optimizer import export_optimizer
+from trainer.export.wiring import Wiring, finished_model
 from trainer.training.checkpoint import FILE_NAME, simulator_to_bytes
 
 CARRIED = tuple(field.name for field in fields(Carried))
@@ -92,19 +91,12 @@ def day_model(simulator: NetworkSimulator) -> ModelProto:
     finals = {"hourly": hourly, "daily": out[NEXT + "harvest"]}
     finals |= {NEXT + name: tensor for name, tensor in carried.items()}
     for name, tensor in finals.items():
-        wiring.nodes.append(helper.make_node("Identity", [tensor], [name]))
+        wiring.output(name, tensor)
     outputs = {"hourly": (HOURS, "batch", len(hourly_outputs(simulator))), "daily": ("batch", widths["harvest"])}
     outputs |= {NEXT + name: ("batch", width) for name, width in widths.items()}
-    inputs: dict[str, tuple[str | int, ...]] = {name: ("batch", width) for name, width in widths.items()}
+    inputs: dict[str, Shape] = {name: ("batch", width) for name, width in widths.items()}
     inputs |= {"known": (HOURS, "batch", len(known_inputs(simulator))), "hour": (HOURS, 1)}
-    graph = helper.make_graph(
-        wiring.nodes,
-        "simulator",
-        [float_tensor(name, shape) for name, shape in inputs.items()],
-        [float_tensor(name, shape) for name, shape in outputs.items()],
-        wiring.initializers,
-    )
-    return finished_model(graph, [hour_block, day_block])
+    return finished_model(wiring.graph("simulator", inputs, outputs), [hour_block, day_block])
 
 
 def _hour_block(simulator: NetworkSimulator) -> Block:
@@ -120,7 +112,7 @@ def _hour_block(simulator: NetworkSimulator) -> Block:
         parts = {NEXT + name: getattr(following, name) for name in widths if not name.startswith("harvest")}
         return parts | {"row": row}
 
-    shapes: dict[str, tuple[str | int, ...]] = {name: ("batch", width) for name, width in widths.items()}
+    shapes: dict[str, Shape] = {name: ("batch", width) for name, width in widths.items()}
     return trace_shaped("hour", formula, {**shapes, "known": ("batch", len(names)), "hour": (1,)})
 
 
@@ -135,7 +127,7 @@ def _harvest_block(simulator: NetworkSimulator) -> Block:
         )
         return {NEXT + "harvest": harvest, NEXT + "harvest_memory": memory}
 
-    shapes: dict[str, tuple[str | int, ...]] = {name: ("batch", widths[name]) for name in ("harvest", "harvest_memory")}
+    shapes: dict[str, Shape] = {name: ("batch", widths[name]) for name in ("harvest", "harvest_memory")}
     return trace_shaped("harvest", formula, {**shapes, "means": ("batch", len(names))})
 
 
@@ -176,17 +168,12 @@ def write_network_bundle(
 
 
 def _traceable(simulator: NetworkSimulator) -> NetworkSimulator:
-    """Return the simulator with bounds that ndonnx takes beside its own arrays."""
-
-    def stage(one: Stage) -> Stage:
-        bounds: dict[str, Any] = {"low": ndx.asarray(one.low), "high": ndx.asarray(one.high)}
-        return replace(one, **bounds)
-
+    """Return the simulator with stages that can be traced."""
     return replace(
         simulator,
-        climate=stage(simulator.climate),
-        growth=stage(simulator.growth),
-        harvest=stage(simulator.harvest),
+        climate=traceable(simulator.climate),
+        growth=traceable(simulator.growth),
+        harvest=traceable(simulator.harvest),
     )
 
 
