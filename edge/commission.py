@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import time
+from datetime import timedelta
 from typing import Protocol
 
 from edge.bus.plc import Reading, RegisterPlc
@@ -15,6 +16,7 @@ from edge.configuration import Configuration
 from edge.guard import GuardedWriter, GuardRules, GuardState, Request, guard
 from edge.image import Image
 from edge.registers.model import expected_unit
+from igrow_core.yaml_schema import duration
 
 READ_AGAIN = 2.0
 """Seconds after a write until it is read again."""
@@ -163,8 +165,8 @@ class Commissioning:
             self._wrong.append("the map has no heartbeat: the PLC cannot know that the daemon is gone")
             return
         question = (
-            f"Now the heartbeat stops for {self._fallback_after / 60:.0f} min, so that the PLC falls back to its own "
-            "safe setpoints. Go on?"
+            f"Now the heartbeat stops for {duration(timedelta(seconds=self._fallback_after))}, so that the PLC falls "
+            "back to its own safe setpoints. Go on?"
         )
         if not self._dialogue.ask(question):
             self._wrong.append("the fallback was not tried")

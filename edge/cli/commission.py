@@ -8,7 +8,7 @@ import contextlib
 
 from edge.cli.common import add_configuration, configuration_of
 from edge.commission import Commissioning, Console
-from edge.state_lock import sole_use
+from edge.state_lock import daemon_stopped
 
 EXAMPLE = "igrow-edge commission /etc/igrow/daemon.yaml"
 
@@ -27,6 +27,6 @@ def run(options: argparse.Namespace) -> int:
         configuration, Console(), fallback_after=options.fallback_after, only_read=options.only_read
     )
     # A daemon would go on writing, and its heartbeat would keep the PLC from falling back.
-    alone = contextlib.nullcontext() if options.only_read else sole_use(configuration.state_folder)
+    alone = contextlib.nullcontext() if options.only_read else daemon_stopped(configuration.state_folder)
     with alone:
         return 0 if asyncio.run(commissioning.run()) else 1

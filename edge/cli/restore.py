@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from edge.cli.common import configuration_of, store_folder
-from edge.state_lock import sole_use
+from edge.state_lock import daemon_stopped
 from edge.store import restore
 
 EXAMPLE = "sudo -u igrow igrow-edge restore /etc/igrow/daemon.yaml igrow-backup.tar.gz"
@@ -22,7 +22,7 @@ def run(options: argparse.Namespace) -> int:
     """Put the backup in place."""
     configuration = configuration_of(options)
     folder = store_folder(configuration)
-    with sole_use(configuration.state_folder):
+    with daemon_stopped(configuration.state_folder):
         restore(options.archive, folder)
     print(f"{folder}: restored from {options.archive}")
     return 0

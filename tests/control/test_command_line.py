@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import json
+import os
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -151,6 +154,33 @@ def test_a_store_is_restored_only_while_no_daemon_has_it(tmp_path, capsys):
             assert code == 2
             assert re.fullmatch(r"error: \S*/state: a daemon is running on it; stop it first, .*\n", err)
     assert "the backup cannot be restored" in call(capsys, "restore", path, tmp_path / "backup.tar.gz")[2]
+
+
+def test_a_walk_before_the_first_start_leaves_no_folder_that_the_service_could_not_write_to(
+    tmp_path, capsys, monkeypatch
+):
+    monkeypatch.setattr("edge.commission.LINE_SECONDS", 0.1)
+    path = write_files(tmp_path, free_port())
+    code, out, _ = call(capsys, "commission", path)
+    assert code == 1
+    assert "no point can be read" in out
+    assert not (tmp_path / "state").exists()
+
+
+def test_a_user_who_cannot_see_the_lock_is_told_whose_rights_it_takes(tmp_path, capsys, monkeypatch):
+    path = write_files(tmp_path, 5020)
+    real = os.open
+
+    def barred(file, *arguments, **named):
+        if Path(file).name == "lock":
+            raise PermissionError(errno.EACCES, "Permission denied", str(file))
+        return real(file, *arguments, **named)
+
+    monkeypatch.setattr("edge.state_lock.os.open", barred)
+    code, _, err = call(capsys, "commission", path)
+    assert code == 2
+    assert "cannot be told: Permission denied" in err
+    assert "sudo -u igrow" in err
 
 
 async def test_probe_shows_raw_and_decoded_values(tmp_path, capsys):
