@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -37,6 +37,12 @@ class Carried:
     """(..., 1) how often leaves were picked."""
 
 
+def known_inputs(simulator: NetworkSimulator) -> tuple[str, ...]:
+    """Return the weather, setpoints and settings that an hour of climate and growth needs, in a fixed order."""
+    names = dict.fromkeys((*simulator.climate.drivers, "global_radiation", "lamp_on"))
+    return tuple(name for name in names if name != "leaf_area_index")
+
+
 def day_ends(hours: int) -> NDArray[np.int64]:
     """Return the last row of each day of 24 rows, the last day cut where the run ends."""
     return np.minimum(np.arange(HOURS, hours + HOURS, HOURS), hours) - 1
@@ -50,7 +56,7 @@ def run_hour(
     Parameters
     ----------
     known
-        Name -> (..., 1): every driver of the climate stage but the leaf area, over the hour that ends.
+        Name -> (..., 1): `known_inputs`, over the hour that ends.
     hour
         (..., 1) hour of the day at its end.
 
@@ -65,7 +71,7 @@ def run_hour(
     values = dict(known) | {"leaf_area_index": carried.growth[..., leaves : leaves + 1]}
     drivers = xp.concat([values[name] for name in climate.drivers], axis=-1)
     state, memory = advance(xp, climate, carried.climate, drivers, carried.climate_memory, hour)
-    values |= {name: state[..., column : column + 1] for column, name in enumerate(climate.states)}
+    values |= _columns(climate, state)
     values["par"] = simulator.light.par(xp, known["global_radiation"], known["lamp_on"])
     return grow_hour(xp, simulator, replace(carried, climate=state, climate_memory=memory), values, hour)
 
@@ -81,7 +87,7 @@ def grow_hour(
     values["crop_age"] = carried.crop_age + 1.0 / HOURS
     drivers = xp.concat([values[name] for name in growth.drivers], axis=-1)
     state, memory = advance(xp, growth, carried.growth, drivers, carried.growth_memory, hour)
-    values |= {name: state[..., column : column + 1] for column, name in enumerate(growth.states)}
+    values |= _columns(growth, state)
     pickings = carried.pickings
     if simulator.picking is not None:
         before = carried.growth[..., leaves : leaves + 1]
@@ -128,7 +134,7 @@ def run_day(
     stage = simulator.harvest
     means = {name: xp.mean(day[name], axis=-1, keepdims=True) for name in stage.drivers}
     state, memory = run_harvest(xp, stage, carried.harvest, carried.harvest_memory, means)
-    day |= {name: state[..., column : column + 1] for column, name in enumerate(stage.states)}
+    day |= _columns(stage, state)
     return replace(carried, harvest=state, harvest_memory=memory), day
 
 
@@ -163,8 +169,8 @@ def free_run(simulator: NetworkSimulator, known: Mapping[str, Values], hour: Val
     Parameters
     ----------
     known
-        Name -> (runs, hours): every driver of the climate stage but the leaf area, over all hours, and the first
-        hour of every state (later hours of a state are not read).
+        Name -> (runs, hours): `known_inputs` over all hours, and the first hour of every state (later hours of a
+        state are not read).
     hour
         (hours,) hour of the day.
 
@@ -173,9 +179,6 @@ def free_run(simulator: NetworkSimulator, known: Mapping[str, Values], hour: Val
     Name -> (runs, hours) of every state, of par, thermal_time (degC d since the first hour) and crop_age (d). The
     harvest stage runs by days of 24 rows; within a day its value is the one at the end of the day before.
     """
-    given = [name for name in dict.fromkeys((*simulator.climate.drivers, "global_radiation", "lamp_on"))
-             if name != "leaf_area_index"]  # fmt: skip
-    drivers = {name: known[name].astype(np.float32)[..., None] for name in given}
     runs, hours = known["global_radiation"].shape
     carried = begin(simulator, known)
     names = (*simulator.climate.states, *simulator.growth.states)
@@ -184,11 +187,7 @@ def free_run(simulator: NetworkSimulator, known: Mapping[str, Values], hour: Val
         result[name][:, 0] = known[name][:, 0]
     light = simulator.light.par(np, known["global_radiation"][:, 0], known["lamp_on"][:, 0])
     result["par"][:, 0], result["thermal_time"][:, 0], result["crop_age"][:, 0] = light, 0.0, 0.0
-    for row in range(1, hours):
-        now = np.full((runs, 1), hour[row], dtype=np.float32)
-        carried, values = run_hour(np, simulator, carried, {name: drivers[name][:, row] for name in given}, now)
-        for name, column in result.items():
-            column[:, row] = values[name][:, 0]
+    _run_rows(run_hour, simulator, carried, {name: known[name] for name in known_inputs(simulator)}, hour, result)
     return result | _harvest(simulator, result, known)
 
 
@@ -213,14 +212,32 @@ def free_growth(
     first = {name: np.full((runs, 1), value) for name, value in start.items()}
     given = [name for name in simulator.growth.drivers if name not in ("crop_age", "thermal_time")]
     carried = begin(simulator, {**climate, **first})
-    columns = {name: climate[name].astype(np.float32)[..., None] for name in given}
     result = {name: np.tile(first[name], (1, hours)) for name in simulator.growth.states}
-    for row in range(1, hours):
+    _run_rows(grow_hour, simulator, carried, {name: climate[name] for name in given}, hour, result)
+    return result
+
+
+def _run_rows(
+    step: Callable[..., tuple[Carried, dict[str, Array]]],
+    simulator: NetworkSimulator,
+    carried: Carried,
+    drivers: Mapping[str, Values],
+    hour: Values,
+    result: Mapping[str, Values],
+) -> None:
+    """Fill `result` (runs, hours) from its second row on with what `run_hour` or `grow_hour` gives, hour by hour."""
+    columns = {name: values.astype(np.float32)[..., None] for name, values in drivers.items()}
+    runs = len(carried.climate)
+    for row in range(1, len(hour)):
         now = np.full((runs, 1), hour[row], dtype=np.float32)
-        carried, values = grow_hour(np, simulator, carried, {name: columns[name][:, row] for name in given}, now)
+        carried, values = step(np, simulator, carried, {name: column[:, row] for name, column in columns.items()}, now)
         for name, column in result.items():
             column[:, row] = values[name][:, 0]
-    return result
+
+
+def _columns(stage: Stage, state: Array) -> dict[str, Array]:
+    """Return the states of a stage (..., s) as name -> (..., 1)."""
+    return {name: state[..., column : column + 1] for column, name in enumerate(stage.states)}
 
 
 def daily_drivers(names: Sequence[str], columns: Mapping[str, Values]) -> Values:

@@ -12,11 +12,12 @@ import pytest
 from numpy.typing import NDArray
 
 from igrow_core.bundle import Bundle, BundleError, open_session, self_test
+from igrow_core.errors import IgrowError
 from igrow_core.simulator.hindcast import SimulatorSettings
 from igrow_core.simulator.leaf_picking import LeafPicking
 from igrow_core.simulator.network import HOURS, LightFormula, NetworkSimulator, Stage
-from igrow_core.simulator.network_run import Carried, begin, free_run, run_day
-from trainer.export.network import CARRIED, NEXT, hourly_outputs, known_inputs, write_network_bundle
+from igrow_core.simulator.network_run import Carried, begin, free_run, known_inputs, run_day
+from trainer.export.network import CARRIED, NEXT, hourly_outputs, write_network_bundle
 from trainer.training.checkpoint import load_simulator
 from trainer.training.simulator import CLIMATE, GROWTH, HARVEST, daily_data, derived, hourly_data
 from trainer.training.stage import run_stage, untrained
@@ -141,7 +142,9 @@ def test_the_bundle_proves_itself_and_brings_its_networks(bundle: Bundle, simula
     assert {one.graph for one in self_test(bundle)} == {"simulator", "optimizer"}
     again = load_simulator(bundle.folder)
     np.testing.assert_array_equal(again.climate.matrices[0], simulator.climate.matrices[0])
-    assert again.picking is not None and again.picking.base == 4.0
+    assert again.picking is not None and simulator.picking is not None and again.light == simulator.light
+    for name, value in vars(simulator.picking).items():
+        np.testing.assert_array_equal(getattr(again.picking, name), value)
 
 
 def test_the_daemon_refuses_to_plan_with_it_in_one_line(bundle: Bundle) -> None:
@@ -156,7 +159,5 @@ def test_a_bundle_is_no_place_for_another(bundle: Bundle, simulator: NetworkSimu
 
 
 def test_a_folder_without_networks_is_refused(tmp_path: Path) -> None:
-    from trainer.training.checkpoint import CheckpointError
-
-    with pytest.raises(CheckpointError, match=r"network\.npz"):
+    with pytest.raises(IgrowError, match=r"network\.npz"):
         load_simulator(tmp_path)

@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from igrow_core.errors import IgrowError
 from igrow_core.simulator.network import advance, initial_memory
 from igrow_core.simulator.network_run import day_ends, free_run
-from trainer.training.checkpoint import CheckpointError, load_simulator, save_simulator
+from trainer.training.checkpoint import FILE_NAME, load_simulator, simulator_to_bytes
 from trainer.training.ensemble import merge
 from trainer.training.simulator import CLIMATE, GROWTH, HARVEST, Layouts, train_simulator
 from trainer.training.stage import StageData, StageLayout, TrainingPlan, run_stage, run_windows, train_stage, untrained
+from trainer.training.stage_file import stages_to_bytes
 
 HOURS = 600
 
@@ -175,7 +177,7 @@ def test_windows_longer_than_any_run_are_refused() -> None:
 
 def test_a_saved_simulator_comes_back_as_it_was(trained, tmp_path: Path) -> None:
     simulator, held_out, hour = trained
-    save_simulator(tmp_path, simulator)
+    (tmp_path / FILE_NAME).write_bytes(simulator_to_bytes(simulator))
     again = free_run(load_simulator(tmp_path), held_out, hour)
     for name, values in free_run(simulator, held_out, hour).items():
         np.testing.assert_array_equal(values, again[name])
@@ -185,7 +187,14 @@ def test_a_saved_simulator_comes_back_as_it_was(trained, tmp_path: Path) -> None
 def test_a_damaged_file_of_weights_is_refused_in_one_line(tmp_path: Path, content: bytes) -> None:
     file = tmp_path / "network.npz"
     file.write_bytes(content)
-    with pytest.raises(CheckpointError, match=r"network\.npz: holds no network simulator"):
+    with pytest.raises(IgrowError, match=r"network\.npz: holds no network stages"):
+        load_simulator(file)
+
+
+def test_a_file_of_a_crop_alone_is_no_simulator(trained, tmp_path: Path) -> None:
+    file = tmp_path / "crop.npz"
+    file.write_bytes(stages_to_bytes({"growth": trained[0].growth, "harvest": trained[0].harvest}))
+    with pytest.raises(IgrowError, match=r"crop\.npz: holds no network simulator"):
         load_simulator(file)
 
 

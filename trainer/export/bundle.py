@@ -38,8 +38,8 @@ from trainer.export import hindcast, plan
 from trainer.export.blocks import OPSET, open_model
 from trainer.export.climate import climate_blocks, effect_parameter
 from trainer.export.optimizer import export_optimizer
-from trainer.export.stage_file import stages_from_bytes, stages_to_bytes
 from trainer.model import HybridModel
+from trainer.training.stage_file import stages_from_bytes, stages_to_bytes
 
 CROP_FILE = "crop.npz"
 MISFIT_KEY = "known_misfit"
@@ -138,7 +138,7 @@ def read_hybrid_model(bundle: Bundle, site: Site) -> HybridModel:
         content = (bundle.folder / CROP_FILE).read_bytes()
     except OSError as error:
         raise BundleError(f"{bundle.folder}: {CROP_FILE} is not readable: {error.strerror}") from None
-    stages = stages_from_bytes(content, where=str(bundle.folder / CROP_FILE))
+    stages, _ = stages_from_bytes(content, where=str(bundle.folder / CROP_FILE))
     given = manifest.simulator.get("parameters", {})
     return HybridModel(
         site=site,

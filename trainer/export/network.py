@@ -22,7 +22,7 @@ from igrow_core.bundle import Bundle, Golden, GraphSignature, Manifest, Tensor, 
 from igrow_core.planner.evolution import EvolutionSettings
 from igrow_core.quantities import QUANTITIES
 from igrow_core.simulator.network import HOURS, NetworkSimulator
-from igrow_core.simulator.network_run import Carried, begin, run_harvest, run_hour
+from igrow_core.simulator.network_run import Carried, begin, known_inputs, run_harvest, run_hour
 from trainer.export.blocks import OPSET, Block, Shape, open_model, trace_shaped, traceable
 from trainer.export.bundle import optimizer_inputs, plain_signature
 from trainer.export.optimizer import export_optimizer
@@ -42,12 +42,6 @@ UNITS = {
 """Of inputs that are no quantities of the registry."""
 NEXT = "next_"
 """Prefix of the outputs that the next call takes in."""
-
-
-def known_inputs(simulator: NetworkSimulator) -> tuple[str, ...]:
-    """Return the rows of weather, setpoints and settings that a day needs, in the order of the input `known`."""
-    names = dict.fromkeys((*simulator.climate.drivers, "global_radiation", "lamp_on"))
-    return tuple(name for name in names if name != "leaf_area_index")
 
 
 def hourly_outputs(simulator: NetworkSimulator) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Network stages as one .npz file: plain arrays and one JSON string, never a pickle."""
+"""Network stages as one .npz file: plain arrays and JSON, never a pickle."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from igrow_core.simulator.network import Stage
 _LAYERS = ("matrices", "biases")
 
 
-def stages_to_bytes(stages: Mapping[str, Stage]) -> bytes:
-    """Return the content of a file that holds these stages by name."""
+def stages_to_bytes(stages: Mapping[str, Stage], notes: Mapping[str, Any] | None = None) -> bytes:
+    """Return the content of a file that holds these stages by name, and notes that JSON can hold."""
     arrays: dict[str, Any] = {}
     plain: dict[str, dict[str, Any]] = {}
     for key, stage in stages.items():
@@ -30,22 +30,27 @@ def stages_to_bytes(stages: Mapping[str, Stage]) -> bytes:
                 arrays[f"{key}.{field.name}"] = value
             else:
                 plain[key][field.name] = value
+    if notes is not None:
+        arrays["notes"] = np.array(json.dumps(notes))
     buffer = io.BytesIO()
     np.savez_compressed(buffer, allow_pickle=False, stages=np.array(json.dumps(plain)), **arrays)
     return buffer.getvalue()
 
 
-def stages_from_bytes(content: bytes, *, where: str) -> dict[str, Stage]:
-    """Read the stages of a file.
+def stages_from_bytes(content: bytes, *, where: str) -> tuple[dict[str, Stage], dict[str, Any]]:
+    """Read the stages of a file, and its notes, empty where it was written without.
 
     Raises:
         IgrowError: it is not such a file; `where` names it.
     """
     try:
-        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
-            plain = json.loads(str(arrays["stages"]))
-            return {key: _stage(key, values, arrays) for key, values in plain.items()}
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        with np.load(io.BytesIO(content), allow_pickle=False) as file:
+            arrays = {key: file[key] for key in file.files}
+        plain = json.loads(str(arrays["stages"]))
+        stages = {key: _stage(key, values, arrays) for key, values in plain.items()}
+        return stages, json.loads(str(arrays.get("notes", "{}")))
+    except Exception as error:
+        # A damaged archive raises from zipfile, zlib or numpy; for the user it is one fault.
         raise IgrowError(f"{where}: holds no network stages: {error}") from None
 
 
