@@ -24,14 +24,11 @@ from igrow_core.quantities import QUANTITIES
 from igrow_core.simulator.network import HOURS, NetworkSimulator
 from igrow_core.simulator.network_run import Carried, begin, known_inputs, run_harvest, run_hour
 from trainer.export.blocks import OPSET, Block, Shape, open_model, trace_shaped, traceable
-from trainer.export.bundle import optimizer_inputs, plain_signature
-from trainer.export.optimizer import export_optimizer
+from trainer.export.optimizer import export_optimizer, optimizer_inputs, optimizer_signature
 from trainer.export.wiring import Wiring, finished_model
 from trainer.training.checkpoint import FILE_NAME, simulator_to_bytes
 
 CARRIED = tuple(field.name for field in fields(Carried))
-GENES = 12
-"""Of the optimizer's self-test."""
 UNITS = {
     "hour": "h",
     "thermal_time": "degC d",
@@ -144,7 +141,7 @@ def write_network_bundle(
     graphs = {"simulator": day_model(simulator), "optimizer": export_optimizer(settings)}
     inputs = {
         "simulator": _golden_day(simulator, training_range, random),
-        "optimizer": optimizer_inputs(settings, GENES, random),
+        "optimizer": optimizer_inputs(settings, random),
     }
     golden = {name: Golden(given, run_graph(open_model(graphs[name]), given)) for name, given in inputs.items()}
     manifest = Manifest(
@@ -153,7 +150,7 @@ def write_network_bundle(
         igrow_version=version("igrow"),
         variant="network",
         opset=OPSET,
-        graphs={"simulator": _signature(simulator), "optimizer": plain_signature(graphs["optimizer"])},
+        graphs={"simulator": _signature(simulator), "optimizer": optimizer_signature(graphs["optimizer"])},
         training_range=training_range,
     )
     files = {f"{name}.onnx": graph.SerializeToString() for name, graph in graphs.items()}
