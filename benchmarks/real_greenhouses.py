@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.ensemble import HistGradientBoostingRegressor
 
+from benchmarks.measured_network import network_predictor
 from igrow_core.economics import local_days
 from igrow_core.errors import IgrowError
 from igrow_core.planner.recent_use import used_in
@@ -85,6 +86,17 @@ def all_errors(
     return {
         name: errors_of(house.record, predict, HORIZONS, rows, begin=begin, every=every)
         for name, (predict, _) in ways.items()
+    }
+
+
+def rivals(
+    house: Greenhouse, fit: Mask, rows: Mask, begin: Mask | None, every: float
+) -> dict[str, dict[tuple[str, str], Errors]]:
+    """What learns from the same rows and knows no physics, driven by the measured actuators."""
+    network = network_predictor(house.record, house.setpoints, fit)
+    return {
+        "network": errors_of(house.record, network, HORIZONS, rows, begin=begin, every=every),
+        "gradient boosting": boosted(house, fit, rows, begin, every),
     }
 
 
@@ -166,7 +178,7 @@ def later(house: Greenhouse, every: float) -> dict[str, object]:
     print(f"{house.log.name}: fitted in {time.monotonic() - began:.0f} s")
     ways = predictors(house, model)
     found = {name: [errors] for name, errors in all_errors(house, ways, rows, None, every).items()}
-    found["gradient boosting"] = [boosted(house, fit | selection, rows, None, every)]
+    found |= {name: [errors] for name, errors in rivals(house, fit | selection, rows, None, every).items()}
     title = (
         f"{house.log.name}, later: weeks 1-{fit_weeks} fit, {selection_weeks} selection, "
         f"{count - fit_weeks - selection_weeks} test"
@@ -193,7 +205,8 @@ def weekly(
         ways = predictors(house, model)
         for name, errors in all_errors(house, ways, rows, begin, every).items():
             found.setdefault(name, []).append(errors)
-        found.setdefault("gradient boosting", []).append(boosted(house, fit | selection, rows, begin, every))
+        for name, errors in rivals(house, fit | selection, rows, begin, every).items():
+            found.setdefault(name, []).append(errors)
         covered.append(coverage(house.record, ways, rows, begin, every))
         totals.append(daily_totals(house.record, house.setpoints, model, rows, begin))
         print(f"week {test + 1} of {count} done", file=sys.stderr)
@@ -261,15 +274,15 @@ def metered(log: Log) -> dict[str, object]:
     return result
 
 
-def print_coverage(parts: Sequence[object]) -> None:
+def print_coverage(parts: Sequence[Mapping[tuple[str, str], tuple[float, float]]]) -> None:
     print("\ncoverage of 90 % intervals")
     pooled: dict[tuple[str, str], list[tuple[float, float]]] = {}
     for part in parts:
-        for key, value in part.items():  # type: ignore[attr-defined]
+        for key, value in part.items():
             pooled.setdefault(key, []).append(value)
-    for (driven, key), values in pooled.items():
+    for (driven, what), values in pooled.items():
         inside, number = np.sum(np.array(values), axis=0)
-        print(f"  {driven:10s} {key:28s} {inside / max(number, 1):.3f}")
+        print(f"  {driven:10s} {what:28s} {inside / max(number, 1):.3f}")
 
 
 def print_range(house: Greenhouse, model: SiteModel, predict: Predictor, fit: Mask, rows: Mask, every: float) -> None:
@@ -310,11 +323,11 @@ def print_range(house: Greenhouse, model: SiteModel, predict: Predictor, fit: Ma
             print(f"  {measure:14s} {title:10s} {chosen.sum():5d} runs  {cells}")
 
 
-def print_totals(parts: Sequence[object]) -> None:
+def print_totals(parts: Sequence[Mapping[str, Floats]]) -> None:
     print("\ndaily totals from setpoints: predicted, measured, difference of the sums, median day's difference")
-    names = list(dict.fromkeys(name for part in parts for name in part))  # type: ignore[attr-defined]
+    names = list(dict.fromkeys(name for part in parts for name in part))
     for name in names:
-        pairs = np.concatenate([part[name] for part in parts if name in part], axis=1)  # type: ignore[index]
+        pairs = np.concatenate([part[name] for part in parts if name in part], axis=1)
         predicted, measured = pairs
         if measured.sum() <= 0:
             continue
