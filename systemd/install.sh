@@ -41,5 +41,5 @@ chmod -R g+rX /etc/igrow
 
 [ ! -d /run/systemd/system ] || systemctl daemon-reload || true
 echo "done. Next: edit /etc/igrow, then"
-echo "  igrow-edge check-config /etc/igrow/daemon.yaml"
+echo "  sudo -u igrow igrow-edge check-config"
 echo "  systemctl enable --now igrow-edge"
