@@ -1,7 +1,8 @@
-"""Print the diagnosis benchmark: `python -m benchmarks.diagnosis [scoring|tuning|usual|real DATA]`.
+"""Print the diagnosis benchmark: `python -m benchmarks.diagnosis [scoring|tuning|matched|usual|real DATA]`.
 
 `scoring` (the default) draws 208 cases, simulates their logs and those that the models are calibrated on, diagnoses
-each, and prints the table beside its bounds. `usual` learns anew what is usual between greenhouses, from seeds that
+each, and prints the table beside its bounds. `matched` does the like with greenhouses of the simulator's own
+structure. `usual` learns anew what is usual between greenhouses, from seeds that
 no case has. Everything is made afresh: an hour or so on two cores.
 """
 
@@ -26,7 +27,7 @@ def _judge(job: tuple[Case, Telemetry, Reference]) -> Outcome:
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.diagnosis", description=__doc__)
-    parser.add_argument("what", nargs="?", default="scoring", choices=("scoring", "tuning", "usual", "real"))
+    parser.add_argument("what", nargs="?", default="scoring", choices=("scoring", "tuning", "matched", "usual", "real"))
     parser.add_argument("data", nargs="?", type=Path, help="folder of the public data sets, for `real`")
     parser.add_argument("--cases", type=int, default=208)
     parser.add_argument("--days", type=int, default=28)
@@ -38,6 +39,10 @@ def main() -> int:
         from benchmarks.diagnosis.real import main as real  # noqa: PLC0415
 
         return real(options.data)
+    if options.what == "matched":
+        from benchmarks.diagnosis.matched import main as matched  # noqa: PLC0415
+
+        return matched(options.processes)
     if options.what == "usual":
         from benchmarks.diagnosis.usual import main as learn  # noqa: PLC0415
 

@@ -12,11 +12,14 @@ import numpy as np
 from benchmarks.diagnosis.cases import SEASONS, Case, hidden
 from benchmarks.diagnosis.logs import SITE, Reference
 from igrow_core.effects import EFFECTS
+from igrow_core.greenhouse import HiddenEffect
 from igrow_core.greenhouse.uncatalogued import UNCATALOGUED
 from igrow_core.telemetry import Telemetry
-from trainer.diagnosis import diagnose, freefit, linearisation
+from trainer.diagnosis import diagnose, freefit, linearisation, search, structure
 from trainer.diagnosis.activation import ActiveTerm, activate
 from trainer.diagnosis.diagnose import Evidence, Stage
+from trainer.diagnosis.gram import Term
+from trainer.diagnosis.problem import Problem
 
 NOISE = {"air_temperature": 0.5, "air_humidity": 2.0, "air_co2": 35.0}
 """Scales under which errors of different quantities are added."""
@@ -41,6 +44,9 @@ class Outcome:
     corrected: float
     perfect: float
     """With the true cause in the model, in the catalogue's form."""
+    worth: float | None
+    """Log-likelihood that the (first) true cause is worth on this log, were the model right but for it: what a search
+    can see at best. None for nothing, and for causes outside the catalogue."""
     seconds: float
 
 
@@ -78,8 +84,27 @@ def judge(case: Case, telemetry: Telemetry, reference: Reference) -> Outcome:
         _sum(errors, "recalibrated"),
         _sum(errors, "corrected"),
         _perfect(evidence, truth, start) if evidence is not None and truth else _sum(errors, "recalibrated"),
+        _worth(evidence.problem, case, truth) if evidence is not None else None,
         seconds,
     )
+
+
+def _worth(problem: Problem, case: Case, truth: Mapping[str, HiddenEffect]) -> float | None:
+    """Return half the squared size of the first true cause over its standard deviation, the nuisance integrated out."""
+    if not case.causes or case.causes[0] not in EFFECTS:
+        return None
+    name = case.causes[0]
+    typical = {shape.name: shape.typical for shape in EFFECTS[name].shapes}
+    own = [
+        (sum(abs(candidate.values[key] - value) for key, value in typical.items()), column)
+        for column, candidate in zip(problem.candidate, problem.candidates, strict=True)
+        if candidate.effect == name
+    ]
+    if not own:
+        return None
+    onset = None if case.onset_day is None else round(case.onset_day)
+    fit = search.fit(problem.grams, structure.null_model(problem).with_term(Term(min(own)[1], onset)))
+    return 0.5 * (float(truth[name].size or 0.0) / float(fit.deviations[0])) ** 2
 
 
 def _sum(errors: Mapping[str, Mapping[str, Mapping[str, float]]], stage: str) -> float:
@@ -143,6 +168,10 @@ def table(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int, str]]:
     sizes = [abs(one.relative_size - 1.0) for one in outcomes if one.relative_size is not None]
     covered = [one.covered for one in outcomes if one.covered is not None]
     claims = _claims(outcomes)
+    alone = _group(outcomes, "single", "sensor")
+    worth = {
+        size: [one.worth for one in alone if one.case.size == size and one.worth is not None] for size in (1.0, 0.3)
+    }
     return [
         (
             "false claims on nothing",
@@ -153,6 +182,11 @@ def table(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int, str]]:
         ("right cause first, ENR 1", *_share(_group(outcomes, "single", "sensor", size=1.0), _first_right), ">= .95"),
         ("right cause first, ENR 0.3", *_share(_group(outcomes, "single", "sensor", size=0.3), _first_right), ">= .85"),
         ("  the same where something was claimed", *_share(claims, _first_right), "-"),
+        *(
+            (f"  log-likelihood that ENR {size:g} is worth, median", float(np.median(values)), len(values), "-")
+            for size, values in worth.items()
+            if values
+        ),
         (
             "process and sensor told apart, of claims",
             *_share(claims, lambda o: _kind(o.found[0]) == _kind(o.case.causes[0]) if o.found[0] in EFFECTS else False),

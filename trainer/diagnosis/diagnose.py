@@ -12,7 +12,19 @@ from igrow_core.errors import IgrowError
 from igrow_core.simulator.hybrid.record import Record
 from igrow_core.site import Site
 from igrow_core.telemetry import Telemetry
-from trainer.diagnosis import freefit, freerun, problem, refine, runner, screening, selection, structure, usual, wording
+from trainer.diagnosis import (
+    freefit,
+    freerun,
+    problem,
+    refine,
+    resolution,
+    runner,
+    screening,
+    selection,
+    structure,
+    usual,
+    wording,
+)
 from trainer.diagnosis.activation import ActiveTerm, activate
 from trainer.diagnosis.adequacy import Adequacy, judge
 from trainer.diagnosis.deployed import Deployed
@@ -178,14 +190,22 @@ def _search(
     A large effect moves the model far from where the search linearised it; further causes and what remains can
     be told only after it has been put in.
     """
+
+    def prepared(terms: Sequence[ActiveTerm], interval: float) -> Problem:
+        allowed_for = usual.installed() if interval == problem.HOUR else ()
+        return problem.prepare(
+            record, split, deployed.prior, activate(record, terms), site.longitude, deployed.known_misfit,
+            allowed_for, without, interval,
+        )  # fmt: skip
+
+    problem_now = prepared(deployed.effects, problem.HOUR)
+    if record.step < problem.HOUR:
+        rows = prepared(deployed.effects, record.step)
+        if resolution.disagreement(problem_now, rows) <= resolution.LARGEST_DISAGREEMENT:
+            problem_now = rows
     first: tuple[Problem, tuple[Selected, ...]] | None = None
     found: list[Estimated] = []
     while True:
-        terms = (*deployed.effects, *(one.term for one in found))
-        problem_now = problem.prepare(
-            record, split, deployed.prior, activate(record, terms), site.longitude, deployed.known_misfit,
-            usual.installed(), without,
-        )  # fmt: skip
         null = structure.null_model(problem_now)
         more = len(found) < MOST_CAUSES
         chain = selection.best_cause(problem_now, null, rng) if more else selection.no_cause(problem_now, null)
@@ -197,6 +217,7 @@ def _search(
         if len(new) <= len(found):
             return _Search(*first, tuple(found), judged)
         found = new
+        problem_now = prepared((*deployed.effects, *(one.term for one in found)), problem_now.interval)
 
 
 def _refined(prepared: Problem, judged: Adequacy, estimated: list[Estimated], deployed: Deployed) -> list[Estimated]:

@@ -207,7 +207,7 @@ def _onset(problem: Problem, reduced: Fit, hypothesis: Hypothesis) -> OnsetInter
             for day in days
         ]
     )
-    best = int(np.argmax(gains))
+    best = selection.middle_of_best(gains)
     inside = np.flatnonzero(gains >= gains[best] - 1.353)
     return OnsetInterval(
         _day_start(problem, days[best]),

@@ -52,33 +52,36 @@ class Problem:
     """Columns of how greenhouses and weathers usually differ."""
     expected: Floats
     """The known and the usual misfits as errors, not whitened, (known + usual, 3, r, steps)."""
+    interval: float
+    """Seconds over which errors are averaged."""
 
 
-def hourly(values: Floats, step: float) -> Floats:
-    """Return means over hours along the last axis, (..., steps) to (..., hours).
+def averaged(values: Floats, step: float, interval: float) -> Floats:
+    """Return means over intervals along the last axis, (..., steps) to (..., intervals).
 
     Within the hour a greenhouse answers to a flux as its fast masses do (leaves, cover, the sensor's housing), which
-    the balances do not have; the mean of an hour hardly depends on them.
+    the balances may not have; the mean of an hour hardly depends on them.
 
     Args:
         values: by step.
         step: its length, s.
+        interval: s; one step at least.
     """
-    block = max(1, round(HOUR / step))
-    hours = values.shape[-1] // block
-    means: Floats = values[..., : hours * block].reshape(*values.shape[:-1], hours, block).mean(axis=-1)
+    block = max(1, round(interval / step))
+    count = values.shape[-1] // block
+    means: Floats = values[..., : count * block].reshape(*values.shape[:-1], count, block).mean(axis=-1)
     return means
 
 
-def counted_hours(line: Linearisation, balances: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Tell which hours have an error in every balance at hand in each of their rows, (r, hours)."""
+def counted_intervals(line: Linearisation, balances: tuple[int, ...], interval: float) -> NDArray[np.bool_]:
+    """Tell which intervals have an error in every balance at hand in each of their rows, (r, intervals)."""
     rows = np.all(line.runs.weight[list(balances)], axis=0)
-    counted: NDArray[np.bool_] = hourly(rows.astype(np.float64), line.record.step) > 1.0 - 1e-9
+    counted: NDArray[np.bool_] = averaged(rows.astype(np.float64), line.record.step, interval) > 1.0 - 1e-9
     return counted
 
 
 def recalibrate(
-    start: Linearisation, split: Split, prior: Prior, misfit: Floats, rounds: int = ROUNDS
+    start: Linearisation, split: Split, prior: Prior, misfit: Floats, interval: float, rounds: int = ROUNDS
 ) -> tuple[Linearisation, Whitening, tuple[int, ...]]:
     """Fit parameters under their prior and the noise to the fit days, by turns.
 
@@ -87,6 +90,7 @@ def recalibrate(
         split: days to fit.
         prior: of the parameters.
         misfit: what is known to be missing, added to the errors, (3, r, steps).
+        interval: seconds over which errors are averaged.
         rounds: of turns.
 
     Returns the linearisation at the fitted parameters, the whitening and the balances at hand.
@@ -96,12 +100,13 @@ def recalibrate(
     line, runs = start, start.runs
     balances = tuple(row for row in range(3) if runs.weight[row].mean() > 0.2)
     fitted = split.fit[runs.day][:, None]
-    observed = counted_hours(line, balances)
+    observed = counted_intervals(line, balances, interval)
     step = line.record.step
-    whitening = _noise(hourly(line.errors + misfit, step), balances, observed, fitted)
+    whitening = _noise(averaged(line.errors + misfit, step, interval), balances, observed, fitted)
     for _ in range(rounds):
         columns = linearisation.parameter_columns(line, names, prior.spread)
-        stack = hourly(np.concatenate([(line.errors + misfit)[None], columns])[:, list(balances)], step) * observed
+        stack = np.concatenate([(line.errors + misfit)[None], columns])[:, list(balances)]
+        stack = averaged(stack, step, interval) * observed
         flat = (whitening(stack) * fitted).reshape(len(stack), -1)
         products = flat @ flat.T
         # The prior's mean is where the search began, not where this round stands.
@@ -113,7 +118,7 @@ def recalibrate(
             {name: parameters[name] + float(part) for name, part in zip(names, change, strict=True)}
         )
         line = linearisation.linearise(line.record, runs, parameters, line.effects)
-        whitening = _noise(hourly(line.errors + misfit, step), balances, observed, fitted, whitening)
+        whitening = _noise(averaged(line.errors + misfit, step, interval), balances, observed, fitted, whitening)
     return line, whitening, balances
 
 
@@ -156,6 +161,7 @@ def prepare(
     known: Mapping[str, float],
     usual: Sequence[Mapping[str, float]] = (),
     without: Collection[str] = (),
+    interval: float = HOUR,
 ) -> Problem:
     """Recalibrate, then linearise everything that may be missing.
 
@@ -168,14 +174,15 @@ def prepare(
         known: the misfit of the calibration, amplitude by key (`structure`).
         usual: how greenhouses and weathers differ though nothing is missing, each in amplitudes by key (`usual`).
         without: effects that are no candidates.
+        interval: seconds over which errors are averaged.
     """
     runs = linearisation.day_runs(record, split.day)
     line = linearisation.linearise(record, runs, prior.mean, effects)
     expected = _combined(line, longitude, [known, *usual] if known else usual)
     misfit = expected[0] if known else np.zeros_like(line.shown)
-    line, whitening, balances = recalibrate(line, split, prior, misfit)
+    line, whitening, balances = recalibrate(line, split, prior, misfit, interval)
     chosen = list(balances)
-    observed = counted_hours(line, balances)
+    observed = counted_intervals(line, balances, interval)
     base = linearisation.parameter_columns(line, prior.names, prior.spread)
     found = candidates.candidate_columns(line, without)
     names, pattern = drivers.pattern_columns(line, longitude)
@@ -189,7 +196,7 @@ def prepare(
         expected[1 if known else 0 :],
     ]
     edges = np.cumsum([0] + [len(part) for part in parts])
-    white = np.concatenate([whitening(hourly(part[:, chosen], record.step) * observed) for part in parts])
+    white = np.concatenate([whitening(averaged(part[:, chosen], record.step, interval) * observed) for part in parts])
     products = gram.daily_products(white, runs.day, split.days)
     spans = [range(int(edges[k]), int(edges[k + 1])) for k in range(1, len(parts))]
     parameter, candidate, ageing, patterned, first_known, usually = spans
@@ -210,6 +217,7 @@ def prepare(
         known=first_known,
         usual=usually,
         expected=expected,
+        interval=interval,
     )
 
 

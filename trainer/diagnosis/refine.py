@@ -16,7 +16,7 @@ from igrow_core.effects import EFFECTS
 from trainer.diagnosis import linearisation
 from trainer.diagnosis.activation import ActiveTerm, activate
 from trainer.diagnosis.linearisation import Floats, Linearisation
-from trainer.diagnosis.problem import Problem, counted_hours, hourly, recalibrate
+from trainer.diagnosis.problem import Problem, averaged, counted_intervals, recalibrate
 from trainer.diagnosis.search import Fit
 from trainer.diagnosis.structure import SPREAD
 
@@ -53,12 +53,13 @@ def refine(problem: Problem, fit: Fit, terms: Sequence[ActiveTerm], before: Sequ
     parameters = prior.clip(start)
     current = list(terms)
     misfit = problem.expected[: len(problem.known)].sum(axis=0)
+    interval = problem.interval
     deviation = np.zeros(0)
     regimes: list[dict[str, tuple[float, float]]] = []
     for step in range(STEPS):
         line = _line(problem, parameters, [*before, *current])
         # The noise is fitted about the model as it now stands; its parameters do not move here.
-        _, whitening, balances = recalibrate(line, problem.split, prior, misfit, rounds=0)
+        _, whitening, balances = recalibrate(line, problem.split, prior, misfit, interval, rounds=0)
         knobs = [(index, None) for index in range(len(current))] + [
             (index, shape.name) for index, term in enumerate(current) for shape in EFFECTS[term.effect].shapes
         ]
@@ -69,9 +70,11 @@ def refine(problem: Problem, fit: Fit, terms: Sequence[ActiveTerm], before: Sequ
             problem.expected,
             np.stack(slopes),
         ]
-        hours = counted_hours(line, balances) & problem.split.fit[line.runs.day][:, None]
+        counted = counted_intervals(line, balances, interval) & problem.split.fit[line.runs.day][:, None]
         length = line.record.step
-        stack = np.concatenate([whitening(hourly(part[:, list(balances)], length) * hours) for part in columns])
+        stack = np.concatenate(
+            [whitening(averaged(part[:, list(balances)], length, interval) * counted) for part in columns]
+        )
         daily = stack.transpose(2, 0, 1, 3).reshape(len(line.runs.day), len(stack), -1)
         products = np.matmul(daily, daily.transpose(0, 2, 1))
         total = products.sum(axis=0)
@@ -104,7 +107,8 @@ def refine(problem: Problem, fit: Fit, terms: Sequence[ActiveTerm], before: Sequ
         residual = np.tensordot(np.concatenate([[1.0], moved]), stack, axes=1)
         offset = len(stack) - len(knobs)
         regimes = [
-            _regimes(line, residual, stack[offset + index], current[index].amplitude) for index in range(len(current))
+            _regimes(line, interval, residual, stack[offset + index], current[index].amplitude)
+            for index in range(len(current))
         ]
         if step and np.all(np.abs(steps) < 0.1 * deviation):
             break
@@ -176,13 +180,16 @@ def _longest(term: ActiveTerm, shape: str | None) -> float:
     return 0.5 * abs(_scale(term, shape)) if shape is None else abs(_scale(term, shape))
 
 
-def _regimes(line: Linearisation, residual: Floats, slope: Floats, amplitude: float) -> dict[str, tuple[float, float]]:
+def _regimes(
+    line: Linearisation, interval: float, residual: Floats, slope: Floats, amplitude: float
+) -> dict[str, tuple[float, float]]:
     """Return (amplitude, standard deviation) refitted on the rows of each regime, all else held.
 
     Args:
         line: of the refitted model.
-        residual: whitened, after the fit, (b, r, hours).
-        slope: whitened, of the amplitude, (b, r, hours).
+        interval: seconds over which errors are averaged.
+        residual: whitened, after the fit, (b, r, intervals).
+        slope: whitened, of the amplitude, (b, r, intervals).
         amplitude: as fitted on all rows.
     """
     rows = line.runs.rows - 1
@@ -203,7 +210,7 @@ def _regimes(line: Linearisation, residual: Floats, slope: Floats, amplitude: fl
     whole = float(np.sum(slope**2))
     found = {}
     for name, mask in masks.items():
-        inside = hourly(mask.astype(np.float64), line.record.step) > 0.5
+        inside = averaged(mask.astype(np.float64), line.record.step, interval) > 0.5
         curvature = float(np.sum((slope * inside) ** 2))
         # A regime in which the effect hardly shows tells nothing of it.
         if curvature > 0.02 * whole:

@@ -73,6 +73,15 @@ def score_candidates(
     return _best(scanned, problem.candidates, ageing, [one.effect for one in problem.candidates])
 
 
+def middle_of_best(gains: Floats) -> int:
+    """Return the position of the largest gain, the middle one of several.
+
+    Held-out days tell nothing: within a block of them all beginnings are as likely, and the middle is the least wrong.
+    """
+    ties = np.flatnonzero(gains >= gains.max() - 1e-9)
+    return int(ties[len(ties) // 2])
+
+
 def score_patterns(
     problem: Problem, current: Fit, onsets: Sequence[int | None], rng: np.random.Generator
 ) -> list[Hypothesis]:
@@ -93,7 +102,7 @@ def _best(
     price = np.array([0.0 if onset is None else ONSET_PRICE for onset in scanned.onsets])
     merit = scanned.gain - price[:, None]
     found: dict[object, Hypothesis] = {}
-    rows = np.argmax(merit, axis=0)
+    rows = np.array([middle_of_best(column) for column in merit.T], dtype=np.int64)
     for column in np.argsort(-merit[rows, np.arange(merit.shape[1])]):
         row = rows[column]
         if groups[column] in found or merit[row, column] <= 0.0:
