@@ -3,21 +3,23 @@
     python -m benchmarks.diagnosis real DATA
 
 DATA is the folder with ``agc2019`` and ``agc2018``. Each compartment's model is calibrated on its first eight weeks
-and diagnosed on the four that follow. Then the known truth: the model is told nothing of an actuator (its column is
-taken out of the log), and the diagnosis must say so. Then the placebo: wind and rain of another half of the season,
+and diagnosed on the four that follow. Then the known truth, in two ways: the model loses a term that it had (its
+parameter goes to its lowest value), and the diagnosis must name it; an actuator's column is taken out of the log, and
+the diagnosis must say that something is missing. Then the placebo: wind and rain of another half of the season,
 put in the place of the true ones, must not be found.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from igrow_core.errors import IgrowError
 from igrow_core.simulator.hybrid.nominal import nominal
+from igrow_core.simulator.hybrid.parameters import PARAMETERS
 from igrow_core.site import Site
 from igrow_core.telemetry import Telemetry
 from trainer.calibration import calibrate, prior
@@ -32,7 +34,14 @@ COMPARTMENTS = (
     ("agc2018", "deep_greens"),
 )
 CALIBRATION_DAYS, DIAGNOSIS_DAYS = 56, 28
-WITHHELD = {"lamp_power": "lamp heat", "rail_pipe_temperature": "pipe heat", "energy_screen": "screen"}
+WITHHELD = ("lamp_power", "rail_pipe_temperature", "energy_screen")
+"""Columns that are taken out of the log."""
+LOST = {
+    "lamp_heat_share": "lamp_heat",
+    "leakage_wind": "wind_infiltration",
+    "transpiration_night_share": "night_transpiration",
+}
+"""Parameters that the model loses, and the effect that is then missing."""
 PLACEBO = ("wind_speed", "wind_direction", "rain")
 
 
@@ -72,7 +81,7 @@ def deploy(log: Telemetry, site: Site) -> Deployed:
 
 def say(title: str, diagnosis: Diagnosis) -> None:
     causes = ", ".join(f"{one.effect} ({'/'.join(one.rivals)})" for one in diagnosis.findings) or "-"
-    print(f"{title:44} {diagnosis.verdict:12} {causes}")
+    print(f"{title:72} {diagnosis.verdict:12} {causes}")
     for quantity, horizons in diagnosis.errors.items():
         if "24_h" in horizons:
             stages = "  ".join(f"{stage} {value:.3g}" for stage, value in horizons["24_h"].items())
@@ -81,6 +90,14 @@ def say(title: str, diagnosis: Diagnosis) -> None:
 
 def without(log: Telemetry, name: str) -> Telemetry:
     return Telemetry(log.time, {column: values for column, values in log.columns.items() if column != name})
+
+
+def lose(model: Deployed, parameter: str) -> Deployed:
+    """Return the model with a term at the lowest value that its parameter may have."""
+    low = {parameter: PARAMETERS[parameter].low}
+    return replace(
+        model, parameters={**model.parameters, **low}, standard_deviation={**model.standard_deviation, parameter: 0.0}
+    )
 
 
 def placebo(log: Telemetry, other: Telemetry) -> Telemetry:
@@ -99,10 +116,13 @@ def main(data: Path | None) -> int:
         diagnosis, _ = diagnose(one.after, one.site, model)
         say(one.name, diagnosis)
         found[one.name] = {finding.effect for finding in diagnosis.findings}
+        for parameter, effect in LOST.items():
+            told, _ = diagnose(one.after, one.site, lose(model, parameter))
+            say(f"  model without {effect} ({parameter} was {model.parameters[parameter]:.3g})", told)
         for column in WITHHELD:
             if column in one.after:
                 told, _ = diagnose(without(one.after, column), one.site, model)
-                say(f"  without {column}", told)
+                say(f"  log without {column}", told)
         false, _ = diagnose(placebo(one.after, one.before), one.site, model)
         say("  wind and rain of other weeks", false)
     shared = {name for names in found.values() for name in names if sum(name in other for other in found.values()) > 1}

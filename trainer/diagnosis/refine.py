@@ -143,11 +143,11 @@ def _slope(
     """Return d(error)/d(amplitude or shape) of one term, (3, r, steps)."""
     term = terms[index]
     small = 0.05 * _scale(term, shape)
-    other = [*terms[:index], _moved(term, {shape: small}), *terms[index + 1 :]]
-    moved = _line(problem, dict(line.parameters), [*before, *other])
-    # A bound may have held the term back, or turned the step round.
-    taken = _value(other[index], shape) - _value(term, shape)
-    slope: Floats = (moved.errors - line.errors) / taken if taken else np.zeros_like(line.errors)
+    tried = [_moved(term, {shape: step}) for step in (small, -small)]
+    # At a bound one of both steps is held back.
+    other = max(tried, key=lambda one: abs(_value(one, shape) - _value(term, shape)))
+    moved = _line(problem, dict(line.parameters), [*before, *terms[:index], other, *terms[index + 1 :]])
+    slope: Floats = (moved.errors - line.errors) / (_value(other, shape) - _value(term, shape))
     return slope
 
 
