@@ -45,8 +45,8 @@ class Outcome:
     perfect: float
     """With the true cause in the model, in the catalogue's form."""
     worth: float | None
-    """Log-likelihood that the (first) true cause is worth on this log, were the model right but for it: what a search
-    can see at best. None for nothing, and for causes outside the catalogue."""
+    """Log-likelihood that a lone true cause is worth on this log, were the model right but for it: what a search can
+    see at best. None for nothing, pairs, beginnings and causes outside the catalogue."""
     seconds: float
 
 
@@ -90,10 +90,10 @@ def judge(case: Case, telemetry: Telemetry, reference: Reference) -> Outcome:
 
 
 def _worth(problem: Problem, case: Case, truth: Mapping[str, HiddenEffect]) -> float | None:
-    """Return half the squared size of the first true cause over its standard deviation, the nuisance integrated out."""
-    if not case.causes or case.causes[0] not in EFFECTS:
+    """Return half the squared size of a lone true cause over its standard deviation, the nuisance integrated out."""
+    if len(case.causes) != 1 or case.causes[0] not in EFFECTS or case.onset_day is not None:
         return None
-    name = case.causes[0]
+    (name,) = case.causes
     typical = {shape.name: shape.typical for shape in EFFECTS[name].shapes}
     own = [
         (sum(abs(candidate.values[key] - value) for key, value in typical.items()), column)
@@ -102,8 +102,7 @@ def _worth(problem: Problem, case: Case, truth: Mapping[str, HiddenEffect]) -> f
     ]
     if not own:
         return None
-    onset = None if case.onset_day is None else round(case.onset_day)
-    fit = search.fit(problem.grams, structure.null_model(problem).with_term(Term(min(own)[1], onset)))
+    fit = search.fit(problem.grams, structure.null_model(problem).with_term(Term(min(own)[1])))
     return 0.5 * (float(truth[name].size or 0.0) / float(fit.deviations[0])) ** 2
 
 
