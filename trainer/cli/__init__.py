@@ -1,17 +1,10 @@
-"""The trainer's command line: `igrow-trainer COMMAND`, one module a command.
-
-A command's module has `add_arguments(parser)`, `run(arguments) -> exit code` and an `EXAMPLE`. It is imported
-only when it is called, so that `--help` does not wait for torch.
-"""
+"""The command line `igrow-trainer COMMAND`; `igrow_core/command_line.py` says what makes a module a command."""
 
 from __future__ import annotations
 
-import argparse
-import importlib
-import sys
 from collections.abc import Sequence
 
-from igrow_core.errors import IgrowError
+from igrow_core.command_line import run_command
 
 COMMANDS = {
     "generate": ("trainer.cli.generate", "simulate a greenhouse and write its log"),
@@ -29,36 +22,6 @@ COMMANDS = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns its exit code, 2 for a user's mistake."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    parser = argparse.ArgumentParser(
-        prog="igrow-trainer",
-        description="Learn the simulator of a greenhouse from its log, find what it lacks, and publish the better one.",
-        epilog="igrow-trainer COMMAND --help explains a command, with an example.",
-    )
-    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    wanted = next((word for word in given if not word.startswith("-")), None)
-    for name, (module_name, summary) in COMMANDS.items():
-        command = commands.add_parser(
-            name,
-            help=summary,
-            description=summary[0].upper() + summary[1:] + ".",
-            formatter_class=argparse.RawDescriptionHelpFormatter,
-        )
-        if name == wanted:
-            module = importlib.import_module(module_name)
-            module.add_arguments(command)
-            command.epilog = f"example:\n  {module.EXAMPLE}"
-            command.set_defaults(run=module.run)
-    options = parser.parse_args(given)
-    try:
-        return int(options.run(options))
-    except IgrowError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        return 130
-    except BrokenPipeError:
-        # Whoever read our output has gone (`igrow-trainer ... | head`).
-        sys.stderr.close()
-        return 0
+    """Run one command; returns its exit code."""
+    description = "Learn the simulator of a greenhouse from its log, find what it lacks, and publish the better one."
+    return run_command("igrow-trainer", description, COMMANDS, arguments)
