@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import gzip
 import json
-import os
 from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from datetime import UTC, datetime
@@ -28,6 +27,7 @@ import numpy as np
 from edge.store.store import read_records, read_telemetry
 from igrow_core.errors import IgrowError
 from igrow_core.telemetry import write_csv
+from igrow_core.whole_files import write_whole
 
 DAY = 86_400
 GRACE_SECONDS = 120
@@ -91,7 +91,13 @@ class FolderExchange:
         """Leave a report for the trainer; raises OSError."""
         moment = datetime.fromtimestamp(time, UTC).strftime("%Y%m%dT%H%M%SZ")
         body = json.dumps(content, indent=2) + "\n"
-        _write_whole(self._root / "reports" / self._site / f"{moment}-{name}.json", body.encode())
+        write_whole(self._folder("reports") / f"{moment}-{name}.json", body.encode())
+
+    def _folder(self, kind: str) -> Path:
+        """Return the site's folder of one kind of file, made where it is missing."""
+        folder = self._root / kind / self._site
+        folder.mkdir(parents=True, exist_ok=True)
+        return folder
 
     def _publish_through(self, last: int, time: float) -> None:
         self._guarded(lambda: self._publish_days(last), time)
@@ -115,16 +121,14 @@ class FolderExchange:
             self._sequence = self._publish_day(day, self._sequence)
             self._published = day
             state = {"published_through": str(_date(day)), "sequence": self._sequence}
-            _write_whole(self._state_file, json.dumps(state).encode())
+            write_whole(self._state_file, json.dumps(state).encode())
         self._published = max(self._published, last)
 
     def _publish_day(self, day: int, sequence: int) -> int:
         """Write the files of one day; returns the sequence number of its newest record."""
         telemetry = read_telemetry(self._store.folder, DAY * day, DAY * (day + 1))
         if len(telemetry):
-            folder = self._root / "telemetry" / self._site
-            folder.mkdir(parents=True, exist_ok=True)
-            write_csv(folder / f"{_date(day)}.csv.gz", telemetry)
+            write_csv(self._folder("telemetry") / f"{_date(day)}.csv.gz", telemetry)
         records = [
             record
             for category in ("event", "write", "alarm")
@@ -139,8 +143,9 @@ class FolderExchange:
                 json.dumps({"sequence": r.sequence, "category": r.category, "time": r.time, **r.body}) + "\n"
                 for r in records
             ]
-            path = self._root / "events" / self._site / f"{_date(day)}.jsonl.gz"
-            _write_whole(path, gzip.compress("".join(lines).encode(), mtime=0))
+            write_whole(
+                self._folder("events") / f"{_date(day)}.jsonl.gz", gzip.compress("".join(lines).encode(), mtime=0)
+            )
         return records[-1].sequence if records else sequence
 
 
@@ -155,13 +160,3 @@ def _read_state(path: Path) -> tuple[int, int]:
         return int(np.datetime64(state["published_through"], "D").astype(np.int64)), int(state["sequence"])
     except (OSError, ValueError, KeyError, TypeError):
         return -1, 0
-
-
-def _write_whole(path: Path, content: bytes) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(path.name + ".part")
-    with partial.open("wb") as stream:
-        stream.write(content)
-        stream.flush()
-        os.fsync(stream.fileno())
-    partial.replace(path)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
+
+from igrow_core.whole_files import write_whole
 
 
 def read_state(path: Path) -> dict[str, object]:
@@ -22,14 +23,9 @@ def read_state(path: Path) -> dict[str, object]:
 
 def write_state(path: Path, content: Mapping[str, object]) -> str:
     """Replace the file atomically; return an empty text, or one line that says why it could not be written."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with temporary.open("w", encoding="utf-8") as file:
-            json.dump(content, file, indent=1, sort_keys=True)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(path)
+        write_whole(path, json.dumps(content, indent=1, sort_keys=True).encode())
     except OSError as error:
         return f"{path}: {error.strerror or error}"
     return ""

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from igrow_core.errors import IgrowError
 from igrow_core.quantities import QUANTITIES
+from igrow_core.whole_files import write_whole
 
 Times = NDArray[np.datetime64]
 Values = NDArray[np.float64]
@@ -189,12 +190,7 @@ def write_csv(path: str | os.PathLike[str], telemetry: Telemetry) -> None:
     body = "\n".join([",".join(["time", *telemetry.columns]), *map(",".join, zip(*texts, strict=True)), ""]).encode()
     # Without a time stamp inside, equal telemetry gives an equal file.
     data = gzip.compress(body, mtime=0) if path.suffix == ".gz" else body
-    partial = path.with_name(path.name + ".part")
-    with partial.open("wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-    partial.replace(path)
+    write_whole(path, data)
 
 
 def read_cells(path: Path, delimiter: str = ",") -> tuple[list[str], list[Sequence[str]], list[int]]:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
 from dataclasses import dataclass, field
 from pathlib import Path
+
+from igrow_core.whole_files import write_whole
 
 
 @dataclass
@@ -44,9 +45,4 @@ def load_state(path: Path) -> UpdateState:
 
 def save_state(path: Path, state: UpdateState) -> None:
     """Replace the state file; raises OSError."""
-    partial = path.with_name(path.name + ".part")
-    with partial.open("w") as stream:
-        json.dump(dataclasses.asdict(state), stream)
-        stream.flush()
-        os.fsync(stream.fileno())
-    partial.replace(path)
+    write_whole(path, json.dumps(dataclasses.asdict(state)).encode())

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import io
-import os
 import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from igrow_core.bundle.manifest import BundleError, Manifest, manifest_from_json, manifest_to_json
+from igrow_core.whole_files import sync_folder, write_through
 
 MANIFEST_FILE = "manifest.json"
 GOLDEN_FILE = "golden.npz"
@@ -82,7 +82,7 @@ def write_bundle(folder: Path, manifest: Manifest, files: Mapping[str, bytes], g
     partial.mkdir()
     try:
         for name, content in contents.items():
-            _write_through(partial / name, content)
+            write_through(partial / name, content)
         partial.rename(folder)
     except BaseException:
         shutil.rmtree(partial, ignore_errors=True)
@@ -127,15 +127,6 @@ def read_golden(bundle: Bundle) -> dict[str, Golden]:
     return {graph: Golden(inputs, outputs) for graph, (inputs, outputs) in parts.items()}
 
 
-def sync_folder(folder: Path) -> None:
-    """Make renames and new names in `folder` durable."""
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-
-
 def _require(names: Mapping[str, object], where: str) -> None:
     for name in REQUIRED_FILES:
         if name not in names:
@@ -161,10 +152,3 @@ def _read(path: Path) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise BundleError(f"{path}: {error.strerror}") from None
-
-
-def _write_through(path: Path, content: bytes) -> None:
-    with path.open("wb") as stream:
-        stream.write(content)
-        stream.flush()
-        os.fsync(stream.fileno())

@@ -8,7 +8,6 @@ target, targets, snapshot, timestamp: whoever reads in between still sees the st
 from __future__ import annotations
 
 import io
-import os
 import tarfile
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -30,6 +29,7 @@ from tuf.api.serialization import DeserializationError
 from tuf.api.serialization.json import JSONSerializer
 
 from igrow_core.bundle import Bundle, read_bundle, self_test
+from igrow_core.whole_files import write_whole
 from trainer.publishing.keys import ROLES, PublishingError, load_signer
 
 _SERIALIZER = JSONSerializer(compact=False)
@@ -84,7 +84,7 @@ def publish(
     name = f"{site}.tar"
     target = TargetFile.from_data(name, content)
     target.unrecognized_fields["custom"] = {"identity": read.identity, "label": read.label}
-    _write_whole(repository / "targets" / f"{target.hashes['sha256']}.{name}", content)
+    write_whole(repository / "targets" / f"{target.hashes['sha256']}.{name}", content)
     targets.targets[name] = target
     targets.version += 1
     targets.expires = _expiry(now, lifetimes.targets)
@@ -138,7 +138,7 @@ def _load(repository: Path, role: str) -> Any:
 
 def _sign_and_write(metadata: Metadata[Any], keys: Path, role: str, path: Path) -> None:
     metadata.sign(load_signer(keys, role))
-    _write_whole(path, metadata.to_bytes(_SERIALIZER))
+    write_whole(path, metadata.to_bytes(_SERIALIZER))
 
 
 def _forget_old_targets(repository: Path, targets: Targets) -> None:
@@ -167,12 +167,3 @@ def _pack(bundle: Bundle) -> bytes:
 
 def _expiry(now: datetime, lifetime: timedelta) -> datetime:
     return (now + lifetime).astimezone(UTC).replace(microsecond=0)
-
-
-def _write_whole(path: Path, content: bytes) -> None:
-    partial = path.with_name(path.name + ".part")
-    with partial.open("wb") as stream:
-        stream.write(content)
-        stream.flush()
-        os.fsync(stream.fileno())
-    partial.replace(path)
