@@ -38,7 +38,8 @@ from igrow_core.bundle.manifest import (
     manifest_from_json,
     manifest_to_json,
 )
-from igrow_core.bundle.self_test import Deviation, open_session, run_graph, self_test
+from igrow_core.bundle.self_test import Deviation, self_test
+from igrow_core.bundle.session import new_session, open_session, run_graph
 
 __all__ = [
     "FORMAT_VERSION",
@@ -61,6 +62,7 @@ __all__ = [
     "Tensor",
     "manifest_from_json",
     "manifest_to_json",
+    "new_session",
     "open_session",
     "read_bundle",
     "read_golden",

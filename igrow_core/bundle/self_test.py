@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import onnxruntime
 from numpy.typing import NDArray
 
 from igrow_core.bundle.files import REQUIRED_GRAPHS, Bundle, read_golden
 from igrow_core.bundle.manifest import BundleError
+from igrow_core.bundle.session import open_session, run_graph
 
 
 @dataclass(frozen=True)
@@ -22,30 +20,6 @@ class Deviation:
     graph: str
     output: str
     relative: float
-
-
-def open_session(path: Path, *, threads: int = 1) -> Any:
-    """Open a graph in onnxruntime with an explicit number of threads; raises BundleError where it cannot.
-
-    A gateway shares its cores with the control cycle, so the thread count is never left to the library.
-    """
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = threads
-    options.inter_op_num_threads = 1
-    options.log_severity_level = 4  # its reasons reach the user through the exception below
-    try:
-        return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
-    except Exception as error:
-        raise BundleError(f"{path}: onnxruntime cannot load the graph: {_first_line(error)}") from None
-
-
-def run_graph(session: Any, inputs: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Run one graph; returns its outputs by name. Raises BundleError where onnxruntime refuses the inputs."""
-    names = [output.name for output in session.get_outputs()]
-    try:
-        return dict(zip(names, session.run(names, dict(inputs)), strict=True))
-    except Exception as error:
-        raise BundleError(f"the graph does not run: {_first_line(error)}") from None
 
 
 def self_test(bundle: Bundle, *, threads: int = 1) -> tuple[Deviation, ...]:
@@ -108,7 +82,3 @@ def _compare_names(bundle: Bundle, graph: str, side: str, listed: list[str], act
             f"{bundle.folder}: {graph}.onnx: the manifest lists the {side}s {', '.join(listed)}, "
             f"the graph has {', '.join(names)}"
         )
-
-
-def _first_line(error: Exception) -> str:
-    return (str(error).strip().splitlines() or [type(error).__name__])[0][:200]

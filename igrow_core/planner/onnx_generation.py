@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
-import onnxruntime
 from numpy.typing import NDArray
 
+from igrow_core.bundle import open_session
 from igrow_core.errors import IgrowError
 from igrow_core.planner.evolution import EvolutionSettings, Fitness, Genes, fixed_inputs
 
@@ -19,16 +19,9 @@ OUTPUTS = ("survivors", "survivor_fitness", "next_offspring")
 class OnnxGeneration:
     """Runs optimizer.onnx; its sizes are read from the graph, its rates from `rates`."""
 
-    def __init__(self, path: str | os.PathLike[str], rates: EvolutionSettings | None = None) -> None:
+    def __init__(self, path: Path, rates: EvolutionSettings | None = None) -> None:
         """Open the graph; raises IgrowError where it is no optimizer."""
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = options.inter_op_num_threads = 1
-        try:
-            self._session = onnxruntime.InferenceSession(
-                os.fspath(path), sess_options=options, providers=["CPUExecutionProvider"]
-            )
-        except Exception as error:
-            raise IgrowError(f"{path}: cannot be opened as an ONNX graph: {str(error).splitlines()[0]}") from None
+        self._session = open_session(path)
         shapes = {item.name: item.shape for item in self._session.get_inputs()}
         missing = {"parents", "offspring", "tournament"} - shapes.keys()
         if missing:

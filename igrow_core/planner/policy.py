@@ -6,13 +6,13 @@ a small network, so that the search may start from it.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
-import onnxruntime
 from numpy.typing import NDArray
 
+from igrow_core.bundle import open_session
 from igrow_core.errors import IgrowError
 from igrow_core.planner.objective import Objective
 from igrow_core.planner.template import Setpoints
@@ -63,16 +63,9 @@ def to_setpoints(site: Site, actions: NDArray[np.float32]) -> Setpoints:
 class OnnxPolicy:
     """A bundle's policy.onnx."""
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
+    def __init__(self, path: Path) -> None:
         """Open the graph; raises IgrowError where it is no policy of 76 observations and 96 actions."""
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = options.inter_op_num_threads = 1
-        try:
-            self._session = onnxruntime.InferenceSession(
-                os.fspath(path), sess_options=options, providers=["CPUExecutionProvider"]
-            )
-        except Exception as error:
-            raise IgrowError(f"{path}: cannot be opened as an ONNX graph: {str(error).splitlines()[0]}") from None
+        self._session = open_session(path)
         shapes = {item.name: item.shape for item in (*self._session.get_inputs(), *self._session.get_outputs())}
         if [shapes.get("observation", [0])[-1], shapes.get("action", [0])[-1]] != [OBSERVATIONS, ACTIONS]:
             raise IgrowError(f"{path}: is no policy of {OBSERVATIONS} observations and {ACTIONS} actions")

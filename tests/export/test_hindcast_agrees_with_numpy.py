@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import onnxruntime
 import pytest
 from numpy.typing import NDArray
 
@@ -13,6 +12,7 @@ from igrow_core.effects import EFFECTS
 from igrow_core.simulator.hybrid import climate
 from igrow_core.simulator.hybrid.measurement import PREDICTED, measured
 from igrow_core.simulator.hybrid.parameters import PARAMETERS
+from trainer.export.blocks import open_model
 from trainer.export.climate import ClimateBlocks, climate_blocks, effect_parameter
 from trainer.export.hindcast import hindcast_model
 
@@ -70,9 +70,7 @@ def run_graph(
     followed: NDArray[np.bool_] = NOWHERE,
 ) -> Table:
     """Run the graph for a day; where `followed`, the measured climate is `start` again."""
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = 1
-    session = onnxruntime.InferenceSession(hindcast_model(blocks).SerializeToString(), options)
+    session = open_model(hindcast_model(blocks))
     feed = {
         "climate": start,
         "inputs": inputs,

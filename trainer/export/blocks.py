@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import ndonnx as ndx
-import onnxruntime
 from onnx import FunctionProto, ModelProto, NodeProto, helper
 
+from igrow_core.bundle import new_session
 from igrow_core.simulator.network import Stage
 
 DOMAIN = "igrow"
@@ -86,10 +86,7 @@ def _einsum_to_product(node: NodeProto) -> None:
 
 def open_model(model: ModelProto) -> Any:
     """Open a finished model in onnxruntime, on one thread."""
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = options.inter_op_num_threads = 1
-    options.log_severity_level = 3
-    return onnxruntime.InferenceSession(model.SerializeToString(), options, providers=["CPUExecutionProvider"])
+    return new_session(model.SerializeToString())
 
 
 def grouped(arrays: Mapping[str, Any]) -> dict[str, dict[str, Any]]:

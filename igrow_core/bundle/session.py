@@ -1,0 +1,46 @@
+"""Graphs in onnxruntime: opened with few threads and quietly, run by the names of inputs and outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import onnxruntime
+from numpy.typing import NDArray
+
+from igrow_core.bundle.manifest import BundleError
+
+
+def new_session(graph: Path | bytes, *, threads: int = 1) -> Any:
+    """Open a graph, a file or a serialised model, in onnxruntime; raises what onnxruntime raises.
+
+    A gateway shares its cores with the control cycle, so the thread count is never left to the library.
+    """
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = threads
+    options.inter_op_num_threads = 1
+    options.log_severity_level = 4  # its reasons reach the user through the exception
+    source = graph if isinstance(graph, bytes) else str(graph)
+    return onnxruntime.InferenceSession(source, options, providers=["CPUExecutionProvider"])
+
+
+def open_session(path: Path, *, threads: int = 1) -> Any:
+    """Open a graph's file in onnxruntime; raises BundleError where it cannot."""
+    try:
+        return new_session(path, threads=threads)
+    except Exception as error:
+        raise BundleError(f"{path}: onnxruntime cannot load the graph: {_first_line(error)}") from None
+
+
+def run_graph(session: Any, inputs: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Run one graph; returns its outputs by name. Raises BundleError where onnxruntime refuses the inputs."""
+    names = [output.name for output in session.get_outputs()]
+    try:
+        return dict(zip(names, session.run(names, dict(inputs)), strict=True))
+    except Exception as error:
+        raise BundleError(f"the graph does not run: {_first_line(error)}") from None
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).strip().splitlines() or [type(error).__name__])[0][:200]
