@@ -30,13 +30,13 @@ from trainer.calibration.holding import fit_holding
 from trainer.calibration.posterior import Posterior, prior
 from trainer.diagnosis.deployed import from_site, learn_misfit
 from trainer.diagnosis.runner import open_record
+from trainer.export.plan import RANGED
 from trainer.model import HybridModel, known_range
 from trainer.training.crop import fit_net_growth, train_networks
 
 START = np.datetime64("2020-01-20T00:00:00")
 CREATED = datetime(2020, 6, 1, tzinfo=UTC)
 """Fixed, so that the same sources give the same bundle."""
-_RANGED = ("air_temperature", "air_humidity", "air_co2", "outdoor_temperature", "global_radiation", *SETPOINTS)
 HOUSES, DAYS = 10, 56
 SPREAD = 0.08
 """How far one greenhouse of this kind lies from the next, relative."""
@@ -122,7 +122,7 @@ def default_model(site: Site, *, seed: int = 0, report: Report = print) -> Hybri
         holding=held,
         crop=CropStages(growth, harvest, conversion, maintenance),
         training_span=Span(_utc(START), _utc(end)),
-        training_range=known_range({name: concatenate_column(tables, name) for name in _RANGED}),
+        training_range=known_range({name: concatenate_column(tables, name) for name in (*RANGED, *SETPOINTS)}),
         known_misfit=misfit,
     )
 

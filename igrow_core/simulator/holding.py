@@ -11,24 +11,11 @@ Pure and elementwise, in numpy and while an ONNX graph is traced (`xp`).
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
 from igrow_core.effects.definition import Array, Values
-
-
-@dataclass(frozen=True)
-class HoldingParameter:
-    """One number of how setpoints are held."""
-
-    name: str
-    unit: str
-    value: float
-    low: float
-    high: float
-    meaning: str
-
+from igrow_core.simulator.actuation import Rule
 
 _ROWS = (
     ("heating_offset", "K", 0.0, -3.0, 3.0, "air above the heating setpoint while the PLC heats"),
@@ -40,7 +27,7 @@ _ROWS = (
     ("co2_vent_stop", "1", 0.5, 0.02, 2.0, "mean vent opening at which dosing has stopped"),
 )
 
-PARAMETERS: Mapping[str, HoldingParameter] = MappingProxyType({row[0]: HoldingParameter(*row) for row in _ROWS})
+PARAMETERS: Mapping[str, Rule] = MappingProxyType({row[0]: Rule(*row) for row in _ROWS})
 """Every parameter by its name."""
 
 

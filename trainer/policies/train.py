@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import onnx
 import torch
 from numpy.typing import NDArray
-from onnx import TensorProto, helper, numpy_helper
+from onnx import ModelProto, TensorProto, helper, numpy_helper
 from torch import nn
 
 from igrow_core.bundle import read_bundle
@@ -20,6 +19,7 @@ from igrow_core.planner.objective import Simulator
 from igrow_core.planner.policy import ACTIONS, OBSERVATIONS, to_setpoints
 from igrow_core.simulator.plan import BundleSimulator
 from igrow_core.site import Site, load_site
+from trainer.export.wiring import finished_model
 from trainer.policies.environment import DailyGreenhouses, Scenario, SimulatedDays, World
 from trainer.policies.sac import Actor, SacSettings, SoftActorCritic
 
@@ -96,7 +96,7 @@ def first_actions(rng: np.random.Generator, count: int) -> NDArray[np.float32]:
     return np.asarray(np.clip(actions, -1.0, 1.0).reshape(count, ACTIONS), dtype=np.float32)
 
 
-def export(actor: Actor) -> onnx.ModelProto:
+def export(actor: Actor) -> ModelProto:
     """Return policy.onnx: `observation` (batch, 76) to `action` (batch, 96), -1 to 1."""
     nodes, weights, tensor = [], [], "observation"
     layers = [layer for layer in actor.body if isinstance(layer, nn.Linear)]
@@ -117,9 +117,7 @@ def export(actor: Actor) -> onnx.ModelProto:
         [helper.make_tensor_value_info("action", TensorProto.FLOAT, ["batch", ACTIONS])],
         weights,
     )
-    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 21)], ir_version=10)
-    onnx.checker.check_model(model)
-    return model
+    return finished_model(graph, [])
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
