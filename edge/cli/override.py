@@ -40,6 +40,9 @@ def run(options: argparse.Namespace) -> int:
         if not rule.low <= value <= rule.high:
             raise IgrowError(f"{name}={value:g}: the site's limits are {rule.low:g} to {rule.high:g}")
         leases[name] = Lease(value, seconds)
+    if not path.parent.is_dir():
+        # Made by root, it would shut out the service's own user.
+        raise IgrowError(f"{path.parent}: is not there; the daemon makes it when it first starts, override after that")
     problem = write_leases(path, leases)
     if problem:
         raise IgrowError(problem)

@@ -69,6 +69,7 @@ def test_check_config_says_what_a_configuration_means(tmp_path, capsys):
 def test_an_override_is_left_for_the_daemon_and_given_back(tmp_path, capsys):
     path = write_files(tmp_path, 5020)
     leases = tmp_path / "state" / "override.json"
+    leases.parent.mkdir()
     assert call(capsys, "override", path, "heating_setpoint=21", "--for", "30 min")[0] == 0
     assert read_leases(leases)["heating_setpoint"].seconds == 1800.0
     assert "limits are 12 to 28" in call(capsys, "override", path, "heating_setpoint=50")[2]
@@ -164,6 +165,14 @@ def test_a_walk_before_the_first_start_leaves_no_folder_that_the_service_could_n
     code, out, _ = call(capsys, "commission", path)
     assert code == 1
     assert "no point can be read" in out
+    assert not (tmp_path / "state").exists()
+
+
+def test_an_override_before_the_first_start_leaves_no_folder_either(tmp_path, capsys):
+    path = write_files(tmp_path, 5020)
+    code, _, err = call(capsys, "override", path, "heating_setpoint=21")
+    assert code == 2
+    assert f"{tmp_path / 'state'}: is not there; the daemon makes it when it first starts" in err
     assert not (tmp_path / "state").exists()
 
 
