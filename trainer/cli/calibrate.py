@@ -26,7 +26,7 @@ from trainer.export.bundle import read_hybrid_model, write_hybrid_bundle
 from trainer.model import known_range
 from trainer.readers.open_log import open_log
 
-EXAMPLE = "igrow-trainer calibrate ../shared/data/agc2019 --compartment Reference --out out/reference"
+EXAMPLE = "igrow-trainer calibrate DATA/agc2019 --compartment Reference --out out/reference"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
