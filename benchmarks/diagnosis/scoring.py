@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,7 +16,7 @@ from igrow_core.effects import EFFECTS
 from igrow_core.greenhouse import HiddenEffect
 from igrow_core.greenhouse.uncatalogued import UNCATALOGUED
 from igrow_core.telemetry import Telemetry
-from trainer.diagnosis import diagnose, freefit, linearisation, search, structure
+from trainer.diagnosis import diagnose, freefit, linearisation, search, selection, structure
 from trainer.diagnosis.activation import ActiveTerm, activate
 from trainer.diagnosis.diagnose import Evidence, Stage
 from trainer.diagnosis.gram import Term
@@ -23,6 +24,9 @@ from trainer.diagnosis.problem import Problem
 
 NOISE = {"air_temperature": 0.5, "air_humidity": 2.0, "air_co2": 35.0}
 """Scales under which errors of different quantities are added."""
+
+WORTHS = (0.0, selection.SMALLEST_GAIN, 20.0, 50.0, float("inf"))
+"""Classes of what a cause is worth, log-likelihood; the search names nothing below the second."""
 
 
 @dataclass(frozen=True)
@@ -145,6 +149,10 @@ def _first_right(one: Outcome) -> bool:
     return bool(one.found) and one.found[0] in one.case.causes
 
 
+def _worth_between(outcomes: Sequence[Outcome], low: float, high: float) -> list[Outcome]:
+    return [one for one in outcomes if one.worth is not None and low <= one.worth < high]
+
+
 def _claims(outcomes: Sequence[Outcome]) -> list[Outcome]:
     return [one for one in _group(outcomes, "single", "sensor", "onset") if one.rivals]
 
@@ -180,6 +188,10 @@ def table(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int, str]]:
         ("right cause first, ENR 3", *_share(_group(outcomes, "single", "sensor", size=3.0), _first_right), "-"),
         ("right cause first, ENR 1", *_share(_group(outcomes, "single", "sensor", size=1.0), _first_right), ">= .95"),
         ("right cause first, ENR 0.3", *_share(_group(outcomes, "single", "sensor", size=0.3), _first_right), ">= .85"),
+        *(
+            (f"  the same, worth {low:g} to {high:g}", *_share(_worth_between(alone, low, high), _first_right), "-")
+            for low, high in itertools.pairwise(WORTHS)
+        ),
         ("  the same where something was claimed", *_share(claims, _first_right), "-"),
         *(
             (f"  log-likelihood that ENR {size:g} is worth, median", float(np.median(values)), len(values), "-")

@@ -60,6 +60,18 @@ def test_at_rest_every_balance_is_closed() -> None:
     assert abs(fluxes["co2_concentration"][0]) < 1e-10
 
 
+def test_co2_adds_up_in_a_tight_house_on_a_still_night() -> None:
+    values = nominal(SITE) | {"leakage_still": 0.0, "respiration": 0.36}
+    inputs = steady_inputs(wind_speed=0.0, global_radiation=0.0)
+    state = climate.initial_state(
+        np, {"air_temperature": 20.0, "air_humidity": 75.0, "air_co2": 600.0}, inputs, values, {}, 1.2
+    )
+    after = climate.advance(np, state, inputs, values, {}, seconds=900.0, lamp_efficacy=1.2)
+    gained = (after["co2_concentration"] - state["co2_concentration"]) * inputs["mean_height"]
+    # 0.36 g m-2 h-1 at 20 degC for a quarter of an hour.
+    assert float(gained) == pytest.approx(0.36e-3 / 4.0, rel=0.01)
+
+
 @pytest.mark.parametrize(
     ("change", "quantity", "sign"),
     [

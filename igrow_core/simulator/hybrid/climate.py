@@ -57,6 +57,8 @@ _PASCAL_PER_CONTENT = 1.36e5
 _DRYING_SHARE = 0.6
 """Share of the evaporation's answer to warmer air that lasts over a step; moister air takes back the rest. It is what
 brings steps of 5 to 30 minutes closest to those of one (tests/simulator/test_step_length.py)."""
+_SLOWEST = 1e-7
+"""Rate at which a state is pulled back at least, s-1; in single precision a smaller one would be lost."""
 _STOMATA_HALF_OPEN = 6.0
 """Short-wave radiation at which the stomata of a canopy are half open, W m-2 (Stanghellini 1987: 3 for one leaf)."""
 _EXTINCTION = 0.7
@@ -288,6 +290,8 @@ def relax(
     """Return `STATES` by name `seconds` later, by the exponential of each balance (see the module's docstring)."""
     following = {}
     for name, (flux, conductance, capacity) in balances(xp, state, drivers, parameters, added).items():
+        # Without wind, vents, leaks and light nothing pulls CO2 back: its balance is then a plain sum.
+        conductance = xp.maximum(conductance, _SLOWEST * capacity)  # noqa: PLW2901
         decay = xp.exp(-seconds * conductance / capacity)
         following[name] = state[name] + flux / conductance * (1.0 - decay)
     return following
