@@ -10,12 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
-from importlib.resources import files
-from pathlib import Path
 
 import numpy as np
 
-from igrow_core.bundle import Span
+from igrow_core.bundle import Span, default_bundle_folder  # noqa: F401  (the benchmarks take the folder from here)
 from igrow_core.greenhouse import Season, generate_weather, recipe, simulate_many
 from igrow_core.greenhouse.described import parameters_of
 from igrow_core.quantities import SETPOINTS
@@ -42,11 +40,6 @@ SPREAD = 0.08
 """How far one greenhouse of this kind lies from the next, relative."""
 
 Report = Callable[[str], None]
-
-
-def default_bundle_folder() -> Path:
-    """Return the folder of the default bundle that is installed with igrow."""
-    return Path(str(files("igrow_core"))) / "default_bundle"
 
 
 def virtual_seasons(site: Site, count: int, days: int, seed: int) -> list[Season]:

@@ -8,6 +8,7 @@ import io
 import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -110,6 +111,11 @@ def read_bundle(folder: Path) -> Bundle:
     if stray := sorted(present - set(manifest.files) - {MANIFEST_FILE}):
         raise BundleError(f"{folder / stray[0]}: not listed in the manifest")
     return Bundle(folder, manifest, hashlib.sha256(text).hexdigest()[:16])
+
+
+def default_bundle_folder() -> Path:
+    """Return the folder of the default bundle that is installed with igrow: a greenhouse that nobody has measured."""
+    return Path(str(resources.files("igrow_core"))) / "default_bundle"
 
 
 def read_golden(bundle: Bundle) -> dict[str, Golden]:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from igrow_core.bundle import HeldOutError, Span, read_bundle
+from igrow_core.bundle import HeldOutError, Span, default_bundle_folder, read_bundle
 from igrow_core.errors import IgrowError
 from igrow_core.quantities import QUANTITIES
 from igrow_core.simulator.hybrid.nominal import nominal, site_record
@@ -20,7 +20,6 @@ from trainer.calibration.holding import fit_holding
 from trainer.calibration.posterior import prior
 from trainer.calibration.site_model import fit_site
 from trainer.calibration.split import alternate_weeks, split_weeks
-from trainer.default_bundle import default_bundle_folder
 from trainer.diagnosis.deployed import learn_misfit
 from trainer.export.bundle import read_hybrid_model, write_hybrid_bundle
 from trainer.model import known_range

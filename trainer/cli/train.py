@@ -7,12 +7,11 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
-from igrow_core.bundle import read_bundle
+from igrow_core.bundle import default_bundle_folder, read_bundle
 from igrow_core.errors import IgrowError
 from igrow_core.simulator.crop import CropStages
 from igrow_core.simulator.hybrid.nominal import site_record
 from igrow_core.site import load_site
-from trainer.default_bundle import default_bundle_folder
 from trainer.export.bundle import read_hybrid_model, write_hybrid_bundle
 from trainer.readers.open_log import open_log
 from trainer.training.crop import fit_net_growth, train_networks

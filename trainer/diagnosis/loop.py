@@ -19,10 +19,9 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from igrow_core.bundle import Bundle, read_bundle
+from igrow_core.bundle import Bundle, default_bundle_folder, read_bundle
 from igrow_core.errors import IgrowError
 from igrow_core.site import Site, load_site
-from trainer.default_bundle import default_bundle_folder
 from trainer.diagnosis.command import write, write_corrected
 from trainer.diagnosis.deployed import from_manifest
 from trainer.diagnosis.diagnose import diagnose
