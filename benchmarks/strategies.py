@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from benchmarks.planner import SITE, recipe_table
 from edge.planning.forecast import persistence
 from edge.planning.make_plan import RECENT_DAYS
-from igrow_core.bundle import read_bundle
+from igrow_core.bundle import default_bundle_folder, read_bundle
 from igrow_core.economics import harvest_income, local_days
 from igrow_core.planner import Objective, Outcome, PlanningState, Simulator, optimise
 from igrow_core.planner.policy import OnnxPolicy
@@ -37,7 +37,6 @@ from igrow_core.simulator.plan import BundleSimulator
 from igrow_core.site import Site, load_site
 from igrow_core.sun import unix_seconds
 from igrow_core.telemetry import Telemetry
-from trainer.default_bundle import default_bundle_folder
 from trainer.policies.environment import DAY, Greenhouses, Scenario, hourly_weather
 
 Values = NDArray[np.float64]

@@ -6,6 +6,11 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# No test of this project asserts a time, on a busy machine least of all.
+settings.register_profile("igrow", deadline=None)
+settings.load_profile("igrow")
 
 ROOT = Path(__file__).resolve().parents[1]
 

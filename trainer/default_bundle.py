@@ -13,7 +13,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from igrow_core.bundle import Span, default_bundle_folder  # noqa: F401  (the benchmarks take the folder from here)
+from igrow_core.bundle import Span
 from igrow_core.greenhouse import Season, generate_weather, recipe, simulate_many
 from igrow_core.greenhouse.described import parameters_of
 from igrow_core.quantities import SETPOINTS

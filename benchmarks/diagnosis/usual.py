@@ -12,11 +12,10 @@ import numpy as np
 
 from benchmarks.diagnosis.cases import SEASONS
 from benchmarks.diagnosis.logs import MISMATCH, SITE, reference
-from igrow_core.bundle import read_bundle
+from igrow_core.bundle import default_bundle_folder, read_bundle
 from igrow_core.greenhouse import Disturbances, GreenhouseParameters, generate_weather, recipe, simulate_many
 from igrow_core.greenhouse.described import parameters_of
 from igrow_core.site import Site
-from trainer.default_bundle import default_bundle_folder
 from trainer.diagnosis import Deployed, from_manifest, problem, runner, usual
 from trainer.diagnosis.problem import Problem
 from trainer.diagnosis.split import split_days

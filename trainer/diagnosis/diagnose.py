@@ -49,7 +49,7 @@ CLEAR_SKILL = 0.03
 """A cause that removes so much needs no other proof on unseen days."""
 LARGEST_DOUBT = 0.45
 """Else the largest bootstrap probability over unseen days that it does not make their 24 h free runs likelier."""
-FURTHER_SKILL, FURTHER_DOUBT, FURTHER_GAIN = 0.005, 0.2, 0.1
+FURTHER_SKILL, FURTHER_DOUBT, FURTHER_GAIN = CLEAR_SKILL, 0.2, 0.1
 """What a second or third cause must show: skill, doubt, and a share of the gain of those before it. The first, bent
 otherwise than the catalogue has it, leaves traces that look like small others."""
 LARGEST_REMAINDER = 5.0
