@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -83,6 +84,18 @@ def test_a_log_without_humidity_and_co2_is_diagnosed_on_what_it_has(quiet_log: T
     diagnosis, _ = diagnose(Telemetry(quiet_log.time, kept), SITE, deployed_model())
     assert set(diagnosis.errors) == {"air_temperature"}
     assert "co2_offset" in diagnosis.untestable
+
+
+def test_co2_is_left_out_where_its_dose_is_not_known(quiet_log: Telemetry) -> None:
+    kept = {name: values for name, values in quiet_log.columns.items() if name != "co2_dosing"}
+    undosed = replace(SITE, greenhouse=replace(SITE.greenhouse, co2_dosing_capacity=0.0))
+    for site, quantities in (
+        (SITE, {"air_temperature", "air_humidity"}),
+        (undosed, {"air_temperature", "air_humidity", "air_co2"}),
+    ):
+        diagnosis, _ = diagnose(Telemetry(quiet_log.time, kept), site, deployed_model())
+        assert set(diagnosis.errors) == quantities
+    assert "co2_offset" not in diagnosis.untestable
 
 
 def test_a_gap_of_two_days_is_lived_with(quiet_log: Telemetry) -> None:

@@ -39,10 +39,17 @@ _WEATHER = ("outdoor_temperature", "outdoor_humidity", "global_radiation", "wind
 
 
 def diagnosis_record(telemetry: Telemetry, site: Site) -> Record:
-    """Return the record that is diagnosed: inputs as means over each step, measurements as at its first instant."""
+    """Return the record that is diagnosed: inputs as means over each step, measurements as at its first instant.
+
+    Where a house doses CO2 and the log does not tell how much, its CO2 tells nothing: it is left out, as in the
+    calibration (`trainer.calibration.fit`).
+    """
     fine = telemetry.step
     step = max(STEP, fine)
     record = site_record(telemetry, site, step)
+    if "co2_dosing" in record.unknown:
+        telemetry = telemetry.with_columns({"air_co2": np.full(len(telemetry), np.nan)})
+        record = replace(record, measured={**record.measured, "air_co2": np.full(len(record), np.nan)})
     if fine >= STEP:
         return record
     grid = to_grid(telemetry, int(step))

@@ -85,4 +85,8 @@ def site_record(telemetry: Telemetry, site: Site, step: float) -> Record:
         lamp_efficacy=site.greenhouse.lamps.efficacy if site.greenhouse.lamps is not None else 0.0,
         leaf_area_index=_CANOPIES.get(site.crop.species.lower(), _CANOPIES["tomato"])[0],
     )
-    return replace(record, unknown=(*record.unknown, "leaf_area_index")) if estimated else record
+    unknown = (*record.unknown, "leaf_area_index") if estimated else record.unknown
+    if site.greenhouse.co2_dosing_capacity == 0.0:
+        # A house that cannot dose needs no column to say that it did not.
+        unknown = tuple(name for name in unknown if name != "co2_dosing")
+    return replace(record, unknown=unknown)
