@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import shutil
 import sqlite3
 import tarfile
 import tempfile
@@ -62,7 +63,11 @@ def restore(archive: Path, folder: Path) -> None:
                 if missing:
                     raise StoreError(f"{archive}: no backup of a store: it lacks {missing[0]}")
                 for name in FILES:
-                    source.extract(members[name], scratch, filter="data")
+                    # Bytes alone, under our own name: no path, link or mode of the archive's takes effect.
+                    packed = source.extractfile(members[name])
+                    assert packed is not None
+                    with (Path(scratch) / name).open("xb") as unpacked:
+                        shutil.copyfileobj(packed, unpacked)
             for name in FILES:
                 _check_database(Path(scratch) / name, archive)
             for name in FILES:
