@@ -18,7 +18,7 @@ from trainer.diagnosis.search import Fit
 from trainer.diagnosis.selection import Hypothesis, Selected
 
 SMALLEST_GAIN = 16.0
-"""Log-likelihood below which a pattern is no cause: a wrong structure makes as much."""
+"""Log-likelihood below which a pattern is no cause in a log of 28 days: a wrong structure makes as much."""
 LARGEST_P_VALUE = 0.005
 BETTER = 1.6
 """A pattern that gains so many times what the name gains replaces it."""
@@ -52,21 +52,21 @@ def judge(problem: Problem, chain: Sequence[Selected], explained: float, rng: np
     gained = named.fit.solution.gain - none.fit.solution.gain
     instead = _best(problem, none.fit, rng)
     gain = instead.gain if instead else 0.0
-    if gain > max(SMALLEST_GAIN, BETTER * gained, LEFT * explained):
+    if gain > max(SMALLEST_GAIN * selection.structural_growth(problem), BETTER * gained, LEFT * explained):
         return Adequacy(none, _patterns(problem, none.fit, rng), gain)
     return Adequacy(named, None, gain)
 
 
 def _best(problem: Problem, fit: Fit, rng: np.random.Generator) -> Hypothesis | None:
     scored = selection.score_patterns(problem, fit, selection.onset_days(problem)[::4], rng)
-    significant = [one for one in scored if one.p_value <= LARGEST_P_VALUE and one.gain >= _needed(one)]
+    significant = [one for one in scored if one.p_value <= LARGEST_P_VALUE and one.gain >= _needed(problem, one)]
     return significant[0] if significant else None
 
 
-def _needed(one: Hypothesis) -> float:
+def _needed(problem: Problem, one: Hypothesis) -> float:
     """Return the gain below which a pattern is not believed: a wrong model looks like one that is always there."""
     steady = isinstance(one.cause, Pattern) and not set(one.cause.drivers) - {"time"}
-    return 2.0 * SMALLEST_GAIN if steady else 0.0
+    return 2.0 * SMALLEST_GAIN * selection.structural_growth(problem) if steady else 0.0
 
 
 def _patterns(problem: Problem, fit: Fit, rng: np.random.Generator) -> tuple[Hypothesis, ...]:
@@ -75,7 +75,11 @@ def _patterns(problem: Problem, fit: Fit, rng: np.random.Generator) -> tuple[Hyp
     current = fit
     for _ in range(MOST_PATTERNS):
         best = _best(problem, current, rng)
-        if best is None or best.gain < 0.5 * SMALLEST_GAIN or not isinstance(best.cause, Pattern):
+        if (
+            best is None
+            or best.gain < 0.5 * SMALLEST_GAIN * selection.structural_growth(problem)
+            or not isinstance(best.cause, Pattern)
+        ):
             break
         found.append(best)
         current = search.fit(problem.grams, current.model.with_term(best.term))

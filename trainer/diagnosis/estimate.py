@@ -59,7 +59,8 @@ class Estimated:
 def estimate(problem: Problem, selected: Selected, rng: np.random.Generator) -> list[Estimated]:
     """Return the terms of a selected model that all still stand beside each other, the largest gain first."""
     found = _estimate(problem, selected, rng)
-    while found and found[-1].gain < selection.SMALLEST_GAIN:
+    needed = selection.SMALLEST_GAIN * selection.structural_growth(problem)
+    while found and found[-1].gain < needed:
         rest = tuple(one.hypothesis for one in found[:-1])
         model = selected.fit.model
         model = Model(model.base, model.precision, model.shift, tuple(one.term for one in rest))

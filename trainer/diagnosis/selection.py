@@ -12,13 +12,15 @@ from trainer.diagnosis import search
 from trainer.diagnosis.candidates import Candidate
 from trainer.diagnosis.drivers import Pattern
 from trainer.diagnosis.gram import Floats, Term, day_losses
-from trainer.diagnosis.problem import Problem
+from trainer.diagnosis.problem import HOUR, Problem
 from trainer.diagnosis.search import Fit, Model
 
 REFITTED = 3
 """Best causes of a scan that are fitted to be compared."""
 SMALLEST_GAIN = 9.0
-"""Log-likelihood that a term must add on the fit days."""
+"""Log-likelihood that a term must add on the fit days of a log of `USUAL_DAYS`."""
+USUAL_DAYS = 28
+"""Length of the logs that thresholds were fitted on."""
 LARGEST_P_VALUE = 0.005
 """Of the day-block max-T test, the price of searching paid."""
 ONSET_PRICE = 9.0
@@ -52,6 +54,16 @@ class Selected:
 
     hypotheses: tuple[Hypothesis, ...]
     fit: Fit
+
+
+def structural_growth(problem: Problem) -> float:
+    """Return how many times as much log-likelihood as in `USUAL_DAYS` a wrong structure brings in this log.
+
+    Chance brings no more in a longer log; what the balances lack brings as much every day. Where the structure is
+    right (errors count row by row), nothing grows.
+    """
+    # The first local day is seldom a whole one.
+    return max(1.0, (problem.split.days - 1) / USUAL_DAYS) if problem.interval >= HOUR else 1.0
 
 
 def onset_days(problem: Problem) -> list[int | None]:
@@ -128,7 +140,8 @@ def best_cause(problem: Problem, null: Model, rng: np.random.Generator) -> tuple
     """Return the model without a cause and, where one passes the test, that with the best, within its bounds."""
     (none,) = no_cause(problem, null)
     ranked = score_candidates(problem, none.fit, onset_days(problem), rng)
-    passed = [one for one in ranked if one.gain >= SMALLEST_GAIN and one.p_value <= LARGEST_P_VALUE]
+    needed = SMALLEST_GAIN * structural_growth(problem)
+    passed = [one for one in ranked if one.gain >= needed and one.p_value <= LARGEST_P_VALUE]
     grown = [Selected((one,), search.fit(problem.grams, null.with_term(one.term))) for one in passed[:REFITTED]]
     grown = [one for one in grown if _within_bounds(one)]
     return (none, max(grown, key=lambda one: one.fit.solution.gain)) if grown else (none,)
