@@ -270,7 +270,7 @@ def _correct(
                 skill=float(freerun.skill_by_day(before, after).mean()),
             )
         weighed.append(one)
-        if _stands(one, kept):
+        if _stands(one, kept, selection.structural_growth(search.problem) > 1.0):
             kept.append(one)
             current = trial
     if search.judged.remainder:
@@ -278,12 +278,16 @@ def _correct(
     return {**stages, "corrected": current}, kept, weighed
 
 
-def _stands(one: Estimated, kept: Sequence[Estimated]) -> bool:
-    """Tell whether a term is large enough, and holds on unseen days; one beside others must do more."""
+def _stands(one: Estimated, kept: Sequence[Estimated], long: bool) -> bool:
+    """Tell whether a term is large enough, and holds on unseen days; one beside others must do more.
+
+    In a long log whose structure is not right, a trifle is likely on unseen days too: there the skill must be clear.
+    """
     if one.effect_to_noise < SMALLEST_ENR:
         return False
     if not kept:
-        return one.skill >= CLEAR_SKILL or (one.skill >= SMALLEST_SKILL and one.doubt <= LARGEST_DOUBT)
+        likely = one.skill >= SMALLEST_SKILL and one.doubt <= LARGEST_DOUBT
+        return one.skill >= CLEAR_SKILL or (likely and not long)
     return (
         one.skill >= FURTHER_SKILL
         and one.doubt <= FURTHER_DOUBT
