@@ -52,6 +52,8 @@ LARGEST_DOUBT = 0.45
 FURTHER_SKILL, FURTHER_DOUBT, FURTHER_GAIN = CLEAR_SKILL, 0.2, 0.1
 """What a second or third cause must show: skill, doubt, and a share of the gain of those before it. The first, bent
 otherwise than the catalogue has it, leaves traces that look like small others."""
+LONG = 1.5
+"""Growth of what a wrong structure gains (`selection.structural_growth`) from which a log is long."""
 LARGEST_REMAINDER = 5.0
 """Bound of the remainder's amplitudes, in units of a pattern."""
 
@@ -270,7 +272,7 @@ def _correct(
                 skill=float(freerun.skill_by_day(before, after).mean()),
             )
         weighed.append(one)
-        if _stands(one, kept, selection.structural_growth(search.problem) > 1.0):
+        if _stands(one, kept, selection.structural_growth(search.problem) > LONG):
             kept.append(one)
             current = trial
     if search.judged.remainder:
