@@ -8,7 +8,7 @@ ROOT=$1
 SOURCE=$(cd "$(dirname "$0")/.." && pwd)
 
 if [ ! -x "$ROOT/usr/bin/apt-get" ]; then
-    debootstrap --variant=minbase --include=ca-certificates bookworm "$ROOT" http://deb.debian.org/debian
+    debootstrap --variant=minbase --include=ca-certificates bookworm "$ROOT"
 fi
 cp /etc/resolv.conf "$ROOT/etc/resolv.conf"
 [ -z "${CERTIFICATES:-}" ] || cp "$CERTIFICATES" "$ROOT/etc/ssl/certs/ca-certificates.crt"

@@ -15,6 +15,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
 from pathlib import Path
 
+from benchmarks.diagnosis import matched, real, usual
 from benchmarks.diagnosis.cases import SEASONS, Case, draw
 from benchmarks.diagnosis.logs import Reference, reference, simulate_cases
 from benchmarks.diagnosis.scoring import Outcome, judge, show, table
@@ -36,17 +37,11 @@ def main() -> int:
     parser.add_argument("--json", type=Path, help="write each case's outcome as a line of JSON")
     options = parser.parse_args()
     if options.what == "real":
-        from benchmarks.diagnosis.real import main as real  # noqa: PLC0415
-
-        return real(options.data)
+        return real.main(options.data)
     if options.what == "matched":
-        from benchmarks.diagnosis.matched import main as matched  # noqa: PLC0415
-
-        return matched(options.processes)
+        return matched.main(options.processes)
     if options.what == "usual":
-        from benchmarks.diagnosis.usual import main as learn  # noqa: PLC0415
-
-        return learn()
+        return usual.main()
     seasons = options.season or ["winter", "spring"]
     outcomes: list[Outcome] = []
     with ProcessPoolExecutor(options.processes) as pool:

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.diagnosis.cases import SEASONS, Case
+from benchmarks.diagnosis.cases import REACHABLE, Case
 from benchmarks.diagnosis.logs import MISMATCH, SITE, Reference, reference, simulate_cases
 from igrow_core.effects import EFFECTS
 from igrow_core.simulator.hybrid.nominal import site_record
@@ -32,8 +32,6 @@ Floats = NDArray[np.float64]
 SEASON, DAYS, SEED = "winter", 28, 9500
 NOTHING = 40
 SIZES = (1.0, 0.3)
-REACHABLE = 1.5
-"""ENR that an effect must be able to reach within its bounds."""
 HEAT, VAPOUR, CO2, CORRELATION_HOURS = 4.0, 4.0, 0.25, 2.0
 """Disturbances: standard deviations in W m-2, g m-2 h-1 and g m-2 h-1, and the time in which they fade to 1/e."""
 NOISE = {"air_temperature": 0.1, "air_humidity": 0.6, "air_co2": 8.0}
@@ -107,7 +105,6 @@ def _jobs(known: Reference) -> list[tuple[int, Telemetry, Deployed, str, float]]
 
 def main(processes: int) -> int:
     """Print the table."""
-    assert SEASON in SEASONS
     known = reference(SEASON)
     jobs = _jobs(known)
     outcomes = []

@@ -26,7 +26,7 @@ NOISE = {"air_temperature": 0.5, "air_humidity": 2.0, "air_co2": 35.0}
 """Scales under which errors of different quantities are added."""
 
 WORTHS = (0.0, selection.SMALLEST_GAIN, 20.0, 50.0, float("inf"))
-"""Classes of what a cause is worth, log-likelihood; the search names nothing below the second."""
+"""Classes of what a cause is worth, log-likelihood; gains below the second are not named."""
 
 
 @dataclass(frozen=True)
@@ -189,10 +189,14 @@ def table(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int, str]]:
         ("right cause first, ENR 1", *_share(_group(outcomes, "single", "sensor", size=1.0), _first_right), ">= .95"),
         ("right cause first, ENR 0.3", *_share(_group(outcomes, "single", "sensor", size=0.3), _first_right), ">= .85"),
         *(
-            (f"  the same, worth {low:g} to {high:g}", *_share(_worth_between(alone, low, high), _first_right), "-")
+            (
+                f"right cause first, worth {low:g} to {high:g}",
+                *_share(_worth_between(alone, low, high), _first_right),
+                "-",
+            )
             for low, high in itertools.pairwise(WORTHS)
         ),
-        ("  the same where something was claimed", *_share(claims, _first_right), "-"),
+        ("right cause first, where something was claimed", *_share(claims, _first_right), "-"),
         *(
             (f"  log-likelihood that ENR {size:g} is worth, median", float(np.median(values)), len(values), "-")
             for size, values in worth.items()

@@ -291,9 +291,9 @@ def relax(
     following = {}
     for name, (flux, conductance, capacity) in balances(xp, state, drivers, parameters, added).items():
         # Without wind, vents, leaks and light nothing pulls CO2 back: its balance is then a plain sum.
-        conductance = xp.maximum(conductance, _SLOWEST * capacity)  # noqa: PLW2901
-        decay = xp.exp(-seconds * conductance / capacity)
-        following[name] = state[name] + flux / conductance * (1.0 - decay)
+        pull = xp.maximum(conductance, _SLOWEST * capacity)
+        decay = xp.exp(-seconds * pull / capacity)
+        following[name] = state[name] + flux / pull * (1.0 - decay)
     return following
 
 
