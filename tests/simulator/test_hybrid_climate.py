@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from virtual_log import SITE, virtual_log
 
+from igrow_core.effects import EFFECTS
 from igrow_core.simulator.hybrid import climate
 from igrow_core.simulator.hybrid import record as records
 from igrow_core.simulator.hybrid.nominal import leaf_area_curve, nominal, site_record
@@ -124,6 +125,21 @@ def test_variants_in_one_batch_equal_runs_one_by_one() -> None:
     for position, single in enumerate((values, other)):
         alone = records.free_run(record, records.observe(record, single, {}), [0, 100], 60, single, {})
         np.testing.assert_allclose(together["air_temperature"][:, position], alone["air_temperature"], rtol=1e-9)
+
+
+def test_memories_of_variants_equal_those_of_each_alone() -> None:
+    # A sensor that the sun warms is corrected by the light inside, which differs from variant to variant; what its
+    # housing remembers then differs too.
+    record = site_record(virtual_log(days=2, step=900.0), SITE, 900.0)
+    effects = {name: EFFECTS[name].values() for name in ("air_temperature_lag", "air_temperature_radiation_error")}
+    parameters = nominal(SITE)
+    transmissivity = np.array([0.5, 0.7])
+    together = records.observe(record, parameters | {"transmissivity": transmissivity[:, None]}, effects)
+    for position, value in enumerate(transmissivity):
+        alone = records.observe(record, parameters | {"transmissivity": float(value)}, effects)
+        for name, course in alone.items():
+            of_both = np.broadcast_to(together[name], (2, len(record)))
+            np.testing.assert_allclose(of_both[position], course, rtol=1e-9, err_msg=name)
 
 
 def test_a_site_scales_what_it_describes_and_stays_within_bounds() -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -326,19 +327,27 @@ def _run_mass(record: Record, state: Values, drivers: Values, parameters: Values
 
 
 def _run_memories(record: Record, state: dict[str, Array], drivers: Values, effects: ActiveEffects) -> None:
-    """Run the memories of the active effects under the measured drivers; they become arrays (n,) in `state`."""
+    """Run the memories of the active effects under the measured drivers; they become arrays in `state`.
+
+    Their shape is (n,), or (m, n) where a driver differs from variant to variant.
+    """
     substeps = max(1, round(record.step / SUBSTEP))
     for effect, values in effects.items():
         memory = EFFECTS[effect].memory
         if memory is None:
             continue
-        read = {name: np.broadcast_to(drivers[name], (len(record),)).tolist() for name in EFFECTS[effect].drivers}
+        names = EFFECTS[effect].drivers
+        shape = np.broadcast_shapes((len(record),), *(np.shape(drivers[name]) for name in names))
+        read: dict[str, Any] = {name: np.broadcast_to(drivers[name], shape).T for name in names}
+        if len(shape) == 1:
+            # Floats are several times as fast as arrays of one element.
+            read = {name: column.tolist() for name, column in read.items()}
         still = {name: float(np.mean(value)) for name, value in values.items()}
-        course = np.empty(len(record))
-        value = float(memory.start(np, {name: column[0] for name, column in read.items()}, still))
+        course = np.empty(shape).T
+        value = memory.start(np, {name: column[0] for name, column in read.items()}, still)
         for k in range(len(record)):
             course[k] = value
             now = {name: column[k] for name, column in read.items()}
             for _ in range(substeps):
-                value = float(memory.advance(np, value, now, still, record.step / substeps))
-        state[memory_name(effect)] = course
+                value = memory.advance(np, value, now, still, record.step / substeps)
+        state[memory_name(effect)] = course.T
