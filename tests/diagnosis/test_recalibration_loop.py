@@ -8,8 +8,8 @@ import pytest
 
 from igrow_core.errors import IgrowError
 from igrow_core.site import Site
+from trainer.cli.recalibrate import read_history, recalibrate, relative_gain
 from trainer.diagnosis import Diagnosis
-from trainer.diagnosis.loop import read_history, recalibrate, relative_gain
 
 SITE = Site(name="house", latitude=52.0, longitude=4.5)
 NOON = datetime(2020, 3, 1, 12, tzinfo=UTC)

@@ -22,7 +22,7 @@ from typing import Any
 from igrow_core.bundle import Bundle, default_bundle_folder, read_bundle
 from igrow_core.errors import IgrowError
 from igrow_core.site import Site, load_site
-from trainer.diagnosis.command import write, write_corrected
+from trainer.cli.diagnose import write, write_corrected
 from trainer.diagnosis.deployed import from_manifest
 from trainer.diagnosis.diagnose import diagnose
 from trainer.diagnosis.result import Diagnosis
