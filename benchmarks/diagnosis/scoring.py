@@ -16,7 +16,7 @@ from igrow_core.effects import EFFECTS
 from igrow_core.greenhouse import HiddenEffect
 from igrow_core.greenhouse.uncatalogued import UNCATALOGUED
 from igrow_core.telemetry import Telemetry
-from trainer.diagnosis import diagnose, freefit, linearisation, search, selection, structure
+from trainer.diagnosis import diagnose, freefit, likelihood, linearisation, search, selection, structure
 from trainer.diagnosis.activation import ActiveTerm, activate
 from trainer.diagnosis.diagnose import Evidence, Stage
 from trainer.diagnosis.gram import Term
@@ -25,7 +25,7 @@ from trainer.diagnosis.problem import Problem
 NOISE = {"air_temperature": 0.5, "air_humidity": 2.0, "air_co2": 35.0}
 """Scales under which errors of different quantities are added."""
 
-WORTHS = (0.0, selection.SMALLEST_GAIN, 20.0, 50.0, float("inf"))
+WORTHS = (0.0, selection.STRUCTURE, 30.0, 100.0, float("inf"))
 """Classes of what a cause is worth, log-likelihood; gains below the second are not named."""
 
 
@@ -51,6 +51,8 @@ class Outcome:
     worth: float | None
     """Log-likelihood that a lone true cause is worth on this log, were the model right but for it: what a search can
     see at best. None for nothing, pairs, beginnings and causes outside the catalogue."""
+    known_worth: float | None
+    """The same were the parameters and the usual differences known."""
     seconds: float
 
 
@@ -77,6 +79,7 @@ def judge(case: Case, telemetry: Telemetry, reference: Reference) -> Outcome:
             )
         break
     errors = diagnosis.errors
+    worth, known_worth = _worth(evidence.first.problem, case, truth) if evidence is not None else (None, None)
     return Outcome(
         case,
         diagnosis.verdict,
@@ -88,15 +91,19 @@ def judge(case: Case, telemetry: Telemetry, reference: Reference) -> Outcome:
         _sum(errors, "recalibrated"),
         _sum(errors, "corrected"),
         _perfect(evidence, truth, start) if evidence is not None and truth else _sum(errors, "recalibrated"),
-        _worth(evidence.problem, case, truth) if evidence is not None else None,
+        worth,
+        known_worth,
         seconds,
     )
 
 
-def _worth(problem: Problem, case: Case, truth: Mapping[str, HiddenEffect]) -> float | None:
-    """Return half the squared size of a lone true cause over its standard deviation, the nuisance integrated out."""
+def _worth(problem: Problem, case: Case, truth: Mapping[str, HiddenEffect]) -> tuple[float | None, float | None]:
+    """Return half the squared size of a lone true cause over its standard deviation, under the noise that it leaves.
+
+    First with the parameters and the usual differences integrated out, then as if they were known.
+    """
     if len(case.causes) != 1 or case.causes[0] not in EFFECTS or case.onset_day is not None:
-        return None
+        return None, None
     (name,) = case.causes
     typical = {shape.name: shape.typical for shape in EFFECTS[name].shapes}
     own = [
@@ -105,9 +112,14 @@ def _worth(problem: Problem, case: Case, truth: Mapping[str, HiddenEffect]) -> f
         if candidate.effect == name
     ]
     if not own:
-        return None
-    fit = search.fit(problem.grams, structure.null_model(problem).with_term(Term(min(own)[1])))
-    return 0.5 * (float(truth[name].size or 0.0) / float(fit.deviations[0])) ** 2
+        return None, None
+    term = Term(min(own)[1])
+    model = structure.null_model(problem).with_term(term)
+    grams = problem.whitened(likelihood.profile(problem, model).whitening).grams
+    size = float(truth[name].size or 0.0)
+    free = float(search.fit(grams, model).deviations[0])
+    known = float(grams.products[grams.fit, term.column, term.column].sum())
+    return 0.5 * (size / free) ** 2, 0.5 * size**2 * known
 
 
 def _sum(errors: Mapping[str, Mapping[str, Mapping[str, float]]], stage: str) -> float:
@@ -116,7 +128,7 @@ def _sum(errors: Mapping[str, Mapping[str, Mapping[str, float]]], stage: str) ->
 
 def _perfect(evidence: Evidence, truth: Mapping[str, Any], start: np.datetime64) -> float:
     """Return the error of the model with the true causes in it, its parameters refitted."""
-    record, split, prepared = evidence.record, evidence.split, evidence.problem
+    record, split, prepared = evidence.record, evidence.split, evidence.first.problem
     terms = []
     added: dict[str, Any] = {}
     for name, one in truth.items():
@@ -179,6 +191,10 @@ def table(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int, str]]:
     worth = {
         size: [one.worth for one in alone if one.case.size == size and one.worth is not None] for size in (1.0, 0.3)
     }
+    known = {
+        size: [one.known_worth for one in alone if one.case.size == size and one.known_worth is not None]
+        for size in (1.0, 0.3)
+    }
     return [
         (
             "false claims on nothing",
@@ -198,8 +214,9 @@ def table(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int, str]]:
         ),
         ("right cause first, where something was claimed", *_share(claims, _first_right), "-"),
         *(
-            (f"  log-likelihood that ENR {size:g} is worth, median", float(np.median(values)), len(values), "-")
-            for size, values in worth.items()
+            (f"  log-likelihood that ENR {size:g} is worth, {what}median", float(np.median(values)), len(values), "-")
+            for what, sizes_of in (("", worth), ("parameters known, ", known))
+            for size, values in sizes_of.items()
             if values
         ),
         (
@@ -250,6 +267,6 @@ def table(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int, str]]:
 
 def show(rows: Sequence[tuple[str, float, int, str]]) -> str:
     """Return the table as text."""
-    lines = [f"{'':52} {'figure':>8} {'cases':>6}  bound"]
-    lines += [f"{what:52} {figure:8.2f} {count:6d}  {bound}" for what, figure, count, bound in rows]
+    lines = [f"{'':62} {'figure':>8} {'cases':>6}  bound"]
+    lines += [f"{what:62} {figure:8.2f} {count:6d}  {bound}" for what, figure, count, bound in rows]
     return "\n".join(lines)

@@ -6,25 +6,29 @@ after it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from trainer.diagnosis import search, selection
 from trainer.diagnosis.drivers import Pattern
+from trainer.diagnosis.likelihood import Profile
 from trainer.diagnosis.problem import Problem
-from trainer.diagnosis.search import Fit
-from trainer.diagnosis.selection import Hypothesis, Selected
+from trainer.diagnosis.selection import Contender, Hypothesis, Selected
 
-SMALLEST_GAIN = 16.0
+SMALLEST_GAIN = 24.0
 """Log-likelihood below which a pattern is no cause in a log of 28 days: a wrong structure makes as much."""
-LARGEST_P_VALUE = 0.005
+STEADY = 2.0
+"""Times as much is asked of a pattern of the clock alone: a wrong model looks like one that is always there."""
+LARGEST_DOUBT = 0.5
+"""Bootstrap probability that unseen days are not likelier with a pattern: one that lives on two Sundays fits them."""
 BETTER = 1.6
 """A pattern that gains so many times what the name gains replaces it."""
-LEFT = 0.5
+LEFT = 1.0
 """Share of the gain of the names found before that a pattern must add beside them: a form that is not quite the
-catalogue's leaves traces."""
+catalogue's leaves traces as large as half of it."""
+FURTHER = 8.0
+"""Log-likelihood that each further pattern must add in a log of 28 days."""
 MOST_PATTERNS = 3
 
 
@@ -35,56 +39,54 @@ class Adequacy:
     selected: Selected
     remainder: tuple[Hypothesis, ...] | None
     """Patterns that fit what no candidate explains; None where nothing remains."""
-    pattern_gain: float
-    """Of the best single pattern instead of the name."""
 
 
-def judge(problem: Problem, chain: Sequence[Selected], explained: float, rng: np.random.Generator) -> Adequacy:
-    """Judge the longest model of a chain against patterns.
+def judge(
+    problem: Problem, none: Profile, cause: Contender | None, explained: float, rng: np.random.Generator
+) -> Adequacy:
+    """Judge the best cause of a round against patterns.
 
     Args:
         problem: that it was found in.
-        chain: from no name to the best one.
+        none: the model without it.
+        cause: the best one, if there is one.
         explained: log-likelihood that the names found before, now part of the model, have gained.
         rng: for the flips.
     """
-    none, named = chain[0], chain[-1]
-    gained = named.fit.solution.gain - none.fit.solution.gain
-    instead = _best(problem, none.fit, rng)
-    gain = instead.gain if instead else 0.0
-    if gain > max(SMALLEST_GAIN * selection.structural_growth(problem), BETTER * gained, LEFT * explained):
-        return Adequacy(none, _patterns(problem, none.fit, rng), gain)
-    return Adequacy(named, None, gain)
+    growth = selection.structural_growth(problem)
+    fit = search.fit(problem.grams, none.model)
+    ranked = selection.score_patterns(problem, fit, selection.onset_days(problem)[::4], rng)
+    instead = selection.contest(problem, none, ranked, rng)
+    gained = cause.hypothesis.gain if cause else 0.0
+    needed = max(SMALLEST_GAIN * growth, BETTER * gained, LEFT * explained)
+    for pattern in (one for one in instead if one.doubt <= LARGEST_DOUBT):
+        least = STEADY * SMALLEST_GAIN * growth if _steady(pattern.hypothesis) else 0.0
+        if pattern.hypothesis.gain > max(needed, least):
+            seen = problem.whitened(pattern.profile.whitening)
+            return Adequacy(selection.selected(problem, none, None), _patterns(seen, pattern, growth, rng))
+    return Adequacy(selection.selected(problem, none, cause), None)
 
 
-def _best(problem: Problem, fit: Fit, rng: np.random.Generator) -> Hypothesis | None:
-    scored = selection.score_patterns(problem, fit, selection.onset_days(problem)[::4], rng)
-    significant = [one for one in scored if one.p_value <= LARGEST_P_VALUE and one.gain >= _needed(problem, one)]
-    return significant[0] if significant else None
+def _steady(one: Hypothesis) -> bool:
+    return isinstance(one.cause, Pattern) and not set(one.cause.drivers) - {"time"}
 
 
-def _needed(problem: Problem, one: Hypothesis) -> float:
-    """Return the gain below which a pattern is not believed: a wrong model looks like one that is always there."""
-    steady = isinstance(one.cause, Pattern) and not set(one.cause.drivers) - {"time"}
-    return 2.0 * SMALLEST_GAIN * selection.structural_growth(problem) if steady else 0.0
-
-
-def _patterns(problem: Problem, fit: Fit, rng: np.random.Generator) -> tuple[Hypothesis, ...]:
+def _patterns(problem: Problem, first: Contender, growth: float, rng: np.random.Generator) -> tuple[Hypothesis, ...]:
     """Return up to three patterns, each significant beside those before it."""
-    found: list[Hypothesis] = []
-    current = fit
-    for _ in range(MOST_PATTERNS):
-        best = _best(problem, current, rng)
-        if (
-            best is None
-            or best.gain < 0.5 * SMALLEST_GAIN * selection.structural_growth(problem)
-            or not isinstance(best.cause, Pattern)
-        ):
+    found = [first.hypothesis]
+    current = search.fit(problem.grams, first.profile.model)
+    before = len(current.model.terms) - 1
+    while len(found) < MOST_PATTERNS:
+        ranked = selection.score_patterns(problem, current, selection.onset_days(problem)[::4], rng)
+        passed = [
+            one
+            for one in ranked
+            if one.p_value <= selection.LARGEST_P_VALUE
+            and one.gain >= FURTHER * growth * (2.0 * STEADY if _steady(one) else 1.0)
+        ]
+        if not passed:
             break
-        found.append(best)
-        current = search.fit(problem.grams, current.model.with_term(best.term))
-    amplitudes = np.asarray(current.amplitudes)[len(fit.model.terms) :]
-    return tuple(
-        Hypothesis(one.cause, one.term, one.gain, float(amplitude), one.statistic, one.p_value)
-        for one, amplitude in zip(found, amplitudes, strict=True)
-    )
+        found.append(passed[0])
+        current = search.fit(problem.grams, current.model.with_term(passed[0].term))
+    amplitudes = np.asarray(current.amplitudes)[before:]
+    return tuple(replace(one, amplitude=float(amplitude)) for one, amplitude in zip(found, amplitudes, strict=True))

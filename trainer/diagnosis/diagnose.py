@@ -15,6 +15,7 @@ from igrow_core.telemetry import Telemetry
 from trainer.diagnosis import (
     freefit,
     freerun,
+    likelihood,
     problem,
     refine,
     resolution,
@@ -47,9 +48,9 @@ SMALLEST_SKILL = -0.05
 recalibration can hide much of a cause, so that it need not remove more; but it must not add more than chance does."""
 CLEAR_SKILL = 0.03
 """A cause that removes so much needs no other proof on unseen days."""
-LARGEST_DOUBT = 0.45
-"""Else the largest bootstrap probability over unseen days that it does not make their 24 h free runs likelier."""
-FURTHER_SKILL, FURTHER_DOUBT, FURTHER_GAIN = CLEAR_SKILL, 0.2, 0.1
+LARGEST_DOUBT = 0.5
+"""Else the largest bootstrap probability that unseen days are not likelier with it."""
+FURTHER_SKILL, FURTHER_DOUBT, FURTHER_GAIN = CLEAR_SKILL, 0.2, 0.15
 """What a second or third cause must show: skill, doubt, and a share of the gain of those before it. The first, bent
 otherwise than the catalogue has it, leaves traces that look like small others."""
 LONG = 1.5
@@ -93,8 +94,8 @@ class Evidence:
 
     record: Record
     split: Split
-    problem: Problem
-    chain: tuple[Selected, ...]
+    first: Selected
+    """What the search selected first."""
     weighed: tuple[Estimated, ...]
     """Every selected term with its size and skill on unseen days, kept or not."""
     runs: dict[str, Runs]
@@ -161,9 +162,7 @@ def diagnose(
         record.unknown,
     )
     shown = {name: day for name, stage in stages.items() if (day := stage.runs(record, split)) is not None}
-    return diagnosis, Evidence(
-        record, split, prepared, search.chain, tuple(weighed), shown, model, deployed.free_run_prior
-    )
+    return diagnosis, Evidence(record, split, search.first, tuple(weighed), shown, model, deployed.free_run_prior)
 
 
 @dataclass(frozen=True)
@@ -172,8 +171,8 @@ class _Search:
 
     problem: Problem
     """Of the deployed model."""
-    chain: tuple[Selected, ...]
-    """Of its first round: no name, and the best one."""
+    first: Selected
+    """What its first round selected."""
     found: tuple[Estimated, ...]
     judged: Adequacy
     """Of the last round."""
@@ -205,28 +204,28 @@ def _search(
         rows = prepared(deployed.effects, record.step)
         if resolution.disagreement(problem_now, rows) <= resolution.LARGEST_DISAGREEMENT:
             problem_now = rows
-    first: tuple[Problem, tuple[Selected, ...]] | None = None
+    first: tuple[Problem, Selected] | None = None
     found: list[Estimated] = []
     while True:
-        null = structure.null_model(problem_now)
+        none = likelihood.profile(problem_now, structure.null_model(problem_now))
         more = len(found) < MOST_CAUSES
-        chain = selection.best_cause(problem_now, null, rng) if more else selection.no_cause(problem_now, null)
-        first = first or (problem_now, chain)
-        judged = judge(problem_now, chain, sum(one.gain for one in found), rng)
-        new = estimate(problem_now, judged.selected, rng)
+        cause = selection.best_cause(problem_now, none, rng) if more else None
+        judged = judge(problem_now, none, cause, sum(one.gain for one in found), rng)
+        first = first or (problem_now, judged.selected)
+        new = estimate(judged.selected, rng)
         if new:
-            new = _refined(problem_now, judged, [*found, *new], deployed)
+            new = _refined(judged.selected, [*found, *new], deployed)
         if len(new) <= len(found):
             return _Search(*first, tuple(found), judged)
         found = new
         problem_now = prepared((*deployed.effects, *(one.term for one in found)), problem_now.interval)
 
 
-def _refined(prepared: Problem, judged: Adequacy, estimated: list[Estimated], deployed: Deployed) -> list[Estimated]:
+def _refined(selected: Selected, estimated: list[Estimated], deployed: Deployed) -> list[Estimated]:
     """Return all terms refitted together, or none where one turns round or a further one runs to its bound."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):
-            found = refine.refine(prepared, judged.selected.fit, [one.term for one in estimated], deployed.effects)
+            found = refine.refine(selected.problem, selected.named, [one.term for one in estimated], deployed.effects)
     except (ValueError, np.linalg.LinAlgError):
         # Undamped steps can run away from a poor start; the terms then stay as the search found them.
         return estimated

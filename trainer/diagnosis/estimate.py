@@ -14,7 +14,7 @@ from trainer.diagnosis.gram import Term
 from trainer.diagnosis.problem import Problem
 from trainer.diagnosis.refine import Refined
 from trainer.diagnosis.result import Interval, OnsetInterval
-from trainer.diagnosis.search import Fit, Model
+from trainer.diagnosis.search import Fit
 from trainer.diagnosis.selection import Hypothesis, Selected
 
 NORMAL_90 = 1.645
@@ -56,49 +56,28 @@ class Estimated:
         return self.hypothesis.effect
 
 
-def estimate(problem: Problem, selected: Selected, rng: np.random.Generator) -> list[Estimated]:
-    """Return the terms of a selected model that all still stand beside each other, the largest gain first."""
-    found = _estimate(problem, selected, rng)
-    needed = selection.SMALLEST_GAIN * selection.structural_growth(problem)
-    while found and found[-1].gain < needed:
-        rest = tuple(one.hypothesis for one in found[:-1])
-        model = selected.fit.model
-        model = Model(model.base, model.precision, model.shift, tuple(one.term for one in rest))
-        selected = Selected(rest, search.fit(problem.grams, model))
-        found = _estimate(problem, selected, rng)
-    return found
-
-
-def _estimate(problem: Problem, selected: Selected, rng: np.random.Generator) -> list[Estimated]:
-    found = []
-    for position, hypothesis in enumerate(selected.hypotheses):
-        others = tuple(one for index, one in enumerate(selected.hypotheses) if index != position)
-        model = selected.fit.model
-        reduced = search.fit(
-            problem.grams, Model(model.base, model.precision, model.shift, tuple(one.term for one in others))
+def estimate(selected: Selected, rng: np.random.Generator) -> list[Estimated]:
+    """Return the cause that a round selected, if it did."""
+    if selected.cause is None:
+        return []
+    problem, reduced, hypothesis = selected.problem, selected.none, selected.cause.hypothesis
+    gain = selected.named.solution.gain - reduced.solution.gain
+    (amplitude,) = (float(one) for one in selected.named.amplitudes)
+    reach = NORMAL_90 * INFLATION * _sandwich(problem, selected.named)
+    onset = _onset(problem, reduced, hypothesis)
+    shape = _shape(problem, reduced, hypothesis)
+    return [
+        Estimated(
+            hypothesis,
+            ActiveTerm(hypothesis.effect, amplitude, shape, None if onset is None else onset.time),
+            Interval(amplitude, amplitude - reach, amplitude + reach, EFFECTS[hypothesis.effect].amplitude.unit),
+            hypothesis.gain,
+            onset,
+            rivals(problem, reduced, hypothesis, gain, rng),
+            doubt=selected.cause.doubt,
+            shift=_shift(problem, reduced, selected.named),
         )
-        gain = selected.fit.solution.gain - reduced.solution.gain
-        amplitude = float(selected.fit.amplitudes[position])
-        deviation = _sandwich(problem, selected.fit, position)
-        candidate = hypothesis.cause
-        assert isinstance(candidate, Candidate)
-        shape = _shape(problem, reduced, hypothesis)
-        onset = _onset(problem, reduced, hypothesis)
-        unit = EFFECTS[hypothesis.effect].amplitude.unit
-        reach = NORMAL_90 * INFLATION * deviation
-        found.append(
-            Estimated(
-                hypothesis,
-                ActiveTerm(hypothesis.effect, amplitude, shape, None if onset is None else onset.time),
-                Interval(amplitude, amplitude - reach, amplitude + reach, unit),
-                gain,
-                onset,
-                rivals(problem, reduced, hypothesis, gain, tuple(one.effect for one in others), rng),
-                doubt=_doubt(problem, reduced, selected.fit, rng),
-                shift=_shift(problem, reduced, selected.fit),
-            )
-        )
-    return sorted(found, key=lambda one: -one.gain)
+    ]
 
 
 def with_refined(one: Estimated, refined: Refined) -> Estimated:
@@ -125,25 +104,22 @@ def rivals(
     reduced: Fit,
     hypothesis: Hypothesis,
     gain: float,
-    others: tuple[str, ...],
     rng: np.random.Generator,
 ) -> tuple[str, ...]:
-    """Return the effects that would do as well in the place of a term, itself first."""
+    """Return the effects that would do as well in the place of a term, itself first.
+
+    Args:
+        problem: under the noise that is left beside the term.
+        reduced: the model without it.
+        hypothesis: the term.
+        gain: of the term, scored as the others are.
+        rng: for the flips.
+    """
     margin = max(RIVAL_GAIN, RIVAL_SHARE * gain)
     onsets = selection.onset_days(problem) if hypothesis.term.onset is not None else [None]
     scored = selection.score_candidates(problem, reduced, onsets, rng)
-    as_good = [one.effect for one in scored if one.gain >= gain - margin and one.effect not in others]
+    as_good = [one.effect for one in scored if one.gain >= gain - margin]
     return (hypothesis.effect, *(name for name in as_good if name != hypothesis.effect))
-
-
-def _doubt(problem: Problem, reduced: Fit, full: Fit, rng: np.random.Generator) -> float:
-    """Return the bootstrap probability that unseen days are not likelier with the term than without it."""
-    unseen = ~problem.grams.fit
-    if not unseen.any():
-        return 0.0
-    gain = (selection.losses_by_day(problem, reduced) - selection.losses_by_day(problem, full))[unseen]
-    means = gain[rng.integers(0, len(gain), size=(2000, len(gain)))].mean(axis=1)
-    return float(np.mean(means <= 0.0))
 
 
 def _shift(problem: Problem, reduced: Fit, full: Fit) -> dict[str, float]:
@@ -152,13 +128,12 @@ def _shift(problem: Problem, reduced: Fit, full: Fit) -> dict[str, float]:
     return {name: float(value) for name, value in zip(problem.prior.names, change, strict=True)}
 
 
-def _sandwich(problem: Problem, fit: Fit, position: int) -> float:
-    """Return the standard deviation of an amplitude from the scatter of its day scores."""
+def _sandwich(problem: Problem, fit: Fit) -> float:
+    """Return the standard deviation of the last term's amplitude from the scatter of its day scores."""
     days = np.flatnonzero(problem.grams.fit)
     coefficients = np.concatenate([[1.0], fit.solution.coefficients])
-    index = len(fit.model.base) + position
-    influence = fit.products[days][:, 1:, :] @ coefficients @ fit.solution.inverse[index]
-    plain = float(fit.deviations[position])
+    influence = fit.products[days][:, 1:, :] @ coefficients @ fit.solution.inverse[-1]
+    plain = float(fit.deviations[-1])
     scatter = float(np.sqrt(np.sum((influence - influence.mean()) ** 2) * len(days) / max(len(days) - 1, 1)))
     return max(plain, scatter)
 

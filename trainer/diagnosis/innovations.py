@@ -115,12 +115,31 @@ def fit_whitening(errors: Floats, counted: NDArray[np.bool_], filters: tuple[Noi
     return extend(Whitening(filters, root, np.zeros(errors.shape[1:])), errors, counted)
 
 
+def log_likelihood(whitening: Whitening, errors: Floats) -> Floats:
+    """Return the log-likelihood of every row under Student's t but for a constant, (r, steps).
+
+    Args:
+        whitening: fitted to these errors, or to others.
+        errors: of runs, (b, r, steps), 0 where not observed.
+    """
+    distance = _distance(whitening, errors)
+    scale = float(np.log(np.diag(whitening.root)).sum())
+    likelihood: Floats = scale - 0.5 * (FREEDOM + len(errors)) * np.log1p(distance / FREEDOM)
+    return likelihood
+
+
 def extend(whitening: Whitening, errors: Floats, counted: NDArray[np.bool_]) -> Whitening:
     """Return the whitening with weights for other rows than it was fitted on."""
-    innovations = np.stack([one(errors[row]) for row, one in enumerate(whitening.filters)])
-    distance = np.sum(np.tensordot(whitening.root, innovations, axes=1) ** 2, axis=0)
+    distance = _distance(whitening, errors)
     weight = np.where(counted, np.sqrt((FREEDOM + len(errors)) / (FREEDOM + distance)), 0.0)
     return replace(whitening, weight=weight)
+
+
+def _distance(whitening: Whitening, errors: Floats) -> Floats:
+    """Return the squared Mahalanobis distance of the innovations of errors (b, r, steps) from 0, (r, steps)."""
+    innovations = np.stack([one(errors[row]) for row, one in enumerate(whitening.filters)])
+    distance: Floats = np.sum(np.tensordot(whitening.root, innovations, axes=1) ** 2, axis=0)
+    return distance
 
 
 def _coefficients(raw: Floats, order: int) -> tuple[Floats, Floats, tuple[float, ...]]:

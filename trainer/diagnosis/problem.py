@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +37,12 @@ class Problem:
     candidates: tuple[Candidate, ...]
     patterns: tuple[Pattern, ...]
     untestable: tuple[str, ...]
+    columns: Floats
+    """All columns as means over intervals, 0 where they do not count, before whitening, (q, b, r, intervals)."""
+    observed: NDArray[np.bool_]
+    """Intervals that count, (r, intervals)."""
     grams: DailyGrams
+    """Of `columns`, whitened."""
     parameter: range
     """Columns of the parameters."""
     candidate: range
@@ -54,6 +59,17 @@ class Problem:
     """The known and the usual misfits as errors, not whitened, (known + usual, 3, r, steps)."""
     interval: float
     """Seconds over which errors are averaged."""
+
+    @property
+    def fitted(self) -> NDArray[np.bool_]:
+        """Runs on days for fitting, (r, 1)."""
+        runs: NDArray[np.bool_] = self.split.fit[self.line.runs.day][:, None]
+        return runs
+
+    def whitened(self, whitening: Whitening) -> Problem:
+        """Return the problem as another noise shows it."""
+        products = gram.daily_products(whitening(self.columns), self.line.runs.day, self.split.days)
+        return replace(self, whitening=whitening, grams=DailyGrams(products, self.split.fit))
 
 
 def averaged(values: Floats, step: float, interval: float) -> Floats:
@@ -102,10 +118,11 @@ def recalibrate(
     fitted = split.fit[runs.day][:, None]
     observed = counted_intervals(line, balances, interval)
     step = line.record.step
-    whitening = _noise(averaged(line.errors + misfit, step, interval), balances, observed, fitted)
+    chosen = list(balances)
+    whitening = fit_noise(averaged((line.errors + misfit)[chosen], step, interval), observed, fitted)
     for _ in range(rounds):
         columns = linearisation.parameter_columns(line, names, prior.spread)
-        stack = np.concatenate([(line.errors + misfit)[None], columns])[:, list(balances)]
+        stack = np.concatenate([(line.errors + misfit)[None], columns])[:, chosen]
         stack = averaged(stack, step, interval) * observed
         flat = (whitening(stack) * fitted).reshape(len(stack), -1)
         products = flat @ flat.T
@@ -118,7 +135,7 @@ def recalibrate(
             {name: parameters[name] + float(part) for name, part in zip(names, change, strict=True)}
         )
         line = linearisation.linearise(line.record, runs, parameters, line.effects)
-        whitening = _noise(averaged(line.errors + misfit, step, interval), balances, observed, fitted, whitening)
+        whitening = fit_noise(averaged((line.errors + misfit)[chosen], step, interval), observed, fitted, whitening)
     return line, whitening, balances
 
 
@@ -134,18 +151,22 @@ def _combined(line: Linearisation, longitude: float, lists: Sequence[Mapping[str
     return combined
 
 
-def _noise(
-    errors: Floats,
-    balances: tuple[int, ...],
-    observed: NDArray[np.bool_],
-    fitted: NDArray[np.bool_],
-    before: Whitening | None = None,
+def fit_noise(
+    errors: Floats, observed: NDArray[np.bool_], fitted: NDArray[np.bool_], start: Whitening | None = None
 ) -> Whitening:
-    errors = errors[list(balances)] * observed
+    """Fit colour and scale of the disturbances to errors on the fit days.
+
+    Args:
+        errors: of the balances at hand, (b, r, intervals).
+        observed: intervals that count, (r, intervals).
+        fitted: runs on days for fitting, (r, 1).
+        start: where to begin.
+    """
+    errors = errors * observed
     counted = observed & fitted
-    starts = before.filters if before else (None,) * len(balances)
+    starts = start.filters if start else (None,) * len(errors)
     filters = tuple(
-        innovations.fit_filter(row, counted, start=start) for row, start in zip(errors, starts, strict=True)
+        innovations.fit_filter(row, counted, start=begin) for row, begin in zip(errors, starts, strict=True)
     )
     whitening = innovations.fit_whitening(errors, counted, filters)
     # Held-out rows are filtered and weighted too: the fit leaves them out by day.
@@ -196,8 +217,8 @@ def prepare(
         expected[1 if known else 0 :],
     ]
     edges = np.cumsum([0] + [len(part) for part in parts])
-    white = np.concatenate([whitening(averaged(part[:, chosen], record.step, interval) * observed) for part in parts])
-    products = gram.daily_products(white, runs.day, split.days)
+    columns = np.concatenate([averaged(part[:, chosen], record.step, interval) * observed for part in parts])
+    products = gram.daily_products(whitening(columns), runs.day, split.days)
     spans = [range(int(edges[k]), int(edges[k + 1])) for k in range(1, len(parts))]
     parameter, candidate, ageing, patterned, first_known, usually = spans
     return Problem(
@@ -209,6 +230,8 @@ def prepare(
         candidates=found.candidates,
         patterns=names,
         untestable=found.untestable,
+        columns=columns,
+        observed=observed,
         grams=DailyGrams(products, split.fit),
         parameter=parameter,
         candidate=candidate,

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from igrow_core.effects import EFFECTS
-from trainer.diagnosis import search
+from trainer.diagnosis import likelihood, search
 from trainer.diagnosis.candidates import Candidate
 from trainer.diagnosis.drivers import Pattern
-from trainer.diagnosis.gram import Floats, Term, day_losses
+from trainer.diagnosis.gram import Floats, Term
+from trainer.diagnosis.likelihood import Profile
 from trainer.diagnosis.problem import HOUR, Problem
-from trainer.diagnosis.search import Fit, Model
+from trainer.diagnosis.search import Fit
 
-REFITTED = 3
-"""Best causes of a scan that are fitted to be compared."""
-SMALLEST_GAIN = 9.0
-"""Log-likelihood that a term must add on the fit days of a log of `USUAL_DAYS`."""
+CONTENDERS = 8
+"""Best causes of a scan that are compared, each beside its own noise."""
+CHANCE = 7.0
+"""Log-likelihood that chance and searching bring at most."""
+STRUCTURE = 15.0
+"""The same with what a wrong structure brings in a log of `USUAL_DAYS` (tuning logs with nothing hidden)."""
 USUAL_DAYS = 28
 """Length of the logs that thresholds were fitted on."""
 LARGEST_P_VALUE = 0.005
@@ -49,11 +52,27 @@ class Hypothesis:
 
 
 @dataclass(frozen=True)
-class Selected:
-    """A model with named terms, and its fit."""
+class Contender:
+    """A hypothesis beside the noise that it leaves."""
 
-    hypotheses: tuple[Hypothesis, ...]
-    fit: Fit
+    hypothesis: Hypothesis
+    """Its gain is that of the profile likelihood."""
+    profile: Profile
+    doubt: float
+    """Probability that unseen days are not likelier with it."""
+
+
+@dataclass(frozen=True)
+class Selected:
+    """What a round of the search found, under one noise."""
+
+    problem: Problem
+    """Under the noise that is left beside the cause."""
+    none: Fit
+    """The model without a cause."""
+    named: Fit
+    """The model with the cause, or that without where there is none."""
+    cause: Contender | None
 
 
 def structural_growth(problem: Problem) -> float:
@@ -64,6 +83,11 @@ def structural_growth(problem: Problem) -> float:
     """
     # The first local day is seldom a whole one.
     return max(1.0, (problem.split.days - 1) / USUAL_DAYS) if problem.interval >= HOUR else 1.0
+
+
+def needed_gain(problem: Problem) -> float:
+    """Return the log-likelihood below which a cause is none."""
+    return STRUCTURE * structural_growth(problem) if problem.interval >= HOUR else CHANCE
 
 
 def onset_days(problem: Problem) -> list[int | None]:
@@ -131,30 +155,45 @@ def _best(
     return list(found.values())
 
 
-def no_cause(problem: Problem, null: Model) -> tuple[Selected]:
-    """Return the chain that holds the model without a cause alone."""
-    return (Selected((), search.fit(problem.grams, null)),)
+def contest(problem: Problem, none: Profile, ranked: Sequence[Hypothesis], rng: np.random.Generator) -> list[Contender]:
+    """Return the first of `ranked` that pass the test, each beside its own noise, the likeliest first."""
+    passed = [one for one in ranked if one.p_value <= LARGEST_P_VALUE]
+    contenders = []
+    for one in passed[:CONTENDERS]:
+        own = likelihood.profile(problem, none.model.with_term(one.term), none.whitening)
+        price = 0.0 if one.term.onset is None else ONSET_PRICE
+        gain = likelihood.gain(problem, own, none) - price
+        contenders.append(Contender(replace(one, gain=gain), own, likelihood.doubt(problem, own, none, rng)))
+    return sorted(contenders, key=lambda one: -one.hypothesis.gain)
 
 
-def best_cause(problem: Problem, null: Model, rng: np.random.Generator) -> tuple[Selected, ...]:
-    """Return the model without a cause and, where one passes the test, that with the best, within its bounds."""
-    (none,) = no_cause(problem, null)
-    ranked = score_candidates(problem, none.fit, onset_days(problem), rng)
-    needed = SMALLEST_GAIN * structural_growth(problem)
-    passed = [one for one in ranked if one.gain >= needed and one.p_value <= LARGEST_P_VALUE]
-    grown = [Selected((one,), search.fit(problem.grams, null.with_term(one.term))) for one in passed[:REFITTED]]
-    grown = [one for one in grown if _within_bounds(one)]
-    return (none, max(grown, key=lambda one: one.fit.solution.gain)) if grown else (none,)
+def best_cause(problem: Problem, none: Profile, rng: np.random.Generator) -> Contender | None:
+    """Return the best cause of a log, within its bounds; None where none gains what is needed.
+
+    Args:
+        problem: of the log.
+        none: the model without a cause.
+        rng: for the flips.
+    """
+    fit = search.fit(problem.grams, none.model)
+    ranked = score_candidates(problem, fit, onset_days(problem), rng)
+    needed = needed_gain(problem)
+    for one in contest(problem, none, ranked, rng):
+        if one.hypothesis.gain >= needed and _within_bounds(one):
+            return one
+    return None
 
 
-def _within_bounds(selected: Selected) -> bool:
-    for hypothesis, amplitude in zip(selected.hypotheses, selected.fit.amplitudes, strict=True):
-        bounds = EFFECTS[hypothesis.effect].amplitude
-        if not bounds.low <= amplitude <= bounds.high or (bounds.low == 0.0 and amplitude <= 0.0):
-            return False
-    return True
+def selected(problem: Problem, none: Profile, cause: Contender | None) -> Selected:
+    """Return both models under the noise that is left beside the cause."""
+    if cause is None:
+        fit = search.fit(problem.grams, none.model)
+        return Selected(problem, fit, fit, None)
+    seen = problem.whitened(cause.profile.whitening)
+    return Selected(seen, search.fit(seen.grams, none.model), search.fit(seen.grams, cause.profile.model), cause)
 
 
-def losses_by_day(problem: Problem, fit: Fit) -> Floats:
-    """Return half the sum of squared innovations of every day under a fit, (days,)."""
-    return day_losses(fit.products, fit.solution.coefficients)
+def _within_bounds(contender: Contender) -> bool:
+    bounds = EFFECTS[contender.hypothesis.effect].amplitude
+    (amplitude,) = contender.profile.amplitudes
+    return bounds.low <= amplitude <= bounds.high and (bounds.low < 0.0 or amplitude > 0.0)

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 
 from igrow_core.quantities import QUANTITIES
 from trainer.diagnosis.diagnose import Evidence
+from trainer.diagnosis.gram import day_losses
 from trainer.diagnosis.result import Finding
-from trainer.diagnosis.selection import losses_by_day
 
 mpl.rcParams.update({"svg.fonttype": "none", "svg.hashsalt": "igrow", "font.size": 9, "axes.grid": True})
 _COLOURS = {"deployed": "#888888", "recalibrated": "#3b7dd8", "corrected": "#1f9d55"}
@@ -44,8 +44,9 @@ def gain_by_day(evidence: Evidence) -> str:
     """Plot how the evidence for the findings adds up from day to day: a bend is a beginning."""
 
     def draw(axes: Axes) -> None:
-        none = losses_by_day(evidence.problem, evidence.chain[0].fit)
-        named = losses_by_day(evidence.problem, evidence.chain[-1].fit)
+        none, named = (
+            day_losses(fit.products, fit.solution.coefficients) for fit in (evidence.first.none, evidence.first.named)
+        )
         axes.plot(np.arange(len(none)), np.cumsum(none - named), color=_COLOURS["corrected"])
         axes.set_xlabel("day of the log")
         axes.set_ylabel("evidence, log-likelihood summed")
@@ -55,14 +56,14 @@ def gain_by_day(evidence: Evidence) -> str:
 
 def residual_against_driver(evidence: Evidence, finding: Finding) -> str | None:
     """Plot what is missing against the finding's first outside driver, in bins; None where it has none."""
-    drivers = evidence.problem.line.drivers
+    drivers = evidence.first.problem.line.drivers
     name = next((one for one in finding.drivers if one in drivers and np.ndim(drivers[one])), None)
     if name is None:
         return None
-    rows = evidence.problem.line.runs.rows
-    errors = evidence.problem.line.errors
+    rows = evidence.first.problem.line.runs.rows
+    errors = evidence.first.problem.line.errors
     values = np.asarray(drivers[name])[rows]
-    counted = evidence.problem.line.runs.weight
+    counted = evidence.first.problem.line.runs.weight
 
     def draw(axes: Axes) -> None:
         for index, (quantity, scale) in enumerate((("air_temperature", 1.0), ("air_humidity", 3.0), ("air_co2", 50.0))):

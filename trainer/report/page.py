@@ -38,7 +38,7 @@ def render_report(diagnosis: Diagnosis, evidence: Evidence | None, deployed: Dep
         for quantity in diagnosis.errors:
             name = quantity.replace("_", " ")
             pictures.append((f"The worst unseen day, {name}", figures.worst_day(evidence, quantity)))
-        if len(evidence.chain) > 1:
+        if evidence.first.cause is not None:
             pictures.append(("When the evidence came", figures.gain_by_day(evidence)))
         for finding in diagnosis.findings:
             against = figures.residual_against_driver(evidence, finding)

@@ -19,7 +19,7 @@ EFFECT = Effect(
     balances=("light", "heat"),
     drivers=("sun_elevation", "radiation_inside"),
     parameters=(
-        Parameter("loss", "1", 0.25, -0.5, 0.9, "fraction of the light lost when the sun stands at the horizon"),
+        Parameter("loss", "1", 0.25, 0.0, 0.9, "fraction of the light lost when the sun stands at the horizon"),
         Parameter("exponent", "1", 2.0, 1.0, 6.0, "how fast the loss fades with the height of the sun"),
     ),
     contribution=_contribution,

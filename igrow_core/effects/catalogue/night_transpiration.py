@@ -26,7 +26,7 @@ EFFECT = Effect(
             "rate",
             "g m-2 h-1 kPa-1",
             8.0,
-            -10.0,
+            0.0,
             60.0,
             "water per leaf area and kilopascal of deficit in the dark",
         ),

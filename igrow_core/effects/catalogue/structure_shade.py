@@ -19,7 +19,7 @@ EFFECT = Effect(
     balances=("light", "heat"),
     drivers=("sun_azimuth", "sun_elevation", "radiation_inside"),
     parameters=(
-        Parameter("loss", "1", 0.25, -0.5, 1.0, "fraction of the light lost in the shade"),
+        Parameter("loss", "1", 0.25, 0.0, 1.0, "fraction of the light lost in the shade"),
         Parameter("azimuth", "deg", 140.0, 60.0, 300.0, "azimuth of the sun in the middle of the shade"),
         Parameter("width", "deg", 20.0, 8.0, 60.0, "half width of the shade"),
     ),

@@ -1,0 +1,75 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from igrow_core.effects import EFFECTS
+from igrow_core.telemetry import Telemetry
+from tests.diagnosis.conftest import deployed_model
+from tests.virtual_log import SITE
+from trainer.diagnosis import gram, likelihood, problem, runner, search, structure
+from trainer.diagnosis.gram import RESIDUAL, DailyGrams, Term
+from trainer.diagnosis.problem import Problem
+from trainer.diagnosis.split import split_days
+
+
+@pytest.fixture(scope="module")
+def quiet(quiet_log: Telemetry) -> Problem:
+    deployed = deployed_model()
+    record, _ = runner.open_record(quiet_log, SITE, deployed)
+    split = split_days(record, SITE.longitude)
+    return problem.prepare(record, split, deployed.prior, {}, SITE.longitude, {})
+
+
+def hiding(quiet: Problem, effect: str, typical: float) -> tuple[Problem, Term, float]:
+    """Return the problem with so many typical amplitudes of an effect in its errors, its noise fitted to these."""
+    column = next(
+        column
+        for column, candidate in zip(quiet.candidate, quiet.candidates, strict=True)
+        if candidate.effect == effect
+    )
+    amplitude = typical * EFFECTS[effect].amplitude.typical
+    columns = quiet.columns.copy()
+    columns[RESIDUAL] -= amplitude * columns[column]
+    noise = problem.fit_noise(columns[RESIDUAL], quiet.observed, quiet.fitted)
+    products = gram.daily_products(noise(columns), quiet.line.runs.day, quiet.split.days)
+    hidden = replace(quiet, columns=columns, whitening=noise, grams=DailyGrams(products, quiet.split.fit))
+    return hidden, Term(column), amplitude
+
+
+def test_a_large_cause_gains_more_beside_its_own_noise_than_beside_the_noise_it_stands_in(quiet: Problem) -> None:
+    hidden, term, amplitude = hiding(quiet, "irrigation_evaporation", 4.0)
+    null = structure.null_model(hidden)
+    none = likelihood.profile(hidden, null)
+    own = likelihood.profile(hidden, null.with_term(term), none.whitening)
+    scanned = search.fit(hidden.grams, null.with_term(term))
+    before = scanned.solution.gain - search.fit(hidden.grams, null).solution.gain
+    assert likelihood.gain(hidden, own, none) > 1.5 * before
+    assert abs(own.amplitudes[-1] / amplitude - 1.0) < abs(scanned.amplitudes[-1] / amplitude - 1.0)
+
+
+def test_a_cause_that_is_there_makes_unseen_days_likelier(quiet: Problem) -> None:
+    hidden, term, _ = hiding(quiet, "air_temperature_offset", 3.0)
+    null = structure.null_model(hidden)
+    none = likelihood.profile(hidden, null)
+    own = likelihood.profile(hidden, null.with_term(term), none.whitening)
+    assert likelihood.doubt(hidden, own, none, np.random.default_rng(0)) < 0.05
+
+
+def test_what_is_not_there_gains_no_more_than_chance(quiet: Problem) -> None:
+    null = structure.null_model(quiet)
+    none = likelihood.profile(quiet, null)
+    (column, _) = next(iter(zip(quiet.candidate, quiet.candidates, strict=True)))
+    own = likelihood.profile(quiet, null.with_term(Term(column)), none.whitening)
+    assert -0.5 < likelihood.gain(quiet, own, none) < 8.0
+
+
+def test_a_term_that_begins_late_leaves_the_days_before_alone(quiet: Problem) -> None:
+    hidden, term, _ = hiding(quiet, "air_temperature_offset", 3.0)
+    null = structure.null_model(hidden)
+    none = likelihood.profile(hidden, null)
+    always = likelihood.profile(hidden, null.with_term(term), none.whitening)
+    late = likelihood.profile(hidden, null.with_term(replace(term, onset=hidden.split.days // 2)), none.whitening)
+    assert likelihood.gain(hidden, always, none) > likelihood.gain(hidden, late, none) > 0.0
