@@ -41,7 +41,7 @@ def main() -> int:
     if options.what == "matched":
         return matched.main(options.processes)
     if options.what == "usual":
-        return usual.main()
+        return usual.main(options.processes)
     seasons = options.season or ["winter", "spring"]
     outcomes: list[Outcome] = []
     with ProcessPoolExecutor(options.processes) as pool:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
 
@@ -16,15 +17,20 @@ from igrow_core.bundle import default_bundle_folder, read_bundle
 from igrow_core.greenhouse import Disturbances, GreenhouseParameters, generate_weather, recipe, simulate_many
 from igrow_core.greenhouse.described import parameters_of
 from igrow_core.site import Site
+from igrow_core.telemetry import Telemetry
 from trainer.diagnosis import Deployed, from_manifest, problem, runner, usual
 from trainer.diagnosis.problem import Problem
 from trainer.diagnosis.split import split_days
 
 LOGS = 30
 """Of each family."""
-DAYS = 28
-FAMILIES = ("winter", "spring", "default")
+MONTH, SEASON = 28, 84
+"""Days of a log."""
+FAMILIES = (("winter", MONTH), ("spring", MONTH), ("default", MONTH), ("winter", SEASON), ("spring", SEASON))
+"""Greenhouses and length of the logs."""
 DEFAULT_SITE = Site(name="default", latitude=52.03, longitude=4.52)
+
+Directions = Sequence[Mapping[str, float]]
 
 
 @dataclass(frozen=True)
@@ -33,12 +39,13 @@ class Family:
 
     start: str
     seed: int
-    """Of the first log; no case has it, nor any of those after it."""
+    """Of the first log of a month; no case has it, nor any of those after it."""
     site: Site
     deployed: Deployed
     plant: GreenhouseParameters
 
 
+@cache
 def family(name: str) -> Family:
     """Return the greenhouses of a season of the benchmark, or those of the default bundle."""
     if name == "default":
@@ -49,36 +56,54 @@ def family(name: str) -> Family:
     return Family(SEASONS[name], seed, SITE, reference(name).deployed, GreenhouseParameters())
 
 
-def problems(name: str) -> list[Problem]:
-    """Return the prepared problems of a family's logs, each without usual directions of its own."""
+def simulate(name: str, days: int) -> list[Telemetry]:
+    """Return the logs of a family's greenhouses."""
     own = family(name)
     start = np.datetime64(f"{own.start}T00:00:00")
-    end = start + np.timedelta64(DAYS, "D")
-    seeds = range(own.seed, own.seed + LOGS)
+    end = start + np.timedelta64(days, "D")
+    first = own.seed if days == MONTH else own.seed + 5_000
     logs = simulate_many(
-        [own.plant.varied(np.random.default_rng(seed), relative=MISMATCH) for seed in seeds],
-        [generate_weather(start, end, seed=seed) for seed in seeds],
+        [own.plant.varied(np.random.default_rng(first + k), relative=MISMATCH) for k in range(LOGS)],
+        [generate_weather(start, end, seed=first + k) for k in range(LOGS)],
         recipe,
         start,
         end,
         count=LOGS,
-        seed=own.seed,
+        seed=first,
         disturbances=Disturbances(degrees_of_freedom=4.0),
     )
-    found = []
-    for log in logs:
-        record, _ = runner.open_record(log.measured, own.site, own.deployed)
-        days = split_days(record, own.site.longitude)
-        known = own.deployed.known_misfit
-        found.append(problem.prepare(record, days, own.deployed.prior, {}, own.site.longitude, known))
-    return found
+    return [log.measured for log in logs]
 
 
-def main() -> int:
-    """Write the directions into the package."""
-    with ProcessPoolExecutor(len(FAMILIES)) as pool:
-        prepared = [one for part in pool.map(problems, FAMILIES) for one in part]
+def prepare(job: tuple[str, Telemetry], directions: Directions = ()) -> Problem:
+    """Return the prepared problem of a family's log."""
+    name, log = job
+    own = family(name)
+    record, _ = runner.open_record(log, own.site, own.deployed)
+    days = split_days(record, own.site.longitude)
+    known = own.deployed.known_misfit
+    return problem.prepare(record, days, own.deployed.prior, {}, own.site.longitude, known, directions)
+
+
+def _traces(job: tuple[str, Telemetry]) -> usual.Traces:
+    return usual.traces(prepare(job))
+
+
+def _amplitudes(directions: Directions, job: tuple[str, Telemetry]) -> dict[str, float]:
+    return usual.amplitudes(prepare(job, directions))
+
+
+def main(processes: int) -> int:
+    """Write what is usual into the package."""
+    with ProcessPoolExecutor(processes) as pool:
+        logs = pool.map(simulate, *zip(*FAMILIES, strict=True))
+        jobs: dict[int, list[tuple[str, Telemetry]]] = {MONTH: [], SEASON: []}
+        for (name, days), own in zip(FAMILIES, logs, strict=True):
+            jobs[days] += [(name, log) for log in own]
+        directions = usual.directions(list(pool.map(_traces, jobs[MONTH])))
+        shown = list(pool.map(partial(_amplitudes, directions), jobs[SEASON]))
+    found = usual.Usual(tuple(directions), usual.root_mean_squares(shown))
     path = Path(str(files("trainer.diagnosis"))) / usual.FILE
-    path.write_text(json.dumps(usual.directions(prepared)) + "\n", encoding="utf-8")
-    print(f"wrote {usual.DIRECTIONS} directions from {len(prepared)} logs to {path}")
+    usual.write(path, found)
+    print(f"wrote {len(directions)} directions and {len(found.season)} usual amplitudes to {path}")
     return 0

@@ -9,7 +9,7 @@ from igrow_core.effects import EFFECTS
 from igrow_core.telemetry import Telemetry
 from tests.diagnosis.conftest import deployed_model
 from tests.virtual_log import SITE
-from trainer.diagnosis import gram, likelihood, problem, runner, search, structure
+from trainer.diagnosis import gram, likelihood, problem, runner, search, selection, structure, usual
 from trainer.diagnosis.gram import RESIDUAL, DailyGrams, Term
 from trainer.diagnosis.problem import Problem
 from trainer.diagnosis.split import split_days
@@ -73,3 +73,29 @@ def test_a_term_that_begins_late_leaves_the_days_before_alone(quiet: Problem) ->
     always = likelihood.profile(hidden, null.with_term(term), none.whitening)
     late = likelihood.profile(hidden, null.with_term(replace(term, onset=hidden.split.days // 2)), none.whitening)
     assert likelihood.gain(hidden, always, none) > likelihood.gain(hidden, late, none) > 0.0
+
+
+def test_what_logs_usually_show_is_no_evidence(quiet: Problem) -> None:
+    hidden, term, amplitude = hiding(quiet, "air_temperature_offset", 3.0)
+    none = likelihood.profile(hidden, structure.null_model(hidden))
+    fit = search.fit(hidden.grams, none.model)
+    ranked = selection.score_candidates(hidden, fit, [None], np.random.default_rng(0))
+    own = [one for one in ranked if one.term == term]
+    assert own
+    for size, share in ((0.0, 1.0), (10.0 * amplitude, 0.1)):
+        seen = replace(hidden, usual_size={"air_temperature_offset": size})
+        (contender,) = selection.contest(seen, none, own, np.random.default_rng(0))
+        assert contender.evidence <= share * contender.hypothesis.gain
+        assert contender.evidence > 0.0
+
+
+def test_the_usual_amplitude_is_the_root_mean_square_over_logs_that_show_it_and_those_that_do_not() -> None:
+    logs = [{"lamp_heat": 0.04}, {"lamp_heat": 0.0, "rain_cooling": 4.0}, {}, {"lamp_heat": 0.04}]
+    assert usual.root_mean_squares(logs) == {"lamp_heat": pytest.approx(0.1414, abs=1e-3), "rain_cooling": 1.0}
+
+
+def test_only_a_log_of_a_season_is_asked_for_more_than_seasons_usually_show() -> None:
+    known = usual.installed()
+    assert known.sizes(29) == {}
+    assert set(known.sizes(85)) <= set(EFFECTS)
+    assert known.sizes(85)["structure_shade"] > 0.0

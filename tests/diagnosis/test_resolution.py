@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -11,7 +9,7 @@ from tests.diagnosis.conftest import deployed_model
 from tests.virtual_log import SITE
 from trainer.diagnosis import problem, resolution, runner, selection
 from trainer.diagnosis.problem import Problem
-from trainer.diagnosis.split import Split, split_days
+from trainer.diagnosis.split import split_days
 
 
 def prepared(log: Telemetry, interval: float) -> Problem:
@@ -47,12 +45,3 @@ def test_the_number_of_intervals_follows_their_length(quiet_log: Telemetry) -> N
 @pytest.mark.parametrize(("gains", "middle"), [([1.0, 3.0, 3.0, 3.0, 2.0], 2), ([5.0, 1.0], 0)])
 def test_of_several_equal_beginnings_the_middle_one_is_taken(gains: list[float], middle: int) -> None:
     assert selection.middle_of_best(np.array(gains)) == middle
-
-
-def test_a_longer_log_needs_more_where_the_structure_is_not_right(quiet_log: Telemetry) -> None:
-    hours = replace(
-        prepared(quiet_log, problem.HOUR), split=Split(np.zeros(0, dtype=np.int64), np.ones(85, dtype=bool))
-    )
-    assert selection.structural_growth(hours) == pytest.approx(3.0)
-    assert selection.structural_growth(replace(hours, interval=900.0)) == 1.0
-    assert selection.structural_growth(prepared(quiet_log, problem.HOUR)) == 1.0

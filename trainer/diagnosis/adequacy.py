@@ -13,7 +13,7 @@ import numpy as np
 from trainer.diagnosis import search, selection
 from trainer.diagnosis.drivers import Pattern
 from trainer.diagnosis.likelihood import Profile
-from trainer.diagnosis.problem import Problem
+from trainer.diagnosis.problem import HOUR, Problem
 from trainer.diagnosis.selection import Contender, Hypothesis, Selected
 
 SMALLEST_GAIN = 24.0
@@ -30,6 +30,8 @@ catalogue's leaves traces as large as half of it."""
 FURTHER = 8.0
 """Log-likelihood that each further pattern must add in a log of 28 days."""
 MOST_PATTERNS = 3
+USUAL_DAYS = 28
+"""Length of the logs that gains were fitted on."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ def judge(
         explained: log-likelihood that the names found before, now part of the model, have gained.
         rng: for the flips.
     """
-    growth = selection.structural_growth(problem)
+    growth = _growth(problem)
     fit = search.fit(problem.grams, none.model)
     ranked = selection.score_patterns(problem, fit, selection.onset_days(problem)[::4], rng)
     instead = selection.contest(problem, none, ranked, rng)
@@ -65,6 +67,15 @@ def judge(
             seen = problem.whitened(pattern.profile.whitening)
             return Adequacy(selection.selected(problem, none, None), _patterns(seen, pattern, growth, rng))
     return Adequacy(selection.selected(problem, none, cause), None)
+
+
+def _growth(problem: Problem) -> float:
+    """Return how many times as much as in `USUAL_DAYS` patterns gain from a wrong structure: the same every day.
+
+    Where the structure is right (errors count row by row), nothing grows.
+    """
+    # The first local day is seldom a whole one.
+    return max(1.0, (problem.split.days - 1) / USUAL_DAYS) if problem.interval >= HOUR else 1.0
 
 
 def _steady(one: Hypothesis) -> bool:

@@ -53,8 +53,6 @@ LARGEST_DOUBT = 0.5
 FURTHER_SKILL, FURTHER_DOUBT, FURTHER_GAIN = CLEAR_SKILL, 0.2, 0.15
 """What a second or third cause must show: skill, doubt, and a share of the gain of those before it. The first, bent
 otherwise than the catalogue has it, leaves traces that look like small others."""
-LONG = 1.5
-"""Growth of what a wrong structure gains (`selection.structural_growth`) from which a log is long."""
 LARGEST_REMAINDER = 5.0
 """Bound of the remainder's amplitudes, in units of a pattern."""
 
@@ -192,11 +190,13 @@ def _search(
     be told only after it has been put in.
     """
 
+    known = usual.installed()
+
     def prepared(terms: Sequence[ActiveTerm], interval: float) -> Problem:
-        allowed_for = usual.installed() if interval == problem.HOUR else ()
+        hours = interval == problem.HOUR
         return problem.prepare(
             record, split, deployed.prior, activate(record, terms), site.longitude, deployed.known_misfit,
-            allowed_for, without, interval,
+            known.directions if hours else (), without, interval, known.sizes(split.days) if hours else {},
         )  # fmt: skip
 
     problem_now = prepared(deployed.effects, problem.HOUR)
@@ -271,7 +271,7 @@ def _correct(
                 skill=float(freerun.skill_by_day(before, after).mean()),
             )
         weighed.append(one)
-        if _stands(one, kept, selection.structural_growth(search.problem) > LONG):
+        if _stands(one, kept):
             kept.append(one)
             current = trial
     if search.judged.remainder:
@@ -279,16 +279,12 @@ def _correct(
     return {**stages, "corrected": current}, kept, weighed
 
 
-def _stands(one: Estimated, kept: Sequence[Estimated], long: bool) -> bool:
-    """Tell whether a term is large enough, and holds on unseen days; one beside others must do more.
-
-    In a long log whose structure is not right, a trifle is likely on unseen days too: there the skill must be clear.
-    """
+def _stands(one: Estimated, kept: Sequence[Estimated]) -> bool:
+    """Tell whether a term is large enough, and holds on unseen days; one beside others must do more."""
     if one.effect_to_noise < SMALLEST_ENR:
         return False
     if not kept:
-        likely = one.skill >= SMALLEST_SKILL and one.doubt <= LARGEST_DOUBT
-        return one.skill >= CLEAR_SKILL or (likely and not long)
+        return one.skill >= CLEAR_SKILL or (one.skill >= SMALLEST_SKILL and one.doubt <= LARGEST_DOUBT)
     return (
         one.skill >= FURTHER_SKILL
         and one.doubt <= FURTHER_DOUBT

@@ -30,6 +30,8 @@ class Profile:
     model: Model
     amplitudes: tuple[float, ...]
     """Of the terms."""
+    deviations: tuple[float, ...]
+    """Their standard deviations."""
     whitening: Whitening
     by_day: Floats
     """Log-likelihood of every day, held-out ones too, (days,)."""
@@ -59,15 +61,16 @@ def profile(problem: Problem, model: Model, start: Whitening | None = None) -> P
     whitening = start or problem.whitening
     for _ in range(TURNS):
         products = gram.daily_products(whitening(stack), day, problem.split.days)
-        coefficients = search.fit(DailyGrams(products, problem.split.fit), plain).solution.coefficients
+        fitted = search.fit(DailyGrams(products, problem.split.fit), plain)
+        coefficients = fitted.solution.coefficients
         errors = np.tensordot(np.concatenate([[1.0], coefficients]), stack, axes=1)
         whitening = fit_noise(errors, problem.observed, problem.fitted, whitening)
     likelihood = np.where(problem.observed, innovations.log_likelihood(whitening, errors), 0.0).sum(axis=1)
     by_day = np.zeros(problem.split.days)
     np.add.at(by_day, day, likelihood)
     away = coefficients[:size] + model.shift
-    amplitudes = tuple(float(one) for one in coefficients[size:])
-    return Profile(model, amplitudes, whitening, by_day, 0.5 * float(away @ model.precision @ away))
+    amplitudes, deviations = (tuple(map(float, part)) for part in (fitted.amplitudes, fitted.deviations))
+    return Profile(model, amplitudes, deviations, whitening, by_day, 0.5 * float(away @ model.precision @ away))
 
 
 def gain(problem: Problem, full: Profile, none: Profile) -> float:

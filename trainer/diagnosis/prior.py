@@ -48,14 +48,18 @@ class Prior:
         return moved
 
 
+def drift(name: str, value: float) -> float:
+    """Return the change of a parameter to expect within a season."""
+    return DRIFT * max(abs(value), 0.3 * abs(PARAMETERS[name].value))
+
+
 def from_posterior(mean: Mapping[str, float], standard_deviation: Mapping[str, float]) -> Prior:
     """Return the prior that follows from a deployed posterior."""
     spread = {}
-    for name, definition in PARAMETERS.items():
+    for name in PARAMETERS:
         if name not in mean:
             continue
-        drift = DRIFT * max(abs(mean[name]), 0.3 * abs(definition.value))
-        spread[name] = float(np.hypot(standard_deviation.get(name, 0.0), drift))
+        spread[name] = float(np.hypot(standard_deviation.get(name, 0.0), drift(name, mean[name])))
     return Prior({name: mean.get(name, definition.value) for name, definition in PARAMETERS.items()}, spread)
 
 

@@ -16,10 +16,14 @@ from trainer.diagnosis.drivers import Pattern
 from trainer.diagnosis.gram import DailyGrams
 from trainer.diagnosis.innovations import Whitening
 from trainer.diagnosis.linearisation import Floats, Linearisation
-from trainer.diagnosis.prior import Prior
+from trainer.diagnosis.prior import Prior, drift
 from trainer.diagnosis.split import Split
 
 HOUR = 3600.0
+LONG_DAYS = 42
+"""Days from which on a log is long: crop and season then change within it."""
+SEASON_DAYS = 84.0
+"""Time in which a parameter may drift by `prior.DRIFT` to either side of its mean."""
 ROUNDS = 3
 """Alternations between parameters and the colour of the disturbances."""
 
@@ -54,11 +58,13 @@ class Problem:
     known: range
     """The column of the misfit that the calibration knew already (empty where it is not known)."""
     usual: range
-    """Columns of how greenhouses and weathers usually differ."""
+    """Columns of how greenhouses and weathers usually differ and, in a long log, of how parameters drift."""
     expected: Floats
     """The known and the usual misfits as errors, not whitened, (known + usual, 3, r, steps)."""
     interval: float
     """Seconds over which errors are averaged."""
+    usual_size: Mapping[str, float]
+    """Amplitude, by effect, that a log with nothing missing usually shows."""
 
     @property
     def fitted(self) -> NDArray[np.bool_]:
@@ -139,6 +145,21 @@ def recalibrate(
     return line, whitening, balances
 
 
+def _drifting(columns: Floats, prior: Prior, day: NDArray[np.int64]) -> Floats:
+    """Return d(error)/d(drift) of every parameter, (p, 3, r, steps): linear in time, at the size that it may have.
+
+    Args:
+        columns: d(error)/d(parameter), (p, 3, r, steps).
+        prior: of the parameters.
+        day: of each run, (r,).
+    """
+    middle = 0.5 * (day[0] + day[-1])
+    course = (day - middle) / (0.5 * SEASON_DAYS)
+    size = np.array([drift(name, prior.mean[name]) for name in prior.names])
+    drifting: Floats = columns * size[:, None, None, None] * course[:, None]
+    return drifting
+
+
 def _combined(line: Linearisation, longitude: float, lists: Sequence[Mapping[str, float]]) -> Floats:
     """Return the columns of lists of amplitudes by key, (lists, 3, r, steps)."""
     if not lists:
@@ -183,6 +204,7 @@ def prepare(
     usual: Sequence[Mapping[str, float]] = (),
     without: Collection[str] = (),
     interval: float = HOUR,
+    usual_size: Mapping[str, float] | None = None,
 ) -> Problem:
     """Recalibrate, then linearise everything that may be missing.
 
@@ -196,6 +218,7 @@ def prepare(
         usual: how greenhouses and weathers differ though nothing is missing, each in amplitudes by key (`usual`).
         without: effects that are no candidates.
         interval: seconds over which errors are averaged.
+        usual_size: amplitude, by effect, that a log with nothing missing usually shows.
     """
     runs = linearisation.day_runs(record, split.day)
     line = linearisation.linearise(record, runs, prior.mean, effects)
@@ -205,6 +228,8 @@ def prepare(
     chosen = list(balances)
     observed = counted_intervals(line, balances, interval)
     base = linearisation.parameter_columns(line, prior.names, prior.spread)
+    if split.days > LONG_DAYS:
+        expected = np.concatenate([expected, _drifting(base, prior, runs.day)])
     found = candidates.candidate_columns(line, without)
     names, pattern = drivers.pattern_columns(line, longitude)
     parts = [
@@ -241,6 +266,7 @@ def prepare(
         usual=usually,
         expected=expected,
         interval=interval,
+        usual_size=usual_size or {},
     )
 
 

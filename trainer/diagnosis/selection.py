@@ -21,11 +21,13 @@ CONTENDERS = 8
 CHANCE = 7.0
 """Log-likelihood that chance and searching bring at most."""
 STRUCTURE = 15.0
-"""The same with what a wrong structure brings in a log of `USUAL_DAYS` (tuning logs with nothing hidden)."""
-USUAL_DAYS = 28
-"""Length of the logs that thresholds were fitted on."""
+"""The same with what a wrong structure brings in a log of four weeks (tuning logs with nothing hidden)."""
+BEYOND_USUAL = 9.0
+"""What must be left of it when the usual size of an effect is allowed for."""
 LARGEST_P_VALUE = 0.005
 """Of the day-block max-T test, the price of searching paid."""
+BEYOND = 1.5
+"""How far, as a multiple, a linear fit may go beyond a bound: the truth may stand at it."""
 ONSET_PRICE = 9.0
 """Log-likelihood that a beginning within the log must add over an effect that was always there."""
 FIRST_ONSET_DAYS = 3
@@ -57,6 +59,8 @@ class Contender:
 
     hypothesis: Hypothesis
     """Its gain is that of the profile likelihood."""
+    evidence: float
+    """The gain that is left when its usual size in logs with nothing missing is allowed for, less an onset's price."""
     profile: Profile
     doubt: float
     """Probability that unseen days are not likelier with it."""
@@ -73,21 +77,6 @@ class Selected:
     named: Fit
     """The model with the cause, or that without where there is none."""
     cause: Contender | None
-
-
-def structural_growth(problem: Problem) -> float:
-    """Return how many times as much log-likelihood as in `USUAL_DAYS` a wrong structure brings in this log.
-
-    Chance brings no more in a longer log; what the balances lack brings as much every day. Where the structure is
-    right (errors count row by row), nothing grows.
-    """
-    # The first local day is seldom a whole one.
-    return max(1.0, (problem.split.days - 1) / USUAL_DAYS) if problem.interval >= HOUR else 1.0
-
-
-def needed_gain(problem: Problem) -> float:
-    """Return the log-likelihood below which a cause is none."""
-    return STRUCTURE * structural_growth(problem) if problem.interval >= HOUR else CHANCE
 
 
 def onset_days(problem: Problem) -> list[int | None]:
@@ -161,9 +150,12 @@ def contest(problem: Problem, none: Profile, ranked: Sequence[Hypothesis], rng: 
     contenders = []
     for one in passed[:CONTENDERS]:
         own = likelihood.profile(problem, none.model.with_term(one.term), none.whitening)
+        gain = likelihood.gain(problem, own, none)
         price = 0.0 if one.term.onset is None else ONSET_PRICE
-        gain = likelihood.gain(problem, own, none) - price
-        contenders.append(Contender(replace(one, gain=gain), own, likelihood.doubt(problem, own, none, rng)))
+        # With a normal prior of the usual size on the amplitude, so much of the gain is beyond the usual.
+        beyond = 1.0 / (1.0 + (problem.usual_size.get(one.effect, 0.0) / own.deviations[-1]) ** 2)
+        doubt = likelihood.doubt(problem, own, none, rng)
+        contenders.append(Contender(replace(one, gain=gain - price), gain * beyond - price, own, doubt))
     return sorted(contenders, key=lambda one: -one.hypothesis.gain)
 
 
@@ -177,9 +169,8 @@ def best_cause(problem: Problem, none: Profile, rng: np.random.Generator) -> Con
     """
     fit = search.fit(problem.grams, none.model)
     ranked = score_candidates(problem, fit, onset_days(problem), rng)
-    needed = needed_gain(problem)
     for one in contest(problem, none, ranked, rng):
-        if one.hypothesis.gain >= needed and _within_bounds(one):
+        if _suffices(problem, one) and _within_bounds(one):
             return one
     return None
 
@@ -193,7 +184,14 @@ def selected(problem: Problem, none: Profile, cause: Contender | None) -> Select
     return Selected(seen, search.fit(seen.grams, none.model), search.fit(seen.grams, cause.profile.model), cause)
 
 
+def _suffices(problem: Problem, contender: Contender) -> bool:
+    """Tell whether a cause gains more than chance does and, where errors count by hours, than a wrong structure."""
+    if problem.interval < HOUR:
+        return contender.hypothesis.gain >= CHANCE
+    return contender.hypothesis.gain >= STRUCTURE and contender.evidence >= BEYOND_USUAL
+
+
 def _within_bounds(contender: Contender) -> bool:
     bounds = EFFECTS[contender.hypothesis.effect].amplitude
     (amplitude,) = contender.profile.amplitudes
-    return bounds.low <= amplitude <= bounds.high and (bounds.low < 0.0 or amplitude > 0.0)
+    return BEYOND * bounds.low <= amplitude <= BEYOND * bounds.high and (bounds.low < 0.0 or amplitude > 0.0)

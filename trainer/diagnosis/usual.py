@@ -4,44 +4,71 @@ A greenhouse whose parameters lie 8 % from the calibrated one's, under another w
 like small effects: a humidity offset here, a little air exchange there. What such traces look like is learned once
 from logs of the mechanistic greenhouse with nothing hidden in them: the misfit of each log as one list of
 amplitudes, and of all lists the few directions that hold most of their scatter. A diagnosis lets each direction
-explain what it can, at the size it usually has, before it looks for a cause.
+explain what it can, at the size it usually has, before it looks for a cause. What is still fitted of each effect then
+is learned too from logs of a season, over which a wrong structure can be told from chance: the size beyond which an
+effect counts as evidence there.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 
-from trainer.diagnosis import structure
+from trainer.diagnosis import likelihood, search, selection, structure
 from trainer.diagnosis.candidates import Candidate
 from trainer.diagnosis.drivers import Pattern
-from trainer.diagnosis.problem import Problem, candidate_key, pattern_key
+from trainer.diagnosis.problem import LONG_DAYS, Problem, candidate_key, pattern_key
 
 FILE = "usual_misfit.json"
 DIRECTIONS = 16
+TRIFLE = 1.0
+"""Log-likelihood that an effect must gain in a scan to be fitted beside its own noise."""
 
 
-def directions(problems: Sequence[Problem], count: int = DIRECTIONS) -> list[dict[str, float]]:
-    """Return the directions of the misfits of logs for which nothing is missing, each at its usual size.
+@dataclass(frozen=True)
+class Usual:
+    """What is usual though nothing is missing."""
 
-    Args:
-        problems: prepared with the known misfit of their calibration, without usual ones.
-        count: of directions.
-    """
-    lists = []
-    traces = []
-    for problem in problems:
-        null = structure.null_model(problem)
-        lists.append(structure.amplitudes(problem, null.base))
-        traces.append(_size(problem))
-    keys = sorted({key for one in lists for key in one})
-    unit = {key: value for sizes in traces for key, value in sizes.items()}
+    directions: tuple[Mapping[str, float], ...]
+    """Each in amplitudes by key (`structure`), at its usual size."""
+    season: Mapping[str, float]
+    """Root mean square amplitude, by effect, that a log of twelve weeks shows beyond its deviation."""
+
+    def sizes(self, days: int) -> Mapping[str, float]:
+        """Return the usual amplitudes by effect in a log of so many days.
+
+        In one that is not long they are too small to matter beside chance.
+        """
+        return self.season if days > LONG_DAYS else {}
+
+
+@dataclass(frozen=True)
+class Traces:
+    """What a log with nothing missing looks like in amplitudes."""
+
+    amplitudes: Mapping[str, float]
+    """Of all candidates and patterns together, by key."""
+    sizes: Mapping[str, float]
+    """How much one unit of each moves the innovations, by key."""
+
+
+def traces(problem: Problem) -> Traces:
+    """Return the traces of a log, prepared with the known misfit of its calibration, without usual directions."""
+    return Traces(structure.amplitudes(problem, structure.null_model(problem).base), _size(problem))
+
+
+def directions(logs: Sequence[Traces], count: int = DIRECTIONS) -> list[dict[str, float]]:
+    """Return the directions of the traces of logs for which nothing is missing, each at its usual size."""
+    keys = sorted({key for one in logs for key in one.amplitudes})
+    unit = {key: value for one in logs for key, value in one.sizes.items()}
     scale = np.array([unit[key] for key in keys])
-    table = np.array([[one.get(key, 0.0) for key in keys] for one in lists]) * scale
+    table = np.array([[one.amplitudes.get(key, 0.0) for key in keys] for one in logs]) * scale
     _, sizes, axes = np.linalg.svd(table / np.sqrt(len(table)), full_matrices=False)
     return [
         {key: float(f"{value:.3g}") for key, value in zip(keys, size * axis / scale, strict=True) if value != 0.0}
@@ -64,8 +91,36 @@ def _size(problem: Problem) -> dict[str, float]:
     }
 
 
+def amplitudes(problem: Problem) -> dict[str, float]:
+    """Return the squared amplitude, less its variance, of every effect that a log shows alone, by effect.
+
+    Args:
+        problem: of a log for which nothing is missing, prepared with the usual directions.
+    """
+    none = likelihood.profile(problem, structure.null_model(problem))
+    fit = search.fit(problem.grams, none.model)
+    found = {}
+    for one in selection.score_candidates(problem, fit, [None], np.random.default_rng(0)):
+        if one.gain >= TRIFLE:
+            own = likelihood.profile(problem, none.model.with_term(one.term), none.whitening)
+            found[one.effect] = max(0.0, own.amplitudes[-1] ** 2 - own.deviations[-1] ** 2)
+    return found
+
+
+def root_mean_squares(logs: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    """Return the usual amplitude of every effect, from `amplitudes` of several logs."""
+    names = sorted({name for one in logs for name in one})
+    return {name: float(f"{np.sqrt(np.mean([one.get(name, 0.0) for one in logs])):.3g}") for name in names}
+
+
 @cache
-def installed() -> tuple[Mapping[str, float], ...]:
-    """Return the directions that are installed with the trainer."""
+def installed() -> Usual:
+    """Return what is installed with the trainer."""
     text = files("trainer.diagnosis").joinpath(FILE).read_text(encoding="utf-8")
-    return tuple(json.loads(text))
+    known = json.loads(text)
+    return Usual(tuple(known["directions"]), known["season"])
+
+
+def write(path: Path, usual: Usual) -> None:
+    """Write what is to be installed."""
+    path.write_text(json.dumps(asdict(usual)) + "\n", encoding="utf-8")
