@@ -50,9 +50,12 @@ CLEAR_SKILL = 0.03
 """A cause that removes so much needs no other proof on unseen days."""
 LARGEST_DOUBT = 0.5
 """Else the largest bootstrap probability that unseen days are not likelier with it."""
-FURTHER_SKILL, FURTHER_DOUBT, FURTHER_GAIN = CLEAR_SKILL, 0.2, 0.15
+FURTHER_SKILL, FURTHER_DOUBT, FURTHER_GAIN = CLEAR_SKILL, 0.2, 0.2
 """What a second or third cause must show: skill, doubt, and a share of the gain of those before it. The first, bent
 otherwise than the catalogue has it, leaves traces that look like small others."""
+REGIMES = (("day", "night"), ("calm", "windy"), ("vents shut", "vents open"), ("first half", "second half"))
+REGIME_SHARE = 0.25
+"""A cause's size in one regime must be at least so much of that in the other: else it is another cause's trace."""
 LARGEST_REMAINDER = 5.0
 """Bound of the remainder's amplitudes, in units of a pattern."""
 
@@ -281,7 +284,7 @@ def _correct(
 
 def _stands(one: Estimated, kept: Sequence[Estimated]) -> bool:
     """Tell whether a term is large enough, and holds on unseen days; one beside others must do more."""
-    if one.effect_to_noise < SMALLEST_ENR:
+    if one.effect_to_noise < SMALLEST_ENR or not _same_in_all_regimes(one):
         return False
     if not kept:
         return one.skill >= CLEAR_SKILL or (one.skill >= SMALLEST_SKILL and one.doubt <= LARGEST_DOUBT)
@@ -290,6 +293,17 @@ def _stands(one: Estimated, kept: Sequence[Estimated]) -> bool:
         and one.doubt <= FURTHER_DOUBT
         and one.gain >= FURTHER_GAIN * sum(other.gain for other in kept)
     )
+
+
+def _same_in_all_regimes(one: Estimated) -> bool:
+    """Tell whether a term's size is about the same by day and by night, in calm and in wind, and so on.
+
+    A regime in which the effect hardly shows has no size of its own.
+    """
+    pairs = (
+        [one.regimes[name].value for name in pair] for pair in REGIMES if all(name in one.regimes for name in pair)
+    )
+    return all(min(a / b, b / a) >= REGIME_SHARE if a * b > 0.0 else False for a, b in pairs)
 
 
 def _with_remainder(
