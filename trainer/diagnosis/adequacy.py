@@ -16,13 +16,13 @@ from trainer.diagnosis.likelihood import Profile
 from trainer.diagnosis.problem import HOUR, Problem
 from trainer.diagnosis.selection import Contender, Hypothesis, Selected
 
-SMALLEST_GAIN = 24.0
+SMALLEST_GAIN = 30.0
 """Log-likelihood below which a pattern is no cause in a log of 28 days: a wrong structure makes as much."""
 STEADY = 2.0
 """Times as much is asked of a pattern of the clock alone: a wrong model looks like one that is always there."""
 LARGEST_DOUBT = 0.5
 """Bootstrap probability that unseen days are not likelier with a pattern: one that lives on two Sundays fits them."""
-BETTER = 1.6
+BETTER = 2.2
 """A pattern that gains so many times what the name gains replaces it."""
 LEFT = 1.0
 """Share of the gain of the names found before that a pattern must add beside them: a form that is not quite the
