@@ -29,7 +29,7 @@ from trainer.diagnosis.linearisation import STEP
 
 Floats = NDArray[np.float64]
 
-SEASON, DAYS, SEED = "winter", 28, 11500
+SEASON, DAYS, SEED = "winter", 28, 9500
 NOTHING = 40
 SIZES = (1.0, 0.3)
 HEAT, VAPOUR, CO2, CORRELATION_HOURS = 4.0, 4.0, 0.25, 2.0
