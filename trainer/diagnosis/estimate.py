@@ -23,9 +23,9 @@ INFLATION = 1.3
 FORM_DOUBT = 0.3
 """Relative standard deviation of an amplitude beside it: the truth is not quite of the catalogue's form, nor is the
 simulator's response quite the greenhouse's (fitted on tuning cases)."""
-RIVAL_GAIN = 4.0
+RIVAL_GAIN = 6.0
 """Log-likelihood within which a rival fits as well."""
-RIVAL_SHARE = 0.15
+RIVAL_SHARE = 0.25
 """The same as a share of the term's own gain, for large effects: the truth is never quite of the catalogue's form."""
 
 
