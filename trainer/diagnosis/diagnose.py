@@ -44,7 +44,7 @@ MOST_CAUSES = 3
 SMALLEST_ENR = 0.15
 """A cause that moves a 24 h forecast by less is not worth a name."""
 SMALLEST_SKILL = 0.01
-"""Share of the squared error of plain free runs on unseen days that a cause must remove, mean over quantities. It is small,
+"""Share of the squared error of plain free runs on unseen days that a cause must remove, mean over quantities: little,
 since a recalibration can hide much of a cause."""
 CLEAR_SKILL = 0.03
 """A cause that removes so much needs no other proof on unseen days."""
