@@ -30,7 +30,7 @@ def ideal_errors(out: Path, effect: str) -> dict[str, float]:
     shape = {one.name: one.typical for one in EFFECTS[truth.name].shapes}
     terms = (ActiveTerm(truth.name, size, shape, truth.start),)
     record, split = evidence.record, evidence.split
-    fitted = freefit.fit(record, evidence.problem.line.runs, split, evidence.knowledge, activate(record, terms))
+    fitted = freefit.fit(record, evidence.first.problem.line.runs, split, evidence.knowledge, activate(record, terms))
     runs = Stage(*fitted, terms).runs(record, split)
     if runs is None:
         return {}
