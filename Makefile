@@ -27,6 +27,7 @@ lint: $(STAMP) ## Run ruff and strict mypy.
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	MYPYPATH=config/demo $(BIN)/mypy config/demo
 
 format: $(STAMP) ## Format the code.
 	$(BIN)/ruff format .

@@ -150,8 +150,8 @@ def table(result: dict[str, Any]) -> str:
     for name, horizons in result["held_out_errors"].items():
         row = horizons.get("24_h")
         if row:
-            cells = "".join(f"{row[stage]:14.3f}" for stage in ("deployed", "recalibrated", "corrected"))
-            lines.append(f"  {name:31}{cells}{ideal.get(name, float('nan')):13.3f}   {row['unit']}")
+            stages = "".join(f"{row[stage]:14.3f}" for stage in ("deployed", "recalibrated", "corrected"))
+            lines.append(f"  {name:31}{stages}{ideal.get(name, float('nan')):13.3f}   {row['unit']}")
     lines += ["", "live error of the daemon, 24 h      first bundle   first bundle   bundle in force"]
     lines.append(f"{'':34}before         after it       after adoption")
     for name, row in result["live_error_24_h"].items():
