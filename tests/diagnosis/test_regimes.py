@@ -2,8 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from trainer.diagnosis.diagnose import _same_in_all_regimes
-from trainer.diagnosis.estimate import Estimated
+from trainer.diagnosis.diagnose import same_in_all_regimes
 from trainer.diagnosis.result import Interval
 
 
@@ -21,5 +20,4 @@ from trainer.diagnosis.result import Interval
 )
 def test_a_cause_is_the_same_by_day_and_by_night_in_calm_and_in_wind(values: dict[str, float], same: bool) -> None:
     regimes = {name: Interval(value, value - 0.1, value + 0.1, "1") for name, value in values.items()}
-    one = Estimated(None, None, None, 20.0, None, ("lamp_heat",), regimes=regimes)  # type: ignore[arg-type]
-    assert _same_in_all_regimes(one) is same
+    assert same_in_all_regimes(regimes) is same

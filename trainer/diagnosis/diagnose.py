@@ -35,7 +35,7 @@ from trainer.diagnosis.freerun import Runs
 from trainer.diagnosis.linearisation import Floats
 from trainer.diagnosis.prior import Prior
 from trainer.diagnosis.problem import Problem
-from trainer.diagnosis.result import HORIZONS, Diagnosis, Finding, Verdict
+from trainer.diagnosis.result import HORIZONS, Diagnosis, Finding, Interval, Verdict
 from trainer.diagnosis.selection import Selected
 from trainer.diagnosis.split import Split, split_days
 
@@ -284,7 +284,7 @@ def _correct(
 
 def _stands(one: Estimated, kept: Sequence[Estimated]) -> bool:
     """Tell whether a term is large enough, and holds on unseen days; one beside others must do more."""
-    if one.effect_to_noise < SMALLEST_ENR or not _same_in_all_regimes(one):
+    if one.effect_to_noise < SMALLEST_ENR or not same_in_all_regimes(one.regimes):
         return False
     if not kept:
         return one.skill >= CLEAR_SKILL or (one.skill >= SMALLEST_SKILL and one.doubt <= LARGEST_DOUBT)
@@ -295,15 +295,13 @@ def _stands(one: Estimated, kept: Sequence[Estimated]) -> bool:
     )
 
 
-def _same_in_all_regimes(one: Estimated) -> bool:
+def same_in_all_regimes(regimes: Mapping[str, Interval]) -> bool:
     """Tell whether a term's size is about the same by day and by night, in calm and in wind, and so on.
 
     A regime in which the effect hardly shows has no size of its own.
     """
-    pairs = (
-        [one.regimes[name].value for name in pair] for pair in REGIMES if all(name in one.regimes for name in pair)
-    )
-    return all(min(a / b, b / a) >= REGIME_SHARE if a * b > 0.0 else False for a, b in pairs)
+    pairs = ([regimes[name].value for name in pair] for pair in REGIMES if all(name in regimes for name in pair))
+    return all(a * b > 0.0 and min(a / b, b / a) >= REGIME_SHARE for a, b in pairs)
 
 
 def _with_remainder(
