@@ -43,8 +43,8 @@ class Usual:
     def sizes(self, days: int) -> Mapping[str, float]:
         """Return the usual amplitudes by effect in a log of so many days.
 
-        In one that is not long the gain that is asked of every cause covers them; allowed for beside it, they hid shades
-        and beginnings.
+        In one that is not long the gain that is asked of every cause covers them; allowed for beside it, they hid
+        shades and beginnings.
         """
         return self.season if days > LONG_DAYS else {}
 
