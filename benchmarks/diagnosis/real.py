@@ -11,6 +11,7 @@ put in the place of the true ones, must not be found.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -81,7 +82,7 @@ def deploy(log: Telemetry, site: Site) -> Deployed:
 
 def say(title: str, diagnosis: Diagnosis) -> None:
     causes = ", ".join(f"{one.effect} ({'/'.join(one.rivals)})" for one in diagnosis.findings) or "-"
-    print(f"{title:72} {diagnosis.verdict:12} {causes}")
+    print(f"{title:72} {diagnosis.verdict:12} {causes}", flush=True)
     for quantity, horizons in diagnosis.errors.items():
         if "24_h" in horizons:
             stages = "  ".join(f"{stage} {value:.3g}" for stage, value in horizons["24_h"].items())
@@ -112,6 +113,7 @@ def main(data: Path | None) -> int:
         return 2
     found: dict[str, set[str]] = {}
     for one in compartments(data):
+        print(f"calibrating {one.name} on {CALIBRATION_DAYS} days", file=sys.stderr)
         model = deploy(one.before, one.site)
         diagnosis, _ = diagnose(one.after, one.site, model)
         say(one.name, diagnosis)

@@ -30,7 +30,7 @@ from trainer.diagnosis.activation import ActiveTerm, activate
 from trainer.diagnosis.adequacy import Adequacy, judge
 from trainer.diagnosis.deployed import Deployed
 from trainer.diagnosis.drivers import Pattern, pattern_fluxes
-from trainer.diagnosis.estimate import Estimated, estimate, with_refined
+from trainer.diagnosis.estimate import Estimated, estimate, with_refined, within_bounds
 from trainer.diagnosis.freerun import Runs
 from trainer.diagnosis.linearisation import Floats
 from trainer.diagnosis.prior import Prior
@@ -230,10 +230,10 @@ def _refined(selected: Selected, estimated: list[Estimated], deployed: Deployed)
         with np.errstate(over="ignore", invalid="ignore"):
             found = refine.refine(selected.problem, selected.named, [one.term for one in estimated], deployed.effects)
     except (ValueError, np.linalg.LinAlgError):
+        found = []
+    if not found or not all(np.isfinite(one.term.amplitude) and np.isfinite(one.deviation) for one in found):
         # Undamped steps can run away from a poor start; the terms then stay as the search found them.
-        return estimated
-    if not all(np.isfinite(one.term.amplitude) and np.isfinite(one.deviation) for one in found):
-        return estimated
+        return [within_bounds(one) for one in estimated]
     better = [with_refined(one, two) for one, two in zip(estimated, found, strict=True)]
     return better if all(one.term.amplitude != 0.0 for one in better) and _inside(better[1:]) else []
 

@@ -99,6 +99,14 @@ def with_refined(one: Estimated, refined: Refined) -> Estimated:
     return replace(one, term=refined.term, amplitude=interval, shapes=shapes, regimes=regimes)
 
 
+def within_bounds(one: Estimated) -> Estimated:
+    """Return the term with its size brought to the nearest bound, if it lies beyond."""
+    bounds = EFFECTS[one.effect].amplitude
+    size = float(np.clip(one.term.amplitude, bounds.low, bounds.high))
+    interval = replace(one.amplitude, value=size, low=min(one.amplitude.low, size), high=max(one.amplitude.high, size))
+    return replace(one, term=replace(one.term, amplitude=size), amplitude=interval)
+
+
 def rivals(
     problem: Problem,
     reduced: Fit,
