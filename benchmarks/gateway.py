@@ -18,15 +18,16 @@ import tempfile
 import time
 from pathlib import Path
 
+from igrow_core.bundle import default_bundle_folder
+
 ROOT = Path(__file__).resolve().parents[1]
-DEFAULT_BUNDLE = ROOT / "igrow_core" / "default_bundle"
 MEMORY_GOAL, START_GOAL = 150.0, 3.0
 
 
 class Site:
     """A virtual PLC and a daemon's configuration in a folder."""
 
-    def __init__(self, folder: Path, *, pace: str, clock: str, interval: str, bundle: Path | None) -> None:
+    def __init__(self, folder: Path, *, pace: str, clock: str, interval: str, bundle: Path) -> None:
         self.folder = folder
         self.environment = {
             **os.environ,
@@ -46,8 +47,7 @@ class Site:
         self.configuration = folder / "daemon.yaml"
         self.configuration.write_text(
             f"site: {ROOT / 'config' / 'site.yaml'}\nregister_map: map.yaml\nstate: state\nexchange: exchange\n"
-            + ("" if bundle is None else f"bundle: {bundle}\n")
-            + f"cycle:\n  interval: {interval}\n  clock: {clock}\nstatus:\n  port: 0\n"
+            f"bundle: {bundle}\ncycle:\n  interval: {interval}\n  clock: {clock}\nstatus:\n  port: 0\n"
         )
 
     def start(self) -> subprocess.Popen[bytes]:
@@ -84,7 +84,7 @@ def processor_seconds(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def time_to_first_cycle(bundle: Path | None, starts: int) -> list[tuple[float, float]]:
+def time_to_first_cycle(bundle: Path, starts: int) -> list[tuple[float, float]]:
     """Return the seconds, by the clock and of processor, from a start to the first cycle with a PLC that answers."""
     found = []
     with tempfile.TemporaryDirectory() as text:
@@ -107,7 +107,7 @@ def time_to_first_cycle(bundle: Path | None, starts: int) -> list[tuple[float, f
     return found[1:]  # the first compiles the programs and unpacks the bundle
 
 
-def memory_in_service(bundle: Path | None, days: float) -> tuple[float, float, list[float], str]:
+def memory_in_service(bundle: Path, days: float) -> tuple[float, float, list[float], str]:
     """Return resident and unshared MB after some days of plant time, those of other processes, and the bundle."""
     with tempfile.TemporaryDirectory() as text:
         site = Site(Path(text), pace="lockstep=300", clock="lockstep", interval="5 min", bundle=bundle)
@@ -137,7 +137,7 @@ def memory_in_service(bundle: Path | None, days: float) -> tuple[float, float, l
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--bundle", type=Path, default=DEFAULT_BUNDLE if DEFAULT_BUNDLE.exists() else None)
+    parser.add_argument("--bundle", type=Path, default=default_bundle_folder())
     parser.add_argument("--starts", type=int, default=5, help="starts to time")
     parser.add_argument("--days", type=float, default=3.0, help="days of plant time before memory is read")
     options = parser.parse_args()

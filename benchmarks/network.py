@@ -20,10 +20,11 @@ from typing import Any
 
 import numpy as np
 import onnx
-import onnxruntime
 import torch
 from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
+
+from igrow_core.bundle import new_session
 
 Weights = list[tuple[NDArray[np.float32], NDArray[np.float32]]]
 
@@ -121,7 +122,7 @@ def torch_rate(setting: Setting) -> float:
         return rate(day, setting.candidates * HOURS)
 
 
-def graph(seed: int, hours: int, with_yield: bool) -> onnxruntime.InferenceSession:
+def graph(seed: int, hours: int, with_yield: bool) -> Any:
     """The networks over `hours` in one graph: drivers (hours, n, 10), state (n, 7) -> state."""
     nodes: list[onnx.NodeProto] = []
     constants = [numpy_helper.from_array(np.array(hour), f"hour{hour}") for hour in range(hours)]
@@ -170,9 +171,7 @@ def graph(seed: int, hours: int, with_yield: bool) -> onnxruntime.InferenceSessi
         ),
         opset_imports=[helper.make_opsetid("", 18)], ir_version=9,
     )  # fmt: skip
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = options.inter_op_num_threads = 1
-    return onnxruntime.InferenceSession(model.SerializeToString(), options, providers=["CPUExecutionProvider"])
+    return new_session(model.SerializeToString())
 
 
 def hourly_session_rate(setting: Setting) -> float:

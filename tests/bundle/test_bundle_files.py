@@ -14,6 +14,7 @@ from igrow_core.bundle import (
     Bundle,
     BundleError,
     Golden,
+    default_bundle_folder,
     manifest_from_json,
     manifest_to_json,
     read_bundle,
@@ -21,8 +22,6 @@ from igrow_core.bundle import (
     self_test,
     write_bundle,
 )
-
-DEFAULT_BUNDLE = Path(__file__).resolve().parents[2] / "igrow_core" / "default_bundle"
 
 
 def test_a_bundle_is_read_back_as_it_was_written(tmp_path: Path) -> None:
@@ -98,7 +97,7 @@ def test_a_graph_that_the_manifest_leaves_out_fails_the_self_test(tmp_path: Path
 
 
 def test_the_default_bundle_passes_with_all_its_graphs() -> None:
-    tested = {deviation.graph for deviation in self_test(read_bundle(DEFAULT_BUNDLE))}
+    tested = {deviation.graph for deviation in self_test(read_bundle(default_bundle_folder()))}
     assert tested == {"simulator", "hindcast", "optimizer"}
 
 

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-import igrow_core
-from igrow_core.bundle import Bundle, read_bundle
+from igrow_core.bundle import Bundle, default_bundle_folder, read_bundle
 from igrow_core.simulator.plan import BundleSimulator
 from igrow_core.site import Greenhouse
 
@@ -20,8 +18,7 @@ WARM = np.tile([20.0, 400.0, 0.0, 0.0], (1, 24, 1))
 
 @pytest.fixture(scope="module")
 def bundle() -> Bundle:
-    folder = Path(igrow_core.__file__).parent / "default_bundle"
-    return read_bundle(folder)
+    return read_bundle(default_bundle_folder())
 
 
 def heat(bundle: Bundle, greenhouse: Greenhouse) -> np.ndarray:
