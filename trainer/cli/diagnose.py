@@ -9,11 +9,11 @@ import sys
 from datetime import UTC, datetime
 from pathlib import Path
 
-from igrow_core.bundle import Bundle, read_bundle
+from igrow_core.bundle import Bundle, default_bundle_folder, read_bundle
 from igrow_core.errors import IgrowError
 from igrow_core.site import Site, load_site
 from trainer.diagnosis.correction import corrected_model
-from trainer.diagnosis.deployed import Deployed, from_manifest, from_site
+from trainer.diagnosis.deployed import Deployed, from_manifest
 from trainer.diagnosis.diagnose import Evidence, diagnose
 from trainer.diagnosis.result import Diagnosis
 from trainer.export.bundle import write_hybrid_bundle
@@ -25,9 +25,7 @@ EXAMPLE = "igrow-trainer diagnose logs/ --bundle bundle/ --site site.yaml --out 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument("log", nargs="+", type=Path, metavar="LOG", help="telemetry: CSV, Parquet, or a folder of them")
-    parser.add_argument(
-        "--bundle", type=Path, help="the bundle in force (without: the model of the site's description)"
-    )
+    parser.add_argument("--bundle", type=Path, help="the bundle in force (default: the built-in one)")
     parser.add_argument("--site", type=Path, help="the site's YAML file; a known data set brings its own")
     parser.add_argument("--compartment", help="its name, where a data set has several")
     parser.add_argument("--out", type=Path, required=True, help="folder for diagnosis.json, report.html and the bundle")
@@ -46,11 +44,11 @@ def run(arguments: argparse.Namespace) -> int:
         raise IgrowError("this log does not tell its greenhouse: give the site file with --site")
     site = load_site(arguments.site) if arguments.site is not None else log.site
     assert site is not None
-    bundle = read_bundle(arguments.bundle) if arguments.bundle is not None else None
-    deployed = from_manifest(bundle.manifest) if bundle is not None else from_site(site)
+    bundle = read_bundle(arguments.bundle or default_bundle_folder())
+    deployed = from_manifest(bundle.manifest)
     diagnosis, evidence = diagnose(log.telemetry, site, deployed, without=arguments.without, seed=arguments.seed)
     write(arguments.out, diagnosis, evidence, deployed)
-    if bundle is not None and evidence is not None and diagnosis.findings:
+    if evidence is not None and diagnosis.findings:
         write_corrected(arguments.out / "bundle", bundle, site, diagnosis, evidence)
     print(summary(diagnosis))
     print(f"written to {arguments.out}", file=sys.stderr)
