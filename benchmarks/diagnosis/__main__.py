@@ -1,7 +1,8 @@
-"""Print the diagnosis benchmark: `python -m benchmarks.diagnosis [scoring|tuning|matched|usual|real DATA]`.
+"""Print the diagnosis benchmark: `python -m benchmarks.diagnosis [scoring|tuning|elsewhere|matched|usual|real DATA]`.
 
 `scoring` (the default) draws 208 cases, simulates their logs and those that the models are calibrated on, diagnoses
-each, and prints the table beside its bounds. `matched` does the like with greenhouses of the simulator's own
+each, and prints the table beside its bounds. `elsewhere` does the same with greenhouses that nothing was learned from
+(take 52 cases or so). `matched` does the like with greenhouses of the simulator's own
 structure. `usual` learns anew what is usual between greenhouses, from seeds that
 no case has. Everything is made afresh: an hour or so on two cores.
 """
@@ -17,9 +18,13 @@ from pathlib import Path
 
 from benchmarks.diagnosis import matched, real, usual
 from benchmarks.diagnosis.cases import SEASONS, Case, draw
+from benchmarks.diagnosis.houses import elsewhere, of_seasons
 from benchmarks.diagnosis.logs import Reference, reference, simulate_cases
 from benchmarks.diagnosis.scoring import Outcome, judge, show, table
 from igrow_core.telemetry import Telemetry
+
+WHAT = ("scoring", "tuning", "elsewhere", "matched", "usual", "real")
+HOUSES_ELSEWHERE = 8
 
 
 def _judge(job: tuple[Case, Telemetry, Reference]) -> Outcome:
@@ -28,7 +33,7 @@ def _judge(job: tuple[Case, Telemetry, Reference]) -> Outcome:
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.diagnosis", description=__doc__)
-    parser.add_argument("what", nargs="?", default="scoring", choices=("scoring", "tuning", "matched", "usual", "real"))
+    parser.add_argument("what", nargs="?", default="scoring", choices=WHAT)
     parser.add_argument("data", nargs="?", type=Path, help="folder of the public data sets, for `real`")
     parser.add_argument("--cases", type=int, default=208)
     parser.add_argument("--days", type=int, default=28)
@@ -43,20 +48,21 @@ def main() -> int:
         return matched.main(options.processes)
     if options.what == "usual":
         return usual.main(options.processes)
-    seasons = options.season or ["winter", "spring"]
+    away = options.what == "elsewhere"
+    houses = elsewhere(HOUSES_ELSEWHERE) if away else of_seasons()
+    seasons = list(houses) if away else options.season or ["winter", "spring"]
     outcomes: list[Outcome] = []
     with ProcessPoolExecutor(options.processes) as pool:
         print(f"calibrating on the reference logs of {', '.join(seasons)}", file=sys.stderr)
-        references = dict(zip(seasons, pool.map(reference, seasons), strict=True))
+        references = dict(zip(seasons, pool.map(reference, [houses[season] for season in seasons]), strict=True))
         units = {season: one.unit for season, one in references.items()}
-        cases = draw(options.what, options.cases, units, options.seed)
+        cases = draw("scoring" if away else options.what, options.cases, units, options.seed)
         own = {season: [case for case in cases if case.season == season] for season in seasons}
         print(f"simulating {len(cases)} logs", file=sys.stderr)
         simulated = pool.map(
             simulate_cases,
-            seasons,
+            [references[season] for season in seasons],
             own.values(),
-            [references[season].unit for season in seasons],
             [options.days] * len(seasons),
         )
         jobs = [
@@ -71,7 +77,7 @@ def main() -> int:
             print(f"{number} of {len(jobs)}: {said}", file=sys.stderr)
     if options.json:
         options.json.write_text("".join(json.dumps(asdict(one)) + "\n" for one in outcomes), encoding="utf-8")
-    print(f"{len(outcomes)} cases, {options.days} days, seeds of {options.what}")
+    print(f"{len(outcomes)} cases, {options.days} days, {options.what}")
     print(show(table(outcomes)))
     return 0
 

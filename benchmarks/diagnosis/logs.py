@@ -7,21 +7,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.diagnosis.cases import SEASONS, Case, hidden
+from benchmarks.diagnosis.cases import Case, hidden
+from benchmarks.diagnosis.houses import House
 from igrow_core.effects import EFFECTS
-from igrow_core.greenhouse import Disturbances, GreenhouseParameters, generate_weather, recipe, simulate_many
+from igrow_core.greenhouse import Disturbances, generate_weather, recipe, simulate_many
 from igrow_core.greenhouse.uncatalogued import UNCATALOGUED
 from igrow_core.simulator.hybrid.nominal import nominal
 from igrow_core.simulator.hybrid.record import Record
-from igrow_core.site import Greenhouse, Site
+from igrow_core.site import Site
 from igrow_core.telemetry import Telemetry
 from trainer.calibration import calibrate, prior
 from trainer.diagnosis import freerun, linearisation, split
-from trainer.diagnosis.deployed import Deployed, from_posterior, learn_misfit
+from trainer.diagnosis.deployed import Deployed, from_posterior, from_site, learn_misfit
 from trainer.diagnosis.linearisation import unit_fluxes
 from trainer.diagnosis.runner import open_record
 
-SITE = Site(name="benchmark", latitude=52.0, longitude=4.5, greenhouse=Greenhouse(mean_height=5.8))
 REFERENCE_DAYS = 56
 MISMATCH = 0.08
 """Relative deviation of every plant parameter from the calibrated greenhouse's."""
@@ -29,42 +29,36 @@ MISMATCH = 0.08
 
 @dataclass(frozen=True)
 class Reference:
-    """The deployed model of a season, and the amplitude of ENR 1 of every cause."""
+    """A house, its deployed model, and the amplitude of ENR 1 of every cause."""
 
+    house: House
     deployed: Deployed
     unit: dict[str, float]
 
 
-def reference(season: str) -> Reference:
+def reference(house: House) -> Reference:
     """Simulate the unchanged greenhouse for eight weeks, calibrate on them, and measure sizes."""
-    end = np.datetime64(f"{SEASONS[season]}T00:00:00")
-    start = end - np.timedelta64(REFERENCE_DAYS, "D")
-    seed = 77 + list(SEASONS).index(season)
-    (log,) = simulate_many(
-        GreenhouseParameters(), generate_weather(start, end, seed=seed), recipe, start, end, count=1, seed=seed
-    )
-    record, shift = open_record(log.measured, SITE, prior_of_site())
-    posterior = calibrate([(record, None)], prior(nominal(SITE)), {}, every_hours=8.0)
+    start = house.start - np.timedelta64(REFERENCE_DAYS, "D")
+    weather = generate_weather(start, house.start, seed=house.seed)
+    (log,) = simulate_many(house.plant, weather, recipe, start, house.start, count=1, seed=house.seed)
+    site = house.site
+    record, shift = open_record(log.measured, site, from_site(site))
+    posterior = calibrate([(record, None)], prior(nominal(site)), {}, every_hours=8.0)
     misfit = learn_misfit(
-        record, posterior.values, dict(zip(posterior.names, posterior.standard_deviation, strict=True)), SITE.longitude
+        record, posterior.values, dict(zip(posterior.names, posterior.standard_deviation, strict=True)), site.longitude
     )
     deployed = replace(from_posterior(posterior, misfit), shift=shift)
-    return Reference(deployed, enr_units(record, deployed))
+    return Reference(house, deployed, enr_units(record, site, deployed))
 
 
-def prior_of_site() -> Deployed:
-    """Return the model of the site's description alone."""
-    return Deployed(nominal(SITE), {})
-
-
-def enr_units(record: Record, deployed: Deployed) -> dict[str, float]:
+def enr_units(record: Record, site: Site, deployed: Deployed) -> dict[str, float]:
     """Return, for every cause, the amplitude at which ENR is one on a log without it."""
-    days = split.split_days(record, SITE.longitude)
+    days = split.split_days(record, site.longitude)
     runs = linearisation.day_runs(record, days.day)
     line = linearisation.linearise(record, runs, deployed.parameters, {})
     noise = [freerun.root_mean_square(np.where(w, e, np.nan)) for w, e in zip(runs.weight, line.errors, strict=True)]
     unit = {}
-    seconds = record.time.astype("datetime64[s]").astype(np.int64) + int(240.0 * SITE.longitude)
+    seconds = record.time.astype("datetime64[s]").astype(np.int64) + int(240.0 * site.longitude)
     line = replace(line, drivers={**line.drivers, "weekday": 1.0 * ((seconds // 86_400 + 3) % 7)})
     for name, effect in {**EFFECTS, **UNCATALOGUED}.items():
         small = 0.2 * effect.amplitude.typical
@@ -79,9 +73,9 @@ def enr_units(record: Record, deployed: Deployed) -> dict[str, float]:
     return unit
 
 
-def simulate_cases(season: str, cases: Sequence[Case], unit: dict[str, float], days: int) -> list[Telemetry]:
-    """Simulate all cases of a season as batches of greenhouses."""
-    start = np.datetime64(f"{SEASONS[season]}T00:00:00")
+def simulate_cases(known: Reference, cases: Sequence[Case], days: int) -> list[Telemetry]:
+    """Simulate all cases of a house as batches of greenhouses."""
+    start = known.house.start
     end = start + np.timedelta64(days, "D")
     logs: dict[str, Telemetry] = {}
     for wrong in (False, True):
@@ -94,14 +88,14 @@ def simulate_cases(season: str, cases: Sequence[Case], unit: dict[str, float], d
                 noise = replace(noise, heat=2.0 * noise.heat, vapour=2.0 * noise.vapour, co2=2.0 * noise.co2,
                                 correlation_hours=6.0 * noise.correlation_hours)  # fmt: skip
             seasons = simulate_many(
-                [GreenhouseParameters().varied(np.random.default_rng(case.seed), relative=MISMATCH) for case in batch],
+                [known.house.plant.varied(np.random.default_rng(case.seed), relative=MISMATCH) for case in batch],
                 [generate_weather(start, end, seed=case.seed) for case in batch],
                 recipe,
                 start,
                 end,
                 count=len(batch),
                 seed=batch[0].seed,
-                effects=[hidden(case, unit, start) for case in batch],
+                effects=[hidden(case, known.unit, start) for case in batch],
                 disturbances=noise,
             )
             logs |= {case.name: one.measured for case, one in zip(batch, seasons, strict=True)}

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.diagnosis.cases import REACHABLE, Case
-from benchmarks.diagnosis.logs import MISMATCH, SITE, Reference, reference, simulate_cases
+from benchmarks.diagnosis.houses import of_seasons
+from benchmarks.diagnosis.logs import MISMATCH, Reference, reference, simulate_cases
 from igrow_core.effects import EFFECTS
 from igrow_core.simulator.hybrid.nominal import site_record
 from igrow_core.simulator.hybrid.parameters import PARAMETERS
@@ -32,6 +33,7 @@ Floats = NDArray[np.float64]
 SEASON, DAYS, SEED = "winter", 28, 9500
 NOTHING = 40
 SIZES = (1.0, 0.3)
+SITE = of_seasons()[SEASON].site
 HEAT, VAPOUR, CO2, CORRELATION_HOURS = 4.0, 4.0, 0.25, 2.0
 """Disturbances: standard deviations in W m-2, g m-2 h-1 and g m-2 h-1, and the time in which they fade to 1/e."""
 NOISE = {"air_temperature": 0.1, "air_humidity": 0.6, "air_co2": 8.0}
@@ -92,7 +94,7 @@ def _judge(job: tuple[int, Telemetry, Deployed, str, float]) -> tuple[str, float
 
 def _jobs(known: Reference) -> list[tuple[int, Telemetry, Deployed, str, float]]:
     drivers = [Case(f"matched-{index}", "nothing", SEASON, SEED + index) for index in range(20)]
-    logs = simulate_cases(SEASON, drivers, known.unit, DAYS)
+    logs = simulate_cases(known, drivers, DAYS)
     # The actuators are read as they stand, and the calibration's misfit is the mechanistic greenhouse's own.
     deployed = replace(known.deployed, known_misfit={}, shift=0.0)
     seen = [name for name, effect in EFFECTS.items() if REACHABLE * known.unit[name] <= abs(effect.amplitude.high)]
@@ -105,7 +107,7 @@ def _jobs(known: Reference) -> list[tuple[int, Telemetry, Deployed, str, float]]
 
 def main(processes: int) -> int:
     """Print the table."""
-    known = reference(SEASON)
+    known = reference(of_seasons()[SEASON])
     jobs = _jobs(known)
     outcomes = []
     with ProcessPoolExecutor(processes) as pool:

@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.diagnosis.cases import SEASONS, Case, hidden
-from benchmarks.diagnosis.logs import SITE, Reference
+from benchmarks.diagnosis.cases import Case, hidden
+from benchmarks.diagnosis.logs import Reference
 from igrow_core.effects import EFFECTS
 from igrow_core.greenhouse import HiddenEffect
 from igrow_core.greenhouse.uncatalogued import UNCATALOGUED
+from igrow_core.site import Site
 from igrow_core.telemetry import Telemetry
 from trainer.diagnosis import diagnose, freefit, likelihood, linearisation, search, selection, structure
 from trainer.diagnosis.activation import ActiveTerm, activate
@@ -59,12 +60,12 @@ class Outcome:
 def judge(case: Case, telemetry: Telemetry, reference: Reference) -> Outcome:
     """Diagnose one case and compare with the truth."""
     begun = time.perf_counter()
-    diagnosis, evidence = diagnose(telemetry, SITE, reference.deployed, without=case.without)
+    site = reference.house.site
+    diagnosis, evidence = diagnose(telemetry, site, reference.deployed, without=case.without)
     seconds = time.perf_counter() - begun
     causes = [one for one in diagnosis.findings if one.kind != "remainder"]
     found = tuple(one.effect for one in diagnosis.findings)
-    start = np.datetime64(f"{SEASONS[case.season]}T00:00:00")
-    truth = {one.name: one for one in hidden(case, reference.unit, start)}
+    truth = {one.name: one for one in hidden(case, reference.unit, reference.house.start)}
     relative, covered, onset_error = None, None, None
     for one in causes:
         if one.effect not in truth:
@@ -90,7 +91,9 @@ def judge(case: Case, telemetry: Telemetry, reference: Reference) -> Outcome:
         onset_error,
         _sum(errors, "recalibrated"),
         _sum(errors, "corrected"),
-        _perfect(evidence, truth, start) if evidence is not None and truth else _sum(errors, "recalibrated"),
+        _perfect(evidence, truth, reference.house.site)
+        if evidence is not None and truth
+        else _sum(errors, "recalibrated"),
         worth,
         known_worth,
         seconds,
@@ -126,7 +129,7 @@ def _sum(errors: Mapping[str, Mapping[str, Mapping[str, float]]], stage: str) ->
     return sum(table["24_h"][stage] / NOISE[quantity] for quantity, table in errors.items() if "24_h" in table)
 
 
-def _perfect(evidence: Evidence, truth: Mapping[str, Any], start: np.datetime64) -> float:
+def _perfect(evidence: Evidence, truth: Mapping[str, Any], site: Site) -> float:
     """Return the error of the model with the true causes in it, its parameters refitted."""
     record, split, prepared = evidence.record, evidence.split, evidence.first.problem
     terms = []
@@ -137,7 +140,7 @@ def _perfect(evidence: Evidence, truth: Mapping[str, Any], start: np.datetime64)
             terms.append(ActiveTerm(name, float(one.size), shape, one.start))
             continue
         line = prepared.line
-        seconds = record.time.astype("datetime64[s]").astype(np.int64) + int(240.0 * SITE.longitude)
+        seconds = record.time.astype("datetime64[s]").astype(np.int64) + int(240.0 * site.longitude)
         weekday = 1.0 * ((seconds // 86_400 + 3) % 7)
         line = replace(line, drivers={**line.drivers, "weekday": weekday})
         for channel, flux in linearisation.unit_fluxes(line, UNCATALOGUED[name], {}).items():

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.diagnosis.cases import SEASONS
-from benchmarks.diagnosis.logs import MISMATCH, SITE, reference
+from benchmarks.diagnosis.houses import of_seasons
+from benchmarks.diagnosis.logs import MISMATCH, reference
 from igrow_core.bundle import default_bundle_folder, read_bundle
 from igrow_core.greenhouse import Disturbances, GreenhouseParameters, generate_weather, recipe, simulate_many
 from igrow_core.greenhouse.described import parameters_of
@@ -37,7 +37,7 @@ Directions = Sequence[Mapping[str, float]]
 class Family:
     """Greenhouses of a kind, with the model that is calibrated on one of them."""
 
-    start: str
+    start: np.datetime64
     seed: int
     """Of the first log of a month; no case has it, nor any of those after it."""
     site: Site
@@ -51,15 +51,16 @@ def family(name: str) -> Family:
     if name == "default":
         bundle = read_bundle(default_bundle_folder())
         deployed = from_manifest(bundle.manifest)
-        return Family("2020-02-01", 40_000, DEFAULT_SITE, deployed, parameters_of(DEFAULT_SITE))
+        return Family(np.datetime64("2020-02-01T00:00:00"), 40_000, DEFAULT_SITE, deployed, parameters_of(DEFAULT_SITE))
     seed = {"winter": 20_000, "spring": 30_000}[name]
-    return Family(SEASONS[name], seed, SITE, reference(name).deployed, GreenhouseParameters())
+    house = of_seasons()[name]
+    return Family(house.start, seed, house.site, reference(house).deployed, house.plant)
 
 
 def simulate(name: str, days: int) -> list[Telemetry]:
     """Return the logs of a family's greenhouses."""
     own = family(name)
-    start = np.datetime64(f"{own.start}T00:00:00")
+    start = own.start
     end = start + np.timedelta64(days, "D")
     first = own.seed if days == MONTH else own.seed + 5_000
     logs = simulate_many(
