@@ -54,7 +54,10 @@ def main() -> int:
     outcomes: list[Outcome] = []
     with ProcessPoolExecutor(options.processes) as pool:
         print(f"calibrating on the reference logs of {', '.join(seasons)}", file=sys.stderr)
-        references = dict(zip(seasons, pool.map(reference, [houses[season] for season in seasons]), strict=True))
+        references = {}
+        for season, one in zip(seasons, pool.map(reference, [houses[season] for season in seasons]), strict=True):
+            references[season] = one
+            print(f"{len(references)} of {len(seasons)}: {season}", file=sys.stderr)
         units = {season: one.unit for season, one in references.items()}
         cases = draw("scoring" if away else options.what, options.cases, units, options.seed)
         own = {season: [case for case in cases if case.season == season] for season in seasons}
