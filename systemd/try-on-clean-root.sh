@@ -12,9 +12,9 @@ if [ ! -x "$ROOT/usr/bin/apt-get" ]; then
 fi
 cp /etc/resolv.conf "$ROOT/etc/resolv.conf"
 [ -z "${CERTIFICATES:-}" ] || cp "$CERTIFICATES" "$ROOT/etc/ssl/certs/ca-certificates.crt"
-rm -rf "$ROOT/root/igrow"
-mkdir -p "$ROOT/root/igrow"
-(cd "$SOURCE" && git archive HEAD) | tar -x -C "$ROOT/root/igrow"
+rm -rf "$ROOT/usr/src/igrow"
+mkdir -p "$ROOT/usr/src/igrow"
+(cd "$SOURCE" && git archive HEAD) | tar -x -C "$ROOT/usr/src/igrow"
 mountpoint -q "$ROOT/proc" || mount -t proc proc "$ROOT/proc"
 trap 'umount "$ROOT/proc"' EXIT
 
@@ -22,7 +22,7 @@ inside() { chroot "$ROOT" env -i PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/
     DEBIAN_FRONTEND=noninteractive PIP_ROOT_USER_ACTION=ignore sh -euc "$1"; }
 
 inside 'apt-get update -qq; apt-get install -qq -y --no-install-recommends python3-venv systemd >/dev/null'
-inside 'sh /root/igrow/systemd/install.sh'
+inside 'sh /usr/src/igrow/systemd/install.sh'
 inside 'igrow-edge check-config /etc/igrow/daemon.yaml'
 inside 'du -sh /opt/igrow/venv | cut -f1; id igrow; ls -ld /etc/igrow /srv/igrow-exchange'
 inside 'systemd-analyze security --offline=true --no-pager /etc/systemd/system/igrow-edge.service | tail -1'

@@ -25,6 +25,7 @@ from igrow_core.telemetry import Telemetry
 
 WHAT = ("scoring", "tuning", "elsewhere", "matched", "usual", "real")
 HOUSES_ELSEWHERE = 8
+SEASONS_USED = ("winter", "spring")
 
 
 def _judge(job: tuple[Case, Telemetry, Reference]) -> Outcome:
@@ -49,29 +50,31 @@ def main() -> int:
     if options.what == "usual":
         return usual.main(options.processes)
     away = options.what == "elsewhere"
-    houses = elsewhere(HOUSES_ELSEWHERE) if away else of_seasons()
-    seasons = list(houses) if away else options.season or ["winter", "spring"]
+    if away and options.season:
+        parser.error("houses elsewhere have seasons of their own: leave --season out")
+    seasons = of_seasons()
+    houses = elsewhere(HOUSES_ELSEWHERE) if away else {name: seasons[name] for name in options.season or SEASONS_USED}
     outcomes: list[Outcome] = []
     with ProcessPoolExecutor(options.processes) as pool:
-        print(f"calibrating on the reference logs of {', '.join(seasons)}", file=sys.stderr)
+        print(f"calibrating on the reference logs of {', '.join(houses)}", file=sys.stderr)
         references = {}
-        for season, one in zip(seasons, pool.map(reference, [houses[season] for season in seasons]), strict=True):
-            references[season] = one
-            print(f"{len(references)} of {len(seasons)}: {season}", file=sys.stderr)
-        units = {season: one.unit for season, one in references.items()}
+        for name, one in zip(houses, pool.map(reference, houses.values()), strict=True):
+            references[name] = one
+            print(f"{len(references)} of {len(houses)}: {name}", file=sys.stderr)
+        units = {name: one.unit for name, one in references.items()}
         cases = draw("scoring" if away else options.what, options.cases, units, options.seed)
-        own = {season: [case for case in cases if case.season == season] for season in seasons}
+        own = {name: [case for case in cases if case.house == name] for name in houses}
         print(f"simulating {len(cases)} logs", file=sys.stderr)
         simulated = pool.map(
             simulate_cases,
-            [references[season] for season in seasons],
+            references.values(),
             own.values(),
-            [options.days] * len(seasons),
+            [options.days] * len(houses),
         )
         jobs = [
-            (case, log, references[season])
-            for season, logs in zip(seasons, simulated, strict=True)
-            for case, log in zip(own[season], logs, strict=True)
+            (case, log, references[name])
+            for name, logs in zip(houses, simulated, strict=True)
+            for case, log in zip(own[name], logs, strict=True)
         ]
         for number, outcome in enumerate(pool.map(_judge, jobs), 1):
             outcomes.append(outcome)

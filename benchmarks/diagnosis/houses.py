@@ -7,8 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.diagnosis.cases import SEASONS
-from igrow_core.greenhouse import GreenhouseParameters
+from igrow_core.greenhouse import GreenhouseParameters, generate_weather
+from igrow_core.greenhouse.weather import WeatherClimate
 from igrow_core.site import Greenhouse, Lamps, Site
+from igrow_core.telemetry import Telemetry
 
 ELSEWHERE_SEED = 60_000
 ELSEWHERE_SPREAD = 0.25
@@ -24,6 +26,10 @@ class House:
     start: np.datetime64
     seed: int
     """Of the log that it is calibrated on."""
+
+    def weather(self, start: np.datetime64, end: np.datetime64, seed: int) -> Telemetry:
+        """Return weather under the sun of this place."""
+        return generate_weather(start, end, seed=seed, climate=WeatherClimate(self.site.latitude, self.site.longitude))
 
 
 def of_seasons() -> dict[str, House]:

@@ -1,4 +1,4 @@
-"""The benchmark's logs: the reference logs that models are calibrated on, and the logs of all cases of a season."""
+"""The benchmark's logs: the reference logs that models are calibrated on, and the logs of all cases of a house."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.diagnosis.cases import Case, hidden
 from benchmarks.diagnosis.houses import House
 from igrow_core.effects import EFFECTS
-from igrow_core.greenhouse import Disturbances, generate_weather, recipe, simulate_many
+from igrow_core.greenhouse import Disturbances, recipe, simulate_many
 from igrow_core.greenhouse.uncatalogued import UNCATALOGUED
 from igrow_core.simulator.hybrid.nominal import nominal
 from igrow_core.simulator.hybrid.record import Record
@@ -39,7 +39,7 @@ class Reference:
 def reference(house: House) -> Reference:
     """Simulate the unchanged greenhouse for eight weeks, calibrate on them, and measure sizes."""
     start = house.start - np.timedelta64(REFERENCE_DAYS, "D")
-    weather = generate_weather(start, house.start, seed=house.seed)
+    weather = house.weather(start, house.start, house.seed)
     (log,) = simulate_many(house.plant, weather, recipe, start, house.start, count=1, seed=house.seed)
     site = house.site
     record, shift = open_record(log.measured, site, from_site(site))
@@ -89,7 +89,7 @@ def simulate_cases(known: Reference, cases: Sequence[Case], days: int) -> list[T
                                 correlation_hours=6.0 * noise.correlation_hours)  # fmt: skip
             seasons = simulate_many(
                 [known.house.plant.varied(np.random.default_rng(case.seed), relative=MISMATCH) for case in batch],
-                [generate_weather(start, end, seed=case.seed) for case in batch],
+                [known.house.weather(start, end, case.seed) for case in batch],
                 recipe,
                 start,
                 end,
