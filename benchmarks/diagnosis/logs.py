@@ -74,29 +74,33 @@ def enr_units(record: Record, site: Site, deployed: Deployed) -> dict[str, float
 
 
 def simulate_cases(known: Reference, cases: Sequence[Case], days: int) -> list[Telemetry]:
-    """Simulate all cases of a house as batches of greenhouses."""
+    """Simulate all cases of a house as one batch of greenhouses."""
+    if not cases:
+        return []
     start = known.house.start
     end = start + np.timedelta64(days, "D")
-    logs: dict[str, Telemetry] = {}
-    for wrong in (False, True):
-        for tails in (False, True):
-            batch = [case for case in cases if case.wrong_noise == wrong and case.heavy_tails == tails]
-            if not batch:
-                continue
-            noise = Disturbances(degrees_of_freedom=4.0 if tails else None)
-            if wrong:
-                noise = replace(noise, heat=2.0 * noise.heat, vapour=2.0 * noise.vapour, co2=2.0 * noise.co2,
-                                correlation_hours=6.0 * noise.correlation_hours)  # fmt: skip
-            seasons = simulate_many(
-                [known.house.plant.varied(np.random.default_rng(case.seed), relative=MISMATCH) for case in batch],
-                [known.house.weather(start, end, case.seed) for case in batch],
-                recipe,
-                start,
-                end,
-                count=len(batch),
-                seed=batch[0].seed,
-                effects=[hidden(case, known.unit, start) for case in batch],
-                disturbances=noise,
-            )
-            logs |= {case.name: one.measured for case, one in zip(batch, seasons, strict=True)}
-    return [logs[case.name] for case in cases]
+    seasons = simulate_many(
+        [known.house.plant.varied(np.random.default_rng(case.seed), relative=MISMATCH) for case in cases],
+        [known.house.weather(start, end, case.seed) for case in cases],
+        recipe,
+        start,
+        end,
+        count=len(cases),
+        seed=cases[0].seed,
+        effects=[hidden(case, known.unit, start) for case in cases],
+        disturbances=[_disturbances(case) for case in cases],
+    )
+    return [one.measured for one in seasons]
+
+
+def _disturbances(case: Case) -> Disturbances:
+    usual = Disturbances(degrees_of_freedom=4.0 if case.heavy_tails else None)
+    if not case.wrong_noise:
+        return usual
+    return replace(
+        usual,
+        heat=2.0 * usual.heat,
+        vapour=2.0 * usual.vapour,
+        co2=2.0 * usual.co2,
+        correlation_hours=6.0 * usual.correlation_hours,
+    )

@@ -67,7 +67,7 @@ class Plant:
         self.tick = tick
         self.scan = scan
         self.effects = EffectBank(self.xp, effects, count, start) if effects else None
-        self._innovated = any((self.disturbances.heat, self.disturbances.vapour, self.disturbances.co2))
+        self._innovated = bool(np.any([self.disturbances.heat, self.disturbances.vapour, self.disturbances.co2]))
         like: Array = 1.0 if count is None else np.ones(count)
         now = weather.at(start)
         grown = _planted(parameters, crop, like)
@@ -232,7 +232,7 @@ class Plant:
         s = self.state
         s.noise = self.sensors.draw(s.generator, self.count)
         if self._innovated:
-            persistence = self.disturbances.persistence
+            persistence = self.disturbances.persistence(self.count)
             fresh = self.disturbances.innovate(s.generator, self.count)
             s.disturbance = [persistence * old + new for old, new in zip(s.disturbance, fresh, strict=True)]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from igrow_core.errors import IgrowError
 from igrow_core.greenhouse.climate_computer import ClimateComputer
-from igrow_core.greenhouse.disturbances import Disturbances
+from igrow_core.greenhouse.disturbances import Disturbances, combined
 from igrow_core.greenhouse.hidden import HiddenEffect
 from igrow_core.greenhouse.parameters import GreenhouseParameters, stack
 from igrow_core.greenhouse.plant import TICK, Plant
@@ -100,7 +100,7 @@ def simulate_many(
     count: int,
     seed: int,
     effects: Sequence[HiddenEffect] | Sequence[Sequence[HiddenEffect]] = (),
-    disturbances: Disturbances | None = None,
+    disturbances: Disturbances | Sequence[Disturbances] | None = None,
     sensors: Sensors | None = None,
     computer: ClimateComputer | None = None,
     step: int = 300,
@@ -109,12 +109,16 @@ def simulate_many(
 ) -> list[Season]:
     """Run a batch of `count` greenhouses at once; arguments as in `simulate`.
 
-    Parameters, weather, setpoint tables and lists of effects may be one for all or a sequence of `count`.
+    Parameters, weather, setpoint tables, lists of effects and disturbances may be one for all or a sequence of `count`.
     """
     if not isinstance(parameters, GreenhouseParameters):
         if len(parameters) != count:
             raise IgrowError(f"a batch of {count} greenhouses needs {count} sets of parameters, not {len(parameters)}")
         parameters = stack(parameters)
+    if disturbances is not None and not isinstance(disturbances, Disturbances):
+        if len(disturbances) != count:
+            raise IgrowError(f"a batch of {count} greenhouses needs {count} disturbances, not {len(disturbances)}")
+        disturbances = combined(disturbances)
     plant = Plant(
         parameters, WeatherTable(weather), float(unix_seconds(start)), count=count, effects=effects,
         disturbances=disturbances, sensors=sensors, computer=computer, crop=crop, seed=seed, tick=tick,

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from greenhouse_seasons import SPRING, hours
 
 from igrow_core.errors import IgrowError
-from igrow_core.greenhouse import GreenhouseParameters, HiddenEffect, recipe, simulate, simulate_many
+from igrow_core.greenhouse import Disturbances, GreenhouseParameters, HiddenEffect, recipe, simulate, simulate_many
 from igrow_core.greenhouse.disturbances import QUIET
 from igrow_core.greenhouse.parameters import KNOWN
 from igrow_core.greenhouse.sensors import EXACT
@@ -48,9 +49,25 @@ def test_each_of_a_batch_may_have_its_own_weather_and_setpoints(winter: Telemetr
     assert not np.allclose(first.true["wind_speed"], second.true["wind_speed"])
 
 
+def test_each_of_a_batch_may_have_its_own_disturbances(spring: Telemetry) -> None:
+    end = SPRING + hours(48)
+    each = [QUIET, Disturbances(), replace(Disturbances(), heat=12.0, correlation_hours=8.0)]
+    seasons = simulate_many(
+        GreenhouseParameters(), spring, recipe, SPRING, end, count=3, seed=1, disturbances=each, sensors=EXACT
+    )
+    plain = simulate(GreenhouseParameters(), spring, recipe, SPRING, end, seed=1, disturbances=QUIET, sensors=EXACT)
+    away = [np.std(one.true["air_temperature"] - plain.true["air_temperature"]) for one in seasons]
+    assert away[0] < 1e-6
+    assert 0.02 < away[1] < 0.5 * away[2]
+
+
 def test_a_list_of_the_wrong_length_is_refused(spring: Telemetry) -> None:
     with pytest.raises(IgrowError, match="3 greenhouses needs 3 sets"):
         simulate_many([GreenhouseParameters()], spring, recipe, SPRING, SPRING + hours(1), count=3, seed=1)
+    with pytest.raises(IgrowError, match="2 greenhouses needs 2 disturbances"):
+        simulate_many(
+            GreenhouseParameters(), spring, recipe, SPRING, SPRING + hours(1), count=2, seed=1, disturbances=[QUIET]
+        )
     with pytest.raises(IgrowError, match="one list each"):
         simulate_many(
             GreenhouseParameters(), spring, recipe, SPRING, SPRING + hours(1), count=3, seed=1, effects=[[], []]
