@@ -9,8 +9,9 @@ from igrow_core.effects import EFFECTS
 from igrow_core.telemetry import Telemetry
 from tests.diagnosis.conftest import deployed_model
 from tests.virtual_log import SITE
-from trainer.diagnosis import gram, likelihood, problem, runner, search, selection, structure, usual
+from trainer.diagnosis import gram, likelihood, linearisation, problem, runner, search, selection, structure, usual
 from trainer.diagnosis.gram import RESIDUAL, DailyGrams, Term
+from trainer.diagnosis.linearisation import DivergenceError
 from trainer.diagnosis.problem import Problem
 from trainer.diagnosis.split import split_days
 
@@ -99,3 +100,10 @@ def test_only_a_log_of_a_season_is_asked_for_more_than_seasons_usually_show() ->
     assert known.sizes(29) == {}
     assert set(known.sizes(85)) <= set(EFFECTS)
     assert known.sizes(85)["structure_shade"] > 0.0
+
+
+def test_a_model_that_runs_out_of_all_bounds_says_so(quiet: Problem) -> None:
+    line = quiet.line
+    absurd = {"lamp_heat": {"share": 1e300}}
+    with pytest.raises(DivergenceError, match="lamp_heat runs out of all bounds"):
+        linearisation.linearise(line.record, line.runs, line.parameters, absurd)

@@ -32,7 +32,7 @@ from trainer.diagnosis.deployed import Deployed
 from trainer.diagnosis.drivers import Pattern, pattern_fluxes
 from trainer.diagnosis.estimate import Estimated, estimate, with_refined, within_bounds
 from trainer.diagnosis.freerun import Runs
-from trainer.diagnosis.linearisation import Floats
+from trainer.diagnosis.linearisation import DivergenceError, Floats
 from trainer.diagnosis.prior import Prior
 from trainer.diagnosis.problem import Problem
 from trainer.diagnosis.result import HORIZONS, Diagnosis, Finding, Interval, Verdict
@@ -220,8 +220,12 @@ def _search(
             new = _refined(judged.selected, [*found, *new], deployed)
         if len(new) <= len(found):
             return _Search(*first, tuple(found), judged)
+        try:
+            problem_now = prepared((*deployed.effects, *(one.term for one in new)), problem_now.interval)
+        except DivergenceError:
+            # No cause: the log itself stayed within all bounds.
+            return _Search(*first, tuple(found), judged)
         found = new
-        problem_now = prepared((*deployed.effects, *(one.term for one in found)), problem_now.interval)
 
 
 def _refined(selected: Selected, estimated: list[Estimated], deployed: Deployed) -> list[Estimated]:
@@ -229,7 +233,7 @@ def _refined(selected: Selected, estimated: list[Estimated], deployed: Deployed)
     try:
         with np.errstate(over="ignore", invalid="ignore"):
             found = refine.refine(selected.problem, selected.named, [one.term for one in estimated], deployed.effects)
-    except (ValueError, np.linalg.LinAlgError):
+    except (ValueError, np.linalg.LinAlgError, DivergenceError):
         found = []
     if not found or not all(np.isfinite(one.term.amplitude) and np.isfinite(one.deviation) for one in found):
         # Undamped steps can run away from a poor start; the terms then stay as the search found them.
@@ -264,7 +268,10 @@ def _correct(
         terms = (*current.terms, one.term)
         # Where the effect takes over what recalibration had put into the parameters, the fit starts there.
         begin = {name: value + one.shift.get(name, 0.0) for name, value in current.parameters.items()}
-        trial = Stage(*freefit.fit(record, runs, split, knowledge, activate(record, terms), begin), terms)
+        try:
+            trial = Stage(*freefit.fit(record, runs, split, knowledge, activate(record, terms), begin), terms)
+        except DivergenceError:
+            continue
         before, after = current.runs(record, split), trial.runs(record, split)
         plain = replace(trial, terms=current.terms).runs(record, split)
         if before is not None and after is not None and plain is not None:
@@ -316,7 +323,10 @@ def _with_remainder(
     }
     added = pattern_fluxes(record, site.longitude, amplitudes)
     effects = activate(record, current.terms)
-    fitted = freefit.fit(record, search.problem.line.runs, split, knowledge, effects, current.parameters, added)
+    try:
+        fitted = freefit.fit(record, search.problem.line.runs, split, knowledge, effects, current.parameters, added)
+    except DivergenceError:
+        return current
     remainder = {f"{channel}:{when}": amplitude for (channel, when), amplitude in amplitudes.items()}
     trial = Stage(*fitted, current.terms, remainder, added)
     before, after = current.runs(record, split), trial.runs(record, split)

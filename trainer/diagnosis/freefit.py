@@ -13,7 +13,7 @@ import numpy as np
 from igrow_core.simulator.hybrid.climate import ActiveEffects
 from igrow_core.simulator.hybrid.record import Record
 from trainer.diagnosis import linearisation
-from trainer.diagnosis.linearisation import DayRuns, Floats, Linearisation
+from trainer.diagnosis.linearisation import DayRuns, DivergenceError, Floats, Linearisation
 from trainer.diagnosis.prior import Prior
 from trainer.diagnosis.split import Split
 
@@ -45,6 +45,9 @@ def fit(
         effects: active, held.
         start: where to begin (None: the prior's mean).
         added: further fluxes by channel, (n,).
+
+    Raises:
+        DivergenceError: the model runs out of all bounds where the fit begins.
     """
     line = linearisation.linearise(record, runs, prior.clip(start or prior.mean), effects, added)
     cost = _cost(line, split, prior)
@@ -62,7 +65,10 @@ def fit(
             moved = prior.clip(
                 {name: line.parameters[name] + float(part) for name, part in zip(prior.names, step, strict=True)}
             )
-            trial = linearisation.linearise(record, runs, moved, effects, added)
+            try:
+                trial = linearisation.linearise(record, runs, moved, effects, added)
+            except DivergenceError:
+                continue
             after = _cost(trial, split, prior)
             if after < cost:
                 improved = cost - after > 1e-3 * cost

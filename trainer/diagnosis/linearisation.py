@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from igrow_core.effects import EFFECTS, Effect
 from igrow_core.effects.definition import Array
+from igrow_core.errors import IgrowError
 from igrow_core.simulator.hybrid import climate, measurement
 from igrow_core.simulator.hybrid.climate import ActiveEffects
 from igrow_core.simulator.hybrid.nominal import site_record
@@ -36,6 +37,10 @@ STEP = 900.0
 _BATCH = 160
 """Variants run at once: more do not fit into the cache."""
 _WEATHER = ("outdoor_temperature", "outdoor_humidity", "global_radiation", "wind_speed", "sky_temperature", "rain")
+
+
+class DivergenceError(IgrowError):
+    """The model runs out of all bounds on a log."""
 
 
 def diagnosis_record(telemetry: Telemetry, site: Site) -> Record:
@@ -137,11 +142,22 @@ def linearise(
     effects: ActiveEffects,
     added: Mapping[str, Floats] | None = None,
 ) -> Linearisation:
-    """Run the model once along a log; `added` are further fluxes by channel, (n,)."""
+    """Run the model once along a log; `added` are further fluxes by channel, (n,).
+
+    Raises:
+        DivergenceError: a prediction that counts is no finite number.
+    """
     states = observe(record, parameters, effects)
-    shown = free_run(record, states, runs.starts, runs.steps, parameters, effects, added)
+    with np.errstate(over="ignore", invalid="ignore"):
+        shown = free_run(record, states, runs.starts, runs.steps, parameters, effects, added)
     drivers = climate.derive(np, states, record.inputs, parameters, record.lamp_efficacy)
-    return Linearisation(record, runs, parameters, effects, _stacked(shown), states, drivers, added or {})
+    line = Linearisation(record, runs, parameters, effects, _stacked(shown), states, drivers, added or {})
+    if not np.isfinite(line.errors).all():
+        active = f" with {', '.join(effects)}" if effects else ""
+        raise DivergenceError(
+            f"the model{active} runs out of all bounds on this log: calibrate it on this greenhouse first"
+        )
+    return line
 
 
 def parameter_columns(line: Linearisation, names: tuple[str, ...], spread: Floats) -> Floats:
