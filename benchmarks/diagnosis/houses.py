@@ -12,7 +12,8 @@ from igrow_core.greenhouse.weather import WeatherClimate
 from igrow_core.site import Greenhouse, Lamps, Site
 from igrow_core.telemetry import Telemetry
 
-ELSEWHERE_SEED = 60_000
+ELSEWHERE_SEED, LEARNING_SEED = 60_000, 80_000
+"""Of houses that cases are drawn for, and of those that what is usual is learned from."""
 ELSEWHERE_SPREAD = 0.25
 """How far houses elsewhere lie from the usual one in each of their parameters, relative."""
 
@@ -41,16 +42,21 @@ def of_seasons() -> dict[str, House]:
     }
 
 
-def elsewhere(count: int) -> dict[str, House]:
-    """Draw other greenhouses: each a quarter off in every parameter, half of them unlit, at any time of the year."""
+def elsewhere(count: int, first: int = ELSEWHERE_SEED) -> dict[str, House]:
+    """Draw other greenhouses: each a quarter off in every parameter, half of them unlit, at any time of the year.
+
+    Args:
+        count: of houses.
+        first: seed of the first one.
+    """
     houses = {}
     for number in range(count):
-        rng = np.random.default_rng(ELSEWHERE_SEED + number)
+        rng = np.random.default_rng(first + number)
         lit = number % 2 == 0
         usual = GreenhouseParameters(latitude=float(rng.uniform(42.0, 60.0)))
         plant = replace(usual.varied(rng, ELSEWHERE_SPREAD), lamp_capacity=usual.lamp_capacity if lit else 0.0)
         described = Greenhouse(mean_height=float(np.mean(plant.air_height)), lamps=Lamps() if lit else None)
         day = np.datetime64("2020-03-01T00:00:00") + np.timedelta64(int(rng.integers(0, 300)), "D")
         site = Site(name=f"house-{number}", latitude=plant.latitude, longitude=plant.longitude, greenhouse=described)
-        houses[site.name] = House(site, plant, day, ELSEWHERE_SEED + 500 + number)
+        houses[site.name] = House(site, plant, day, first + 500 + number)
     return houses

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.diagnosis.houses import of_seasons
+from benchmarks.diagnosis.houses import LEARNING_SEED, House, elsewhere, of_seasons
 from benchmarks.diagnosis.logs import MISMATCH, reference
 from igrow_core.bundle import default_bundle_folder, read_bundle
-from igrow_core.greenhouse import Disturbances, GreenhouseParameters, generate_weather, recipe, simulate_many
+from igrow_core.greenhouse import Disturbances, recipe, simulate_many
 from igrow_core.greenhouse.described import parameters_of
 from igrow_core.site import Site
 from igrow_core.telemetry import Telemetry
@@ -22,12 +23,14 @@ from trainer.diagnosis import Deployed, from_manifest, problem, runner, usual
 from trainer.diagnosis.problem import Problem
 from trainer.diagnosis.split import split_days
 
-LOGS = 30
-"""Of each family."""
+HOUSES = 12
+"""Drawn as those elsewhere are, beside the house of the cases in winter and spring and that of the default bundle."""
+LOGS = 12
+"""Of each family and length."""
 MONTH, SEASON = 28, 84
 """Days of a log."""
-FAMILIES = (("winter", MONTH), ("spring", MONTH), ("default", MONTH), ("winter", SEASON), ("spring", SEASON))
-"""Greenhouses and length of the logs."""
+SEASONS_FROM = 2
+"""Families, the first ones, that have logs of a season too."""
 DEFAULT_SITE = Site(name="default", latitude=52.03, longitude=4.52)
 
 Directions = Sequence[Mapping[str, float]]
@@ -35,39 +38,40 @@ Directions = Sequence[Mapping[str, float]]
 
 @dataclass(frozen=True)
 class Family:
-    """Greenhouses of a kind, with the model that is calibrated on one of them."""
+    """Greenhouses about a house, and the model that is calibrated on it."""
 
-    start: np.datetime64
+    house: House
+    deployed: Deployed
     seed: int
     """Of the first log of a month; no case has it, nor any of those after it."""
-    site: Site
-    deployed: Deployed
-    plant: GreenhouseParameters
 
 
-@cache
-def family(name: str) -> Family:
-    """Return the greenhouses of a season of the benchmark, or those of the default bundle."""
-    if name == "default":
-        bundle = read_bundle(default_bundle_folder())
-        deployed = from_manifest(bundle.manifest)
-        return Family(np.datetime64("2020-02-01T00:00:00"), 40_000, DEFAULT_SITE, deployed, parameters_of(DEFAULT_SITE))
-    seed = {"winter": 20_000, "spring": 30_000}[name]
-    house = of_seasons()[name]
-    return Family(house.start, seed, house.site, reference(house).deployed, house.plant)
+def families(processes: int) -> list[Family]:
+    """Calibrate the models of all families."""
+    own = of_seasons()
+    seeds = {"winter": 20_000, "spring": 30_000}
+    houses = {**{name: own[name] for name in seeds}, **elsewhere(HOUSES, LEARNING_SEED)}
+    seeds |= {name: 81_000 + 100 * number for number, name in enumerate(elsewhere(HOUSES))}
+    found = []
+    with ProcessPoolExecutor(processes) as pool:
+        for name, one in zip(houses, pool.map(reference, houses.values()), strict=True):
+            found.append(Family(one.house, one.deployed, seeds[name]))
+            print(f"calibrated {len(found)} of {len(houses)}: {name}", file=sys.stderr)
+    default = House(DEFAULT_SITE, parameters_of(DEFAULT_SITE), np.datetime64("2020-02-01T00:00:00"), 40_000)
+    manifest = read_bundle(default_bundle_folder()).manifest
+    return [*found, Family(default, from_manifest(manifest), default.seed)]
 
 
-def simulate(name: str, days: int) -> list[Telemetry]:
+def simulate(family: Family, days: int) -> list[Telemetry]:
     """Return the logs of a family's greenhouses."""
-    own = family(name)
-    start = own.start
-    end = start + np.timedelta64(days, "D")
-    first = own.seed if days == MONTH else own.seed + 5_000
+    house = family.house
+    end = house.start + np.timedelta64(days, "D")
+    first = family.seed if days == MONTH else family.seed + 5_000
     logs = simulate_many(
-        [own.plant.varied(np.random.default_rng(first + k), relative=MISMATCH) for k in range(LOGS)],
-        [generate_weather(start, end, seed=first + k) for k in range(LOGS)],
+        [house.plant.varied(np.random.default_rng(first + k), relative=MISMATCH) for k in range(LOGS)],
+        [house.weather(house.start, end, first + k) for k in range(LOGS)],
         recipe,
-        start,
+        house.start,
         end,
         count=LOGS,
         seed=first,
@@ -76,35 +80,41 @@ def simulate(name: str, days: int) -> list[Telemetry]:
     return [log.measured for log in logs]
 
 
-def prepare(job: tuple[str, Telemetry], directions: Directions = ()) -> Problem:
+def prepare(family: Family, log: Telemetry, directions: Directions = ()) -> Problem:
     """Return the prepared problem of a family's log."""
-    name, log = job
-    own = family(name)
-    record, _ = runner.open_record(log, own.site, own.deployed)
-    days = split_days(record, own.site.longitude)
-    known = own.deployed.known_misfit
-    return problem.prepare(record, days, own.deployed.prior, {}, own.site.longitude, known, directions)
+    site, deployed = family.house.site, family.deployed
+    record, _ = runner.open_record(log, site, deployed)
+    days = split_days(record, site.longitude)
+    return problem.prepare(record, days, deployed.prior, {}, site.longitude, deployed.known_misfit, directions)
 
 
-def _traces(job: tuple[str, Telemetry]) -> usual.Traces:
-    return usual.traces(prepare(job))
+def _traces(family: Family) -> list[usual.Traces]:
+    return [usual.traces(prepare(family, log)) for log in simulate(family, MONTH)]
 
 
-def _amplitudes(directions: Directions, job: tuple[str, Telemetry]) -> dict[str, float]:
-    return usual.amplitudes(prepare(job, directions))
+def _amplitudes(directions: Directions, family: Family) -> list[dict[str, float]]:
+    return [usual.amplitudes(prepare(family, log, directions)) for log in simulate(family, SEASON)]
+
+
+def learn(known: Sequence[Family], processes: int) -> usual.Usual:
+    """Return what is usual between the greenhouses of families."""
+    with ProcessPoolExecutor(processes) as pool:
+        traces: list[usual.Traces] = []
+        for number, some in enumerate(pool.map(_traces, known), 1):
+            traces += some
+            print(f"traces of {number} of {len(known)} families", file=sys.stderr)
+        directions = usual.directions(traces)
+        shown: list[dict[str, float]] = []
+        for number, seen in enumerate(pool.map(partial(_amplitudes, directions), known[:SEASONS_FROM]), 1):
+            shown += seen
+            print(f"seasons of {number} of {SEASONS_FROM} families", file=sys.stderr)
+    return usual.Usual(tuple(directions), usual.root_mean_squares(shown))
 
 
 def main(processes: int) -> int:
     """Write what is usual into the package."""
-    with ProcessPoolExecutor(processes) as pool:
-        logs = pool.map(simulate, *zip(*FAMILIES, strict=True))
-        jobs: dict[int, list[tuple[str, Telemetry]]] = {MONTH: [], SEASON: []}
-        for (name, days), own in zip(FAMILIES, logs, strict=True):
-            jobs[days] += [(name, log) for log in own]
-        directions = usual.directions(list(pool.map(_traces, jobs[MONTH])))
-        shown = list(pool.map(partial(_amplitudes, directions), jobs[SEASON]))
-    found = usual.Usual(tuple(directions), usual.root_mean_squares(shown))
+    found = learn(families(processes), processes)
     path = Path(str(files("trainer.diagnosis"))) / usual.FILE
     usual.write(path, found)
-    print(f"wrote {len(directions)} directions and {len(found.season)} usual amplitudes to {path}")
+    print(f"wrote {len(found.directions)} directions and {len(found.season)} usual amplitudes to {path}")
     return 0

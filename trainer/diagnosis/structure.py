@@ -3,12 +3,12 @@
 No simple model has the structure of its greenhouse. The misfit that stands in the calibration log is no finding:
 it was there when the model was judged good. It is learned there as a ridge regression of the innovations on all
 candidates and patterns together, goes with the bundle as one list of amplitudes, and enters a later diagnosis as
-one column with a coefficient near one, beside a little slack on each candidate.
+one column with a coefficient near one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -34,37 +34,21 @@ Structure = Mapping[str, float]
 def learn(problem: Problem) -> dict[str, float]:
     """Return the misfit of a calibrated model on its own log (all days)."""
     # The parameters stay where the recalibration put them: moved along, they would leave their bounds.
-    return amplitudes(problem, ()) | {
+    columns = [*problem.candidate, *problem.pattern]
+    scale = np.array(
+        [RIDGE * EFFECTS[one.effect].amplitude.typical for one in problem.candidates]
+        + [PATTERN_RIDGE] * len(problem.patterns)
+    )
+    solution = solve(problem.grams.of(columns, ()).sum(axis=0), np.diag(scale**-2.0))
+    return dict(zip(keys(problem), map(float, solution.coefficients), strict=True)) | {
         PARAMETER_PREFIX + name: float(value)
         for name, value in zip(problem.prior.names, parameter_shift(problem), strict=True)
     }
 
 
-def amplitudes(problem: Problem, base: Sequence[int]) -> dict[str, float]:
-    """Return the ridge regression of what is left on all candidates and patterns, amplitude by key (all days).
-
-    Args:
-        problem: of a log for which nothing is missing.
-        base: columns that take their share first, under the null model's prior.
-    """
-    columns = [*problem.candidate, *problem.pattern]
-    keys = [candidate_key(one) for one in problem.candidates] + [pattern_key(one) for one in problem.patterns]
-    scale = np.array(
-        [RIDGE * EFFECTS[one.effect].amplitude.typical for one in problem.candidates]
-        + [PATTERN_RIDGE] * len(problem.patterns)
-    )
-    size = len(base)
-    products = problem.grams.of([*base, *columns], ()).sum(axis=0)
-    precision = np.zeros((len(products) - 1,) * 2)
-    precision[size:, size:] = np.diag(scale**-2.0)
-    if base:
-        null = null_model(problem)
-        precision[:size, :size] = null.precision
-        pull = null.precision @ null.shift
-        products[0, 1 : size + 1] += pull
-        products[1 : size + 1, 0] += pull
-    solution = solve(products, precision)
-    return {key: float(value) for key, value in zip(keys, solution.coefficients[size:], strict=True)}
+def keys(problem: Problem) -> tuple[str, ...]:
+    """Return the keys of all candidates and patterns of a log, in the order of their columns."""
+    return (*map(candidate_key, problem.candidates), *map(pattern_key, problem.patterns))
 
 
 def centre(knowledge: Prior, known: Structure) -> Prior:

@@ -2,8 +2,8 @@
 
 A greenhouse whose parameters lie 8 % from the calibrated one's, under another weather, leaves traces that look
 like small effects: a humidity offset here, a little air exchange there. What such traces look like is learned once
-from logs of the mechanistic greenhouse with nothing hidden in them: the misfit of each log as one list of
-amplitudes, and of all lists the few directions that hold most of their scatter. A diagnosis lets each direction
+from logs of many mechanistic greenhouses with nothing hidden in them: the few directions in the amplitudes of all
+candidates and patterns that make these logs likeliest. A diagnosis lets each direction
 explain what it can, at the size it usually has, before it looks for a cause. What is still fitted of each effect then
 is learned too from logs of a season, over which a wrong structure can be told from chance: the size beyond which an
 effect counts as evidence there.
@@ -20,13 +20,12 @@ from pathlib import Path
 
 import numpy as np
 
-from trainer.diagnosis import likelihood, search, selection, structure
-from trainer.diagnosis.candidates import Candidate
-from trainer.diagnosis.drivers import Pattern
-from trainer.diagnosis.problem import LONG_DAYS, Problem, candidate_key, pattern_key
+from trainer.diagnosis import factors, likelihood, search, selection, structure
+from trainer.diagnosis.factors import LogLikelihood
+from trainer.diagnosis.problem import LONG_DAYS, Problem
 
 FILE = "usual_misfit.json"
-DIRECTIONS = 16
+DIRECTIONS = 8
 TRIFLE = 1.0
 """Log-likelihood that an effect must gain in a scan to be fitted beside its own noise."""
 
@@ -51,45 +50,49 @@ class Usual:
 
 @dataclass(frozen=True)
 class Traces:
-    """What a log with nothing missing looks like in amplitudes."""
+    """What a log with nothing missing says of the amplitudes of all candidates and patterns together."""
 
-    amplitudes: Mapping[str, float]
-    """Of all candidates and patterns together, by key."""
-    sizes: Mapping[str, float]
-    """How much one unit of each moves the innovations, by key."""
+    keys: tuple[str, ...]
+    likelihood: LogLikelihood
+    """Parameters and the known misfit integrated out."""
 
 
 def traces(problem: Problem) -> Traces:
     """Return the traces of a log, prepared with the known misfit of its calibration, without usual directions."""
-    return Traces(structure.amplitudes(problem, structure.null_model(problem).base), _size(problem))
+    null = structure.null_model(problem)
+    size = len(null.base)
+    products = problem.grams.of([*null.base, *problem.candidate, *problem.pattern], ()).sum(axis=0)
+    information, score = products[1:, 1:], -products[0, 1:]
+    information[:size, :size] += null.precision
+    score[:size] -= null.precision @ null.shift
+    first, other = slice(0, size), slice(size, None)
+    taken = np.linalg.solve(information[first, first], np.column_stack([information[first, other], score[first]]))
+    return Traces(
+        structure.keys(problem),
+        LogLikelihood(
+            information[other, other] - information[other, first] @ taken[:, :-1],
+            score[other] - information[other, first] @ taken[:, -1],
+        ),
+    )
 
 
 def directions(logs: Sequence[Traces], count: int = DIRECTIONS) -> list[dict[str, float]]:
     """Return the directions of the traces of logs for which nothing is missing, each at its usual size."""
-    keys = sorted({key for one in logs for key in one.amplitudes})
-    unit = {key: value for one in logs for key, value in one.sizes.items()}
-    scale = np.array([unit[key] for key in keys])
-    table = np.array([[one.amplitudes.get(key, 0.0) for key in keys] for one in logs]) * scale
-    _, sizes, axes = np.linalg.svd(table / np.sqrt(len(table)), full_matrices=False)
+    keys = sorted({key for one in logs for key in one.keys})
+    place = {key: index for index, key in enumerate(keys)}
+    whole = [_spread([place[key] for key in one.keys], len(keys), one.likelihood) for one in logs]
     return [
-        {key: float(f"{value:.3g}") for key, value in zip(keys, size * axis / scale, strict=True) if value != 0.0}
-        for size, axis in zip(sizes[:count], axes[:count], strict=True)
+        {key: float(f"{value:.4g}") for key, value in zip(keys, axis, strict=True) if value != 0.0}
+        for axis in factors.loadings(whole, count).T
     ]
 
 
-def _size(problem: Problem) -> dict[str, float]:
-    """Return how much one unit of each column moves the innovations, by key."""
-    columns: list[tuple[int, Candidate | Pattern]] = [
-        *zip(problem.candidate, problem.candidates, strict=True),
-        *zip(problem.pattern, problem.patterns, strict=True),
-    ]
-    total = problem.grams.products.sum(axis=0)
-    return {
-        candidate_key(cause) if isinstance(cause, Candidate) else pattern_key(cause): float(
-            np.sqrt(total[index, index])
-        )
-        for index, cause in columns
-    }
+def _spread(places: Sequence[int], count: int, known: LogLikelihood) -> LogLikelihood:
+    """Return what a log says of a longer list of amplitudes, nothing of those that it cannot show."""
+    information, score = np.zeros((count, count)), np.zeros(count)
+    information[np.ix_(places, places)] = known.information
+    score[places] = known.score
+    return LogLikelihood(information, score)
 
 
 def amplitudes(problem: Problem) -> dict[str, float]:
