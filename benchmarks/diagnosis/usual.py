@@ -49,14 +49,14 @@ class Family:
 def families(processes: int) -> list[Family]:
     """Calibrate the models of all families."""
     own = of_seasons()
-    seeds = {"winter": 20_000, "spring": 30_000}
-    houses = {**{name: own[name] for name in seeds}, **elsewhere(HOUSES, LEARNING_SEED)}
-    seeds |= {name: 81_000 + 100 * number for number, name in enumerate(elsewhere(HOUSES))}
-    found = []
+    learned = elsewhere(HOUSES, LEARNING_SEED).values()
+    houses = [own["winter"], own["spring"], *learned]
+    seeds = [20_000, 30_000, *(81_000 + 100 * number for number in range(HOUSES))]
+    found: list[Family] = []
     with ProcessPoolExecutor(processes) as pool:
-        for name, one in zip(houses, pool.map(reference, houses.values()), strict=True):
-            found.append(Family(one.house, one.deployed, seeds[name]))
-            print(f"calibrated {len(found)} of {len(houses)}: {name}", file=sys.stderr)
+        for one, seed in zip(pool.map(reference, houses), seeds, strict=True):
+            found.append(Family(one.house, one.deployed, seed))
+            print(f"calibrated {len(found)} of {len(houses)}: {one.house.site.name}", file=sys.stderr)
     default = House(DEFAULT_SITE, parameters_of(DEFAULT_SITE), np.datetime64("2020-02-01T00:00:00"), 40_000)
     manifest = read_bundle(default_bundle_folder()).manifest
     return [*found, Family(default, from_manifest(manifest), default.seed)]
