@@ -7,6 +7,7 @@ from tests.virtual_log import SITE
 from trainer.diagnosis import problem, refine, runner, search, structure
 from trainer.diagnosis.activation import ActiveTerm
 from trainer.diagnosis.gram import Term
+from trainer.diagnosis.refine import Refined
 from trainer.diagnosis.split import split_days
 
 
@@ -26,3 +27,9 @@ def test_a_term_at_its_bound_comes_back_from_there(quiet_log: Telemetry) -> None
     (found,) = refine.refine(ready, fit, [ActiveTerm("wind_infiltration", bound, shape)], ())
     assert found.term.amplitude < 0.5 * bound
     assert 0.0 < found.deviation < bound
+
+
+def test_two_ways_for_co2_to_leak_in_have_no_sizes_of_their_own() -> None:
+    leak, soil = (ActiveTerm(name, 1.0, {}) for name in ("co2_valve_leak", "soil_respiration"))
+    assert refine.told_apart([Refined(leak, 0.1, {}, {}), Refined(soil, 0.2, {}, {})])
+    assert not refine.told_apart([Refined(leak, 11.0, {}, {}), Refined(soil, 0.2, {}, {})])

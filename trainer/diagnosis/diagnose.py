@@ -229,7 +229,11 @@ def _search(
 
 
 def _refined(selected: Selected, estimated: list[Estimated], deployed: Deployed) -> list[Estimated]:
-    """Return all terms refitted together, or none where one turns round or a further one runs to its bound."""
+    """Return all terms refitted together, or none where one turns round or a further one adds nothing of its own.
+
+    A further one that only mops up what is left runs to its bound; one that is an alias of another (two ways for CO2 to
+    leak in) leaves neither with a size.
+    """
     try:
         with np.errstate(over="ignore", invalid="ignore"):
             found = refine.refine(selected.problem, selected.named, [one.term for one in estimated], deployed.effects)
@@ -239,11 +243,12 @@ def _refined(selected: Selected, estimated: list[Estimated], deployed: Deployed)
         # Undamped steps can run away from a poor start; the terms then stay as the search found them.
         return [within_bounds(one) for one in estimated]
     better = [with_refined(one, two) for one, two in zip(estimated, found, strict=True)]
-    return better if all(one.term.amplitude != 0.0 for one in better) and _inside(better[1:]) else []
+    stands = all(one.term.amplitude != 0.0 for one in better) and _inside(better[1:])
+    return better if stands and (len(found) == 1 or refine.told_apart(found)) else []
 
 
 def _inside(further: Sequence[Estimated]) -> bool:
-    """Tell whether terms after the first lie inside their bounds: one that runs there only mops up what is left."""
+    """Tell whether terms lie inside their bounds."""
     bounds = ((one.term.amplitude, EFFECTS[one.effect].amplitude) for one in further)
     return all(amplitude < bound.high and (bound.low == 0.0 or amplitude > bound.low) for amplitude, bound in bounds)
 

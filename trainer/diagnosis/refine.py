@@ -127,6 +127,11 @@ def refine(problem: Problem, fit: Fit, terms: Sequence[ActiveTerm], before: Sequ
     ]
 
 
+def told_apart(terms: Sequence[Refined]) -> bool:
+    """Tell whether terms that were fitted together each have a size of their own."""
+    return all(abs(one.term.amplitude) > one.deviation for one in terms)
+
+
 def _line(problem: Problem, parameters: dict[str, float], terms: Sequence[ActiveTerm]) -> Linearisation:
     record = problem.line.record
     return linearisation.linearise(record, problem.line.runs, parameters, activate(record, terms))
