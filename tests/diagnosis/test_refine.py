@@ -1,8 +1,10 @@
 from __future__ import annotations
 
+import numpy as np
+
 from igrow_core.effects import EFFECTS
 from igrow_core.telemetry import Telemetry
-from tests.diagnosis.conftest import deployed_model
+from tests.diagnosis.conftest import DAYS, STEP, deployed_model, greenhouse_log
 from tests.virtual_log import SITE
 from trainer.diagnosis import problem, refine, runner, search, structure
 from trainer.diagnosis.activation import ActiveTerm
@@ -30,6 +32,22 @@ def test_a_term_at_its_bound_comes_back_from_there(quiet_log: Telemetry) -> None
 
 
 def test_two_ways_for_co2_to_leak_in_have_no_sizes_of_their_own() -> None:
-    leak, soil = (ActiveTerm(name, 1.0, {}) for name in ("co2_valve_leak", "soil_respiration"))
-    assert refine.told_apart([Refined(leak, 0.1, {}, {}), Refined(soil, 0.2, {}, {})])
-    assert not refine.told_apart([Refined(leak, 11.0, {}, {}), Refined(soil, 0.2, {}, {})])
+    count = round(DAYS * 86_400 / STEP)
+    log = greenhouse_log(4, {"co2": np.full(count, 1.0 / 3.6e6)})
+    log = log.with_columns({"air_temperature": log["air_temperature"] + 2.0})
+    deployed = deployed_model()
+    record, _ = runner.open_record(log, SITE, deployed)
+    split = split_days(record, SITE.longitude)
+    ready = problem.prepare(record, split, deployed.prior, {}, SITE.longitude, {})
+
+    def together(*sizes: tuple[str, float]) -> list[Refined]:
+        columns = {one.effect: column for column, one in zip(ready.candidate, ready.candidates, strict=True)}
+        model = structure.null_model(ready)
+        for name, _ in sizes:
+            model = model.with_term(Term(columns[name]))
+        shapes = {name: {one.name: one.typical for one in EFFECTS[name].shapes} for name, _ in sizes}
+        terms = [ActiveTerm(name, size, shapes[name]) for name, size in sizes]
+        return refine.refine(ready, search.fit(ready.grams, model), terms, ())
+
+    assert refine.told_apart(together(("co2_valve_leak", 1.0), ("air_temperature_offset", 2.0)))
+    assert not refine.told_apart(together(("co2_valve_leak", 0.5), ("soil_respiration", 0.5)))
