@@ -247,9 +247,9 @@ def _refined(selected: Selected, estimated: list[Estimated], deployed: Deployed)
     return better if stands and (len(found) == 1 or refine.told_apart(found)) else []
 
 
-def _inside(further: Sequence[Estimated]) -> bool:
+def _inside(terms: Sequence[Estimated]) -> bool:
     """Tell whether terms lie inside their bounds."""
-    bounds = ((one.term.amplitude, EFFECTS[one.effect].amplitude) for one in further)
+    bounds = ((one.term.amplitude, EFFECTS[one.effect].amplitude) for one in terms)
     return all(amplitude < bound.high and (bound.low == 0.0 or amplitude > bound.low) for amplitude, bound in bounds)
 
 
@@ -276,6 +276,7 @@ def _correct(
         try:
             trial = Stage(*freefit.fit(record, runs, split, knowledge, activate(record, terms), begin), terms)
         except DivergenceError:
+            weighed.append(one)
             continue
         before, after = current.runs(record, split), trial.runs(record, split)
         plain = replace(trial, terms=current.terms).runs(record, split)
