@@ -29,6 +29,8 @@ LOGS = 12
 """Of each family and length."""
 MONTH, SEASON = 28, 84
 """Days of a log."""
+FOLDS = 4
+"""In which families are left out to see how well directions carry."""
 SEASONS_FROM = 2
 """Families, the first ones, that have logs of a season too."""
 DEFAULT_SITE = Site(name="default", latitude=52.03, longitude=4.52)
@@ -96,14 +98,30 @@ def _amplitudes(directions: Directions, family: Family) -> list[dict[str, float]
     return [usual.amplitudes(prepare(family, log, directions)) for log in simulate(family, SEASON)]
 
 
+def carried(traces: Sequence[Sequence[usual.Traces]]) -> list[float]:
+    """Return how well directions carry to houses that they were not learned from: the evidence of each log there.
+
+    Args:
+        traces: of the logs of each family; every fourth is left out in turn.
+    """
+    shares = []
+    for turn in range(FOLDS):
+        others = [log for number, logs in enumerate(traces) if number % FOLDS != turn for log in logs]
+        unseen = [log for logs in traces[turn::FOLDS] for log in logs]
+        shares.append(usual.evidence(usual.directions(others), unseen) / len(unseen))
+    return shares
+
+
 def learn(known: Sequence[Family], processes: int) -> usual.Usual:
     """Return what is usual between the greenhouses of families."""
     with ProcessPoolExecutor(processes) as pool:
-        traces: list[usual.Traces] = []
-        for number, some in enumerate(pool.map(_traces, known), 1):
-            traces += some
-            print(f"traces of {number} of {len(known)} families", file=sys.stderr)
-        directions = usual.directions(traces)
+        traces: list[list[usual.Traces]] = []
+        for some in pool.map(_traces, known):
+            traces.append(some)
+            print(f"traces of {len(traces)} of {len(known)} families", file=sys.stderr)
+        directions = usual.directions([log for logs in traces for log in logs])
+        shares = ", ".join(f"{share:.0f}" for share in carried(traces))
+        print(f"log marginal likelihood of a log in houses not learned from, {FOLDS} folds: {shares}")
         shown: list[dict[str, float]] = []
         for number, seen in enumerate(pool.map(partial(_amplitudes, directions), known[:SEASONS_FROM]), 1):
             shown += seen

@@ -87,6 +87,14 @@ def directions(logs: Sequence[Traces], count: int = DIRECTIONS) -> list[dict[str
     ]
 
 
+def evidence(found: Sequence[Mapping[str, float]], logs: Sequence[Traces]) -> float:
+    """Return the log marginal likelihood of logs under directions, over that of no traces at all."""
+    return sum(
+        factors.evidence(np.array([[one.get(key, 0.0) for one in found] for key in log.keys]), [log.likelihood])
+        for log in logs
+    )
+
+
 def _spread(places: Sequence[int], count: int, known: LogLikelihood) -> LogLikelihood:
     """Return what a log says of a longer list of amplitudes, nothing of those that it cannot show."""
     information, score = np.zeros((count, count)), np.zeros(count)
