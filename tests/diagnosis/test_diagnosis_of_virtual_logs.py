@@ -86,6 +86,15 @@ def test_a_log_without_humidity_and_co2_is_diagnosed_on_what_it_has(quiet_log: T
     assert "co2_offset" in diagnosis.untestable
 
 
+def test_lamps_whose_power_the_log_lacks_are_traced_to_their_switch(quiet_log: Telemetry) -> None:
+    kept = {name: values for name, values in quiet_log.columns.items() if name != "lamp_power"}
+    diagnosis, _ = diagnose(Telemetry(quiet_log.time, kept), SITE, deployed_model())
+    assert diagnosis.verdict == "unexplained"
+    assert "lamp_on" in diagnosis.findings[-1].drivers
+    day = diagnosis.errors["air_temperature"]["24_h"]
+    assert day["corrected"] < 0.7 * day["recalibrated"]
+
+
 def test_co2_is_left_out_where_its_dose_is_not_known(quiet_log: Telemetry) -> None:
     kept = {name: values for name, values in quiet_log.columns.items() if name != "co2_dosing"}
     undosed = replace(SITE, greenhouse=replace(SITE.greenhouse, co2_dosing_capacity=0.0))

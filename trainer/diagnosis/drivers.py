@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from igrow_core.simulator.hybrid.record import Record
+from igrow_core.simulator.hybrid.record import SWITCHES, Record
 from trainer.diagnosis.linearisation import Floats, Linearisation, flux_columns
 
 UNIT_FLUX: Mapping[str, float] = {
@@ -84,13 +84,15 @@ def patterns(record: Record, longitude: float) -> list[tuple[str, tuple[str, ...
         fallen = np.cumsum(np.asarray(record.inputs["rain"])) * record.step / 72_000.0
         table.append(("until rain has fallen", ("rain",), np.exp(-fallen)))
     # Lamps and irrigation follow the clock and the light, not the climate that they are to be blamed for.
-    for name, scale in (("lamp_power", 80.0), ("irrigation", 1.0)):
-        if name not in record.unknown and np.any(record.inputs[name]):
-            running: Floats = np.asarray(record.inputs[name], dtype=np.float64) / scale
-            table.append((f"{name.replace('_', ' ')} on", (name,), running))
+    for name, usual in (("lamp_power", 80.0), ("irrigation", 1.0)):
+        driver, scale = (SWITCHES[name], 1.0) if name in record.unknown else (name, usual)
+        if np.any(record.inputs.get(driver, 0.0)):
+            running: Floats = np.asarray(record.inputs[driver], dtype=np.float64) / scale
+            text = driver.replace("_", " ")
+            table.append((text if driver == SWITCHES[name] else f"{text} on", (driver,), running))
             keep = float(np.exp(-record.step / 3600.0))
             late: Floats = lfilter([1.0 - keep], [1.0, -keep], running)
-            table.append((f"an hour after {name.replace('_', ' ')}", (name,), late))
+            table.append((f"an hour after {text}", (driver,), late))
     days = np.arange(len(record)) * record.step / 86_400.0
     month: Floats = np.asarray(days / 30.0, dtype=np.float64)
     table.append(("from day to day", ("time",), month))

@@ -46,6 +46,8 @@ _ABSENT: Mapping[str, float] = {
     "rain": 0.0,
 }
 """What stands in for a column that the log lacks; the record names it in `unknown`."""
+SWITCHES: Mapping[str, str] = {"lamp_power": "lamp_on", "irrigation": "irrigation_on"}
+"""What a log may tell of equipment whose own column it lacks: the balances cannot use it, a diagnosis can."""
 _SKY_BELOW_AIR = 12.0
 """K, sky below outdoor air under a half-clouded sky, where no sky temperature is measured."""
 
@@ -147,6 +149,9 @@ def make_record(
         else:
             inputs[name] = np.full(count, stand_in)
             unknown.append(name)
+    for name, switch in SWITCHES.items():
+        if name in unknown and _present(table, switch):
+            inputs[switch] = _bridge(table[switch], longest, smooth=False)[0]
     if _present(table, "leaf_area_index"):
         inputs["leaf_area_index"] = _bridge(table["leaf_area_index"], count, smooth=True)[0]
     else:
