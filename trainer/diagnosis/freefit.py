@@ -23,7 +23,7 @@ CORRELATION = 43_200.0
 """Seconds over which errors of a free run hang together."""
 ROBUST = 2.0
 """Errors beyond so many spreads count linearly (Huber)."""
-ITERATIONS = 4
+ITERATIONS = 12
 
 
 def fit(
