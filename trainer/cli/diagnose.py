@@ -45,7 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
     site = load_site(arguments.site) if arguments.site is not None else log.site
     assert site is not None
     bundle = read_bundle(arguments.bundle or default_bundle_folder())
-    deployed = from_manifest(bundle.manifest)
+    deployed = from_manifest(bundle.manifest, site)
     diagnosis, evidence = diagnose(log.telemetry, site, deployed, without=arguments.without, seed=arguments.seed)
     write(arguments.out, diagnosis, evidence, deployed)
     if evidence is not None and diagnosis.findings:
@@ -82,6 +82,8 @@ def summary(diagnosis: Diagnosis) -> str:
     lines = [f"{diagnosis.site}: {diagnosis.verdict}"]
     lines += [f"  {one.sentence}" for one in diagnosis.findings]
     lines += [f"  rivals that fit as well: {', '.join(one.rivals[1:])}" for one in diagnosis.findings if one.rivals[1:]]
+    if diagnosis.unknown:
+        lines.append(f"  the log lacks {', '.join(diagnosis.unknown)}: usual values stand in")
     lines += [f"  {note}" for note in diagnosis.notes]
     for quantity, horizons in diagnosis.errors.items():
         day = horizons.get("24_h")

@@ -86,7 +86,12 @@ def site_record(telemetry: Telemetry, site: Site, step: float) -> Record:
         leaf_area_index=_CANOPIES.get(site.crop.species.lower(), _CANOPIES["tomato"])[0],
     )
     unknown = (*record.unknown, "leaf_area_index") if estimated else record.unknown
-    if site.greenhouse.co2_dosing_capacity == 0.0:
-        # A house that cannot dose needs no column to say that it did not.
-        unknown = tuple(name for name in unknown if name != "co2_dosing")
-    return replace(record, unknown=unknown)
+    house = site.greenhouse
+    # A house that cannot dose needs no column to say that it did not; the same of lamps and screens.
+    equipped = {
+        "co2_dosing": house.co2_dosing_capacity > 0.0,
+        "lamp_power": house.lamps is not None,
+        "energy_screen": house.energy_screen is not None,
+        "blackout_screen": house.blackout_screen is not None,
+    }
+    return replace(record, unknown=tuple(name for name in unknown if equipped.get(name, True)))
