@@ -111,6 +111,7 @@ def default_model(site: Site, *, seed: int = 0, report: Report = print) -> Hybri
     return HybridModel(
         site=site,
         posterior=posterior,
+        calibrated_on=site.name,
         actuation=rules,
         holding=held,
         crop=CropStages(growth, harvest, conversion, maintenance),

@@ -13,6 +13,9 @@ from igrow_core.simulator.crop import CropStages
 from igrow_core.site import Site
 from trainer.calibration.posterior import Posterior
 
+MISFIT_KEY, CALIBRATED_ON_KEY = "known_misfit", "calibrated_on"
+"""Where the `simulator` of a bundle's manifest holds what the trainer knows beside the parameters."""
+
 
 @dataclass(frozen=True)
 class HybridModel:
@@ -21,6 +24,8 @@ class HybridModel:
     site: Site
     posterior: Posterior
     """Of the physical parameters."""
+    calibrated_on: str
+    """Name of the site on whose log they were fitted."""
     actuation: Mapping[str, float]
     """Rules of the actuation stage by name."""
     holding: Mapping[str, float]

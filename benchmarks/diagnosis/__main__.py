@@ -1,10 +1,11 @@
-"""Print the diagnosis benchmark: `python -m benchmarks.diagnosis [scoring|tuning|elsewhere|matched|usual|real DATA]`.
+"""Print the diagnosis benchmark: `python -m benchmarks.diagnosis [WHAT]`.
 
 `scoring` (the default) draws 208 cases, simulates their logs and those that the models are calibrated on, diagnoses
-each, and prints the table beside its bounds. `elsewhere` does the same with greenhouses that nothing was learned from
-(take 52 cases or so). `matched` does the like with greenhouses of the simulator's own
-structure. `usual` learns anew what is usual between greenhouses, from seeds that
-no case has. Everything is made afresh: an hour or so on two cores.
+each, and prints the table beside its bounds. `elsewhere` does the same with greenhouses that nothing was learned from,
+each with a model calibrated on its own first weeks; `uncalibrated` diagnoses the same logs with the built-in bundle.
+`matched` does the like with greenhouses of the simulator's own structure; `real` diagnoses the public logs. `usual`
+learns anew what is usual between greenhouses, from seeds that no case has. Everything is made afresh: an hour or so on
+two cores.
 """
 
 from __future__ import annotations
@@ -13,17 +14,17 @@ import argparse
 import json
 import sys
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from benchmarks.diagnosis import matched, real, usual
 from benchmarks.diagnosis.cases import SEASONS, Case, draw
 from benchmarks.diagnosis.houses import elsewhere, of_seasons
-from benchmarks.diagnosis.logs import Reference, reference, simulate_cases
+from benchmarks.diagnosis.logs import Reference, built_in, reference, simulate_cases
 from benchmarks.diagnosis.scoring import Outcome, judge, show, table
 from igrow_core.telemetry import Telemetry
 
-WHAT = ("scoring", "tuning", "elsewhere", "matched", "usual", "real")
+WHAT = ("scoring", "tuning", "elsewhere", "uncalibrated", "matched", "usual", "real")
 HOUSES_ELSEWHERE = 8
 SEASONS_USED = ("winter", "spring")
 
@@ -49,7 +50,7 @@ def main() -> int:
         return matched.main(options.processes)
     if options.what == "usual":
         return usual.main(options.processes)
-    away = options.what == "elsewhere"
+    away = options.what in {"elsewhere", "uncalibrated"}
     if away and options.season:
         parser.error("houses elsewhere have seasons of their own: leave --season out")
     seasons = of_seasons()
@@ -71,6 +72,8 @@ def main() -> int:
             own.values(),
             [options.days] * len(houses),
         )
+        if options.what == "uncalibrated":
+            references = {name: replace(one, deployed=built_in(one.house.site)) for name, one in references.items()}
         jobs = [
             (case, log, references[name])
             for name, logs in zip(houses, simulated, strict=True)

@@ -12,8 +12,9 @@ from igrow_core.greenhouse.weather import WeatherClimate
 from igrow_core.site import Greenhouse, Lamps, Site
 from igrow_core.telemetry import Telemetry
 
-ELSEWHERE_SEED, LEARNING_SEED = 60_000, 80_000
-"""Of houses that cases are drawn for, and of those that what is usual is learned from."""
+ELSEWHERE_SEED, LEARNING_SEED, PLACES_SEED = 60_000, 80_000, 90_000
+"""Of houses that cases are drawn for, of those that what is usual is learned from, and of places at which it is learned
+how the built-in bundle fares."""
 ELSEWHERE_SPREAD = 0.25
 """How far houses elsewhere lie from the usual one in each of their parameters, relative."""
 
@@ -52,11 +53,29 @@ def elsewhere(count: int, first: int = ELSEWHERE_SEED) -> dict[str, House]:
     houses = {}
     for number in range(count):
         rng = np.random.default_rng(first + number)
-        lit = number % 2 == 0
         usual = GreenhouseParameters(latitude=float(rng.uniform(42.0, 60.0)))
-        plant = replace(usual.varied(rng, ELSEWHERE_SPREAD), lamp_capacity=usual.lamp_capacity if lit else 0.0)
-        described = Greenhouse(mean_height=float(np.mean(plant.air_height)), lamps=Lamps() if lit else None)
+        plant = usual.varied(rng, ELSEWHERE_SPREAD)
+        if number % 2:
+            plant = replace(plant, lamp_capacity=0.0)
         day = np.datetime64("2020-03-01T00:00:00") + np.timedelta64(int(rng.integers(0, 300)), "D")
-        site = Site(name=f"house-{number}", latitude=plant.latitude, longitude=plant.longitude, greenhouse=described)
-        houses[site.name] = House(site, plant, day, first + 500 + number)
+        name = f"house-{number}"
+        houses[name] = House(_site(name, plant), plant, day, first + 500 + number)
     return houses
+
+
+def neighbours(house: House, count: int) -> list[House]:
+    """Draw greenhouses beside one: as different as those elsewhere are, under the same sun, lit if it is."""
+    usual = GreenhouseParameters(latitude=house.plant.latitude, lamp_capacity=house.plant.lamp_capacity)
+    found = []
+    for number in range(count):
+        seed = house.seed + 1000 * (1 + number)
+        plant = usual.varied(np.random.default_rng(seed), ELSEWHERE_SPREAD)
+        found.append(House(_site(f"{house.site.name}-{number}", plant), plant, house.start, seed))
+    return found
+
+
+def _site(name: str, plant: GreenhouseParameters) -> Site:
+    """Return what a grower would write down of a greenhouse."""
+    lamps = Lamps() if plant.lamp_capacity > 0.0 else None
+    described = Greenhouse(mean_height=float(np.mean(plant.air_height)), lamps=lamps)
+    return Site(name=name, latitude=plant.latitude, longitude=plant.longitude, greenhouse=described)

@@ -9,6 +9,7 @@ import numpy as np
 
 from benchmarks.diagnosis.cases import Case, hidden
 from benchmarks.diagnosis.houses import House
+from igrow_core.bundle import default_bundle_folder, read_bundle
 from igrow_core.effects import EFFECTS
 from igrow_core.greenhouse import Disturbances, recipe, simulate_many
 from igrow_core.greenhouse.uncatalogued import UNCATALOGUED
@@ -18,7 +19,7 @@ from igrow_core.site import Site
 from igrow_core.telemetry import Telemetry
 from trainer.calibration import calibrate, prior
 from trainer.diagnosis import freerun, linearisation, split
-from trainer.diagnosis.deployed import Deployed, from_posterior, from_site, learn_misfit
+from trainer.diagnosis.deployed import Deployed, from_manifest, from_posterior, from_site, learn_misfit
 from trainer.diagnosis.linearisation import unit_fluxes
 from trainer.diagnosis.runner import open_record
 
@@ -49,6 +50,11 @@ def reference(house: House) -> Reference:
     )
     deployed = replace(from_posterior(posterior, misfit), shift=shift)
     return Reference(house, deployed, enr_units(record, site, deployed))
+
+
+def built_in(site: Site) -> Deployed:
+    """Return the model of the built-in bundle, which knows a site's description alone."""
+    return from_manifest(read_bundle(default_bundle_folder()).manifest, site)
 
 
 def enr_units(record: Record, site: Site, deployed: Deployed) -> dict[str, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -12,14 +12,14 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.diagnosis.houses import LEARNING_SEED, House, elsewhere, of_seasons
-from benchmarks.diagnosis.logs import MISMATCH, reference
-from igrow_core.bundle import default_bundle_folder, read_bundle
+from benchmarks.diagnosis import houses
+from benchmarks.diagnosis.houses import LEARNING_SEED, PLACES_SEED, House, of_seasons
+from benchmarks.diagnosis.logs import MISMATCH, built_in, reference
 from igrow_core.greenhouse import Disturbances, recipe, simulate_many
 from igrow_core.greenhouse.described import parameters_of
 from igrow_core.site import Site
 from igrow_core.telemetry import Telemetry
-from trainer.diagnosis import Deployed, from_manifest, problem, runner, usual
+from trainer.diagnosis import Deployed, problem, runner, usual
 from trainer.diagnosis.problem import Problem
 from trainer.diagnosis.split import split_days
 
@@ -27,6 +27,8 @@ HOUSES = 12
 """Drawn as those elsewhere are, beside the house of the cases in winter and spring and that of the default bundle."""
 LOGS = 12
 """Of each family and length."""
+PLACES, NEIGHBOURS = 16, 12
+"""Where the built-in bundle is all that is known of greenhouses, and how many of them stand there."""
 MONTH, SEASON = 28, 84
 """Days of a log."""
 FOLDS = 4
@@ -51,17 +53,16 @@ class Family:
 def families(processes: int) -> list[Family]:
     """Calibrate the models of all families."""
     own = of_seasons()
-    learned = elsewhere(HOUSES, LEARNING_SEED).values()
-    houses = [own["winter"], own["spring"], *learned]
+    learned = houses.elsewhere(HOUSES, LEARNING_SEED).values()
+    known = [own["winter"], own["spring"], *learned]
     seeds = [20_000, 30_000, *(81_000 + 100 * number for number in range(HOUSES))]
     found: list[Family] = []
     with ProcessPoolExecutor(processes) as pool:
-        for one, seed in zip(pool.map(reference, houses), seeds, strict=True):
+        for one, seed in zip(pool.map(reference, known), seeds, strict=True):
             found.append(Family(one.house, one.deployed, seed))
-            print(f"calibrated {len(found)} of {len(houses)}: {one.house.site.name}", file=sys.stderr)
+            print(f"calibrated {len(found)} of {len(known)}: {one.house.site.name}", file=sys.stderr)
     default = House(DEFAULT_SITE, parameters_of(DEFAULT_SITE), np.datetime64("2020-02-01T00:00:00"), 40_000)
-    manifest = read_bundle(default_bundle_folder()).manifest
-    return [*found, Family(default, from_manifest(manifest), default.seed)]
+    return [*found, Family(default, built_in(DEFAULT_SITE), default.seed)]
 
 
 def simulate(family: Family, days: int) -> list[Telemetry]:
@@ -94,8 +95,39 @@ def _traces(family: Family) -> list[usual.Traces]:
     return [usual.traces(prepare(family, log)) for log in simulate(family, MONTH)]
 
 
+def _traces_elsewhere(place: House) -> list[usual.Traces]:
+    """Return the traces of greenhouses at a place of which only the built-in bundle is known."""
+    some = houses.neighbours(place, NEIGHBOURS)
+    end = place.start + np.timedelta64(MONTH, "D")
+    logs = simulate_many(
+        [one.plant for one in some],
+        [one.weather(one.start, end, one.seed) for one in some],
+        recipe,
+        place.start,
+        end,
+        count=len(some),
+        seed=place.seed,
+        disturbances=Disturbances(degrees_of_freedom=4.0),
+    )
+    return [
+        usual.traces(prepare(Family(one, built_in(one.site), one.seed), log.measured))
+        for one, log in zip(some, logs, strict=True)
+    ]
+
+
 def _amplitudes(directions: Directions, family: Family) -> list[dict[str, float]]:
     return [usual.amplitudes(prepare(family, log, directions)) for log in simulate(family, SEASON)]
+
+
+def _directions(what: str, groups: Iterable[Sequence[usual.Traces]], count: int) -> list[dict[str, float]]:
+    """Return the directions of all groups of logs, and print how well they carry from one group to another."""
+    traces: list[Sequence[usual.Traces]] = []
+    for some in groups:
+        traces.append(some)
+        print(f"{what}: traces of {len(traces)} of {count}", file=sys.stderr)
+    shares = ", ".join(f"{share:.0f}" for share in carried(traces))
+    print(f"{what}: log marginal likelihood of a log in houses not learned from, {FOLDS} folds: {shares}")
+    return usual.directions([log for logs in traces for log in logs])
 
 
 def carried(traces: Sequence[Sequence[usual.Traces]]) -> list[float]:
@@ -115,18 +147,14 @@ def carried(traces: Sequence[Sequence[usual.Traces]]) -> list[float]:
 def learn(known: Sequence[Family], processes: int) -> usual.Usual:
     """Return what is usual between the greenhouses of families."""
     with ProcessPoolExecutor(processes) as pool:
-        traces: list[list[usual.Traces]] = []
-        for some in pool.map(_traces, known):
-            traces.append(some)
-            print(f"traces of {len(traces)} of {len(known)} families", file=sys.stderr)
-        directions = usual.directions([log for logs in traces for log in logs])
-        shares = ", ".join(f"{share:.0f}" for share in carried(traces))
-        print(f"log marginal likelihood of a log in houses not learned from, {FOLDS} folds: {shares}")
+        directions = _directions("calibrated before", pool.map(_traces, known), len(known))
+        places = houses.elsewhere(PLACES, PLACES_SEED).values()
+        elsewhere = _directions("by the built-in bundle", pool.map(_traces_elsewhere, places), PLACES)
         shown: list[dict[str, float]] = []
         for number, seen in enumerate(pool.map(partial(_amplitudes, directions), known[:SEASONS_FROM]), 1):
             shown += seen
             print(f"seasons of {number} of {SEASONS_FROM} families", file=sys.stderr)
-    return usual.Usual(tuple(directions), usual.root_mean_squares(shown))
+    return usual.Usual(tuple(directions), tuple(elsewhere), usual.root_mean_squares(shown))
 
 
 def main(processes: int) -> int:

@@ -21,7 +21,7 @@ from trainer.readers.open_log import open_log
 def ideal_errors(out: Path, effect: str) -> dict[str, float]:
     """Return the mean absolute error of 24 h free runs by quantity, the parameters refitted beside the true effect."""
     site = load_site(out / "site.yaml")
-    deployed = from_manifest(read_bundle(out / "first-bundle").manifest)
+    deployed = from_manifest(read_bundle(out / "first-bundle").manifest, site)
     _, evidence = diagnose(open_log(out / "log").telemetry, site, deployed)
     if evidence is None:
         return {}

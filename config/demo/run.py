@@ -200,7 +200,11 @@ def prepare(demo: Demo) -> None:
     (out / "register-map.yaml").write_text(template.replace("port: 5020", f"port: {free_port()}"))
     demo.run("keys", ["igrow-trainer", "publish", "--init", "--keys", "keys", "--exchange", "exchange"])
     shutil.copy(out / "exchange/bundles/metadata/1.root.json", out / "root.json")
-    demo.run("export", ["igrow-trainer", "export", "--site", "site.yaml", "--out", "first-bundle"])
+    # The demo's greenhouse is the one that the built-in bundle was calibrated on.
+    demo.run(
+        "export",
+        ["igrow-trainer", "export", "--site", "site.yaml", "--same-greenhouse", "--out", "first-bundle"],
+    )
 
 
 def free_port() -> int:

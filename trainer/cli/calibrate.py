@@ -93,7 +93,7 @@ def run(arguments: argparse.Namespace) -> int:
     corrected = model.corrected(fitted.posterior, ()).trained(span, known, tuple(errors)).controlled(fitted.rules, held)
     deviation = dict(zip(fitted.posterior.names, map(float, fitted.posterior.standard_deviation), strict=True))
     misfit = learn_misfit(record, fitted.posterior.values, deviation, site.longitude)
-    corrected = replace(corrected, known_misfit=misfit)
+    corrected = replace(corrected, calibrated_on=site.name, known_misfit=misfit)
     bundle = write_hybrid_bundle(arguments.out, corrected, created=datetime.now(UTC))
     print(f"wrote {bundle.folder} ({bundle.label})")
     return 0

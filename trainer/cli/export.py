@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -19,6 +20,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's options."""
     parser.add_argument("--site", type=Path, required=True, help="site file that the bundle is for")
     parser.add_argument("--bundle", type=Path, help="bundle that brings the simulator (default: the built-in one)")
+    parser.add_argument(
+        "--same-greenhouse",
+        action="store_true",
+        help="the bundle was calibrated on this very greenhouse, under another name (a diagnosis then believes it)",
+    )
     parser.add_argument("--out", type=Path, required=True, help="folder for the new bundle; must not exist yet")
 
 
@@ -30,6 +36,8 @@ def run(arguments: argparse.Namespace) -> int:
     model = read_hybrid_model(read_bundle(arguments.bundle or default_bundle_folder()), site)
     if arguments.bundle is None:
         model = equipped(model)
+    if arguments.same_greenhouse:
+        model = replace(model, calibrated_on=site.name)
     bundle = write_hybrid_bundle(arguments.out, model, created=datetime.now(UTC))
     worst = max(self_test(bundle), key=lambda deviation: deviation.relative)
     print(f"wrote {bundle.folder} ({bundle.label}); self-test: {worst.graph} {worst.output} {worst.relative:.1e}")

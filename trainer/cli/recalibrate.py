@@ -136,7 +136,7 @@ def recalibrate(
 def _run(site: Site, exchange: Path, folder: Path, publish_bundle: Publish, now: datetime, days: int) -> Turn:
     log = read_exchange(exchange, site.name, start=(now - timedelta(days=days)).date())
     bundle = bundle_in_force(folder, log.reports)
-    deployed = from_manifest(bundle.manifest)
+    deployed = from_manifest(bundle.manifest, site)
     diagnosis, evidence = diagnose(log.telemetry, site, deployed)
     write(folder / "diagnosis", diagnosis, evidence, deployed)
     gain = relative_gain(diagnosis)

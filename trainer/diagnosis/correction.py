@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -35,7 +36,8 @@ def corrected_model(bundle: Bundle, site: Site, diagnosis: Diagnosis, evidence: 
     )
     span = Span(_utc(diagnosis.start), _utc(diagnosis.end))
     fitted = model.corrected(Posterior(names, mean, np.diag(deviation**2)), (*kept, *found))
-    return fitted.trained(span, model.training_range, errors)
+    own = replace(fitted, calibrated_on=site.name, known_misfit=corrected.known_misfit)
+    return own.trained(span, model.training_range, errors)
 
 
 def effect_record(finding: Finding) -> EffectRecord:

@@ -11,6 +11,7 @@ from igrow_core.bundle import Manifest
 from igrow_core.effects import EFFECTS
 from igrow_core.errors import IgrowError
 from igrow_core.simulator.hybrid.nominal import nominal
+from igrow_core.simulator.hybrid.parameters import PARAMETERS
 from igrow_core.simulator.hybrid.record import Record
 from igrow_core.site import Site
 from trainer.calibration import Posterior
@@ -19,9 +20,10 @@ from trainer.diagnosis import problem, structure
 from trainer.diagnosis.activation import ActiveTerm
 from trainer.diagnosis.prior import Prior
 from trainer.diagnosis.split import split_days
+from trainer.model import CALIBRATED_ON_KEY, MISFIT_KEY
 
-STRUCTURE_KEY = "known_misfit"
-"""Where a manifest's `simulator` holds what the calibration already missed."""
+BUILT_IN = "default"
+"""Site of the built-in bundle, a greenhouse with all defaults of a description."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,7 @@ class Deployed:
     """Empty: the model has seen no log."""
     effects: tuple[ActiveTerm, ...] = ()
     known_misfit: Mapping[str, float] = field(default_factory=dict)
+    """Empty: it was not calibrated on this very greenhouse, or not with a look at what it misses there."""
     shift: float | None = None
     """Rows by which the site's actuators are read ahead; None asks each log."""
 
@@ -63,8 +66,10 @@ def from_posterior(posterior: Posterior, known_misfit: Mapping[str, float] | Non
     return Deployed(posterior.values, deviations, (), known_misfit or {})
 
 
-def from_manifest(manifest: Manifest) -> Deployed:
-    """Return the model that a bundle carries.
+def from_manifest(manifest: Manifest, site: Site) -> Deployed:
+    """Return the model that a bundle carries, as knowledge of a site.
+
+    What was calibrated on another greenhouse is known less well of this one, and what it missed there says nothing.
 
     Raises:
         IgrowError: the bundle is not of the hybrid variant, or has no parameters.
@@ -83,13 +88,26 @@ def from_manifest(manifest: Manifest) -> Deployed:
         shape = {one.name: values.get(one.name, one.typical) for one in definition.shapes}
         onset = None if record.onset is None else np.datetime64(record.onset.time.replace(tzinfo=None), "s")
         effects.append(ActiveTerm(record.name, values.get(definition.amplitude.name, 0.0), shape, onset))
-    misfit = manifest.simulator.get(STRUCTURE_KEY, {})
-    return Deployed(
-        {name: one.mean for name, one in manifest.parameters.items()},
-        {name: one.standard_deviation for name, one in manifest.parameters.items()},
-        tuple(effects),
-        {str(key): float(value) for key, value in misfit.items()} if isinstance(misfit, dict) else {},
-    )
+    misfit = manifest.simulator.get(MISFIT_KEY, {})
+    mean = {name: one.mean for name, one in manifest.parameters.items()}
+    deviation = {name: one.standard_deviation for name, one in manifest.parameters.items()}
+    known = {str(key): float(value) for key, value in misfit.items()} if isinstance(misfit, dict) else {}
+    calibrated_on = manifest.simulator.get(CALIBRATED_ON_KEY, manifest.site)
+    if calibrated_on == site.name:
+        return Deployed(mean, deviation, tuple(effects), known)
+    if calibrated_on == BUILT_IN:
+        mean = as_described(mean, site)
+    return Deployed(mean, priors.elsewhere(mean, deviation), tuple(effects))
+
+
+def as_described(parameters: Mapping[str, float], site: Site) -> dict[str, float]:
+    """Return the parameters of a greenhouse with all defaults, scaled to what a site's description changes of them."""
+    described = nominal(site)
+    scaled = {
+        name: value * (described[name] / PARAMETERS[name].value if PARAMETERS[name].value else 1.0)
+        for name, value in parameters.items()
+    }
+    return {name: float(np.clip(value, PARAMETERS[name].low, PARAMETERS[name].high)) for name, value in scaled.items()}
 
 
 def learn_misfit(

@@ -58,6 +58,10 @@ REGIME_SHARE = 0.25
 """A cause's size in one regime must be at least so much of that in the other: else it is another cause's trace."""
 LARGEST_REMAINDER = 5.0
 """Bound of the remainder's amplitudes, in units of a pattern."""
+NOT_CALIBRATED = (
+    "The model was not calibrated on this greenhouse, and only large causes can be told from a greenhouse that is "
+    "another: calibrate it on weeks of the log that are known to be good (igrow-trainer calibrate)."
+)
 
 
 @dataclass(frozen=True)
@@ -161,6 +165,7 @@ def diagnose(
         screened.screened,
         prepared.untestable,
         record.unknown,
+        () if deployed.known_misfit else (NOT_CALIBRATED,),
     )
     shown = {name: day for name, stage in stages.items() if (day := stage.runs(record, split)) is not None}
     return diagnosis, Evidence(record, split, search.first, tuple(weighed), shown, model, deployed.free_run_prior)
@@ -194,12 +199,13 @@ def _search(
     """
 
     known = usual.installed()
+    directions = known.directions if deployed.known_misfit else known.elsewhere
 
     def prepared(terms: Sequence[ActiveTerm], interval: float) -> Problem:
         hours = interval == problem.HOUR
         return problem.prepare(
             record, split, deployed.prior, activate(record, terms), site.longitude, deployed.known_misfit,
-            known.directions if hours else (), without, interval, known.sizes(split.days) if hours else {},
+            directions if hours else (), without, interval, known.sizes(split.days) if hours else {},
         )  # fmt: skip
 
     problem_now = prepared(deployed.effects, problem.HOUR)

@@ -15,6 +15,8 @@ Floats = NDArray[np.float64]
 
 DRIFT = 0.08
 """Relative change of a parameter to expect between calibration and this log (season, crop, wear)."""
+ELSEWHERE = 0.25
+"""The same between the greenhouse of a calibration and another one."""
 
 
 @dataclass(frozen=True)
@@ -48,9 +50,17 @@ class Prior:
         return moved
 
 
-def drift(name: str, value: float) -> float:
-    """Return the change of a parameter to expect within a season."""
-    return DRIFT * max(abs(value), 0.3 * abs(PARAMETERS[name].value))
+def drift(name: str, value: float, share: float = DRIFT) -> float:
+    """Return the change of a parameter to expect within a season (or at another relative `share`)."""
+    return share * max(abs(value), 0.3 * abs(PARAMETERS[name].value))
+
+
+def elsewhere(mean: Mapping[str, float], standard_deviation: Mapping[str, float]) -> dict[str, float]:
+    """Return the standard deviations of what is known of a greenhouse from a calibration on another one."""
+    return {
+        name: float(np.hypot(deviation, drift(name, mean[name], ELSEWHERE)))
+        for name, deviation in standard_deviation.items()
+    }
 
 
 def from_posterior(mean: Mapping[str, float], standard_deviation: Mapping[str, float]) -> Prior:

@@ -67,6 +67,11 @@ class Problem:
     """Amplitude, by effect, that a log with nothing missing usually shows."""
 
     @property
+    def elsewhere(self) -> bool:
+        """The model was calibrated on another greenhouse: what it missed on this one is not known."""
+        return len(self.known) == 0
+
+    @property
     def fitted(self) -> NDArray[np.bool_]:
         """Runs on days for fitting, (r, 1)."""
         runs: NDArray[np.bool_] = self.split.fit[self.line.runs.day][:, None]

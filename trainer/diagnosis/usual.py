@@ -35,7 +35,9 @@ class Usual:
     """What is usual though nothing is missing."""
 
     directions: tuple[Mapping[str, float], ...]
-    """Each in amplitudes by key (`structure`), at its usual size."""
+    """Of models calibrated on the greenhouse before; each in amplitudes by key (`structure`), at its usual size."""
+    elsewhere: tuple[Mapping[str, float], ...]
+    """Of models calibrated on another greenhouse."""
     season: Mapping[str, float]
     """Root mean square amplitude, by effect, that a log of twelve weeks shows beyond its deviation."""
 
@@ -130,7 +132,7 @@ def installed() -> Usual:
     """Return what is installed with the trainer."""
     text = files("trainer.diagnosis").joinpath(FILE).read_text(encoding="utf-8")
     known = json.loads(text)
-    return Usual(tuple(known["directions"]), known["season"])
+    return Usual(tuple(known["directions"]), tuple(known["elsewhere"]), known["season"])
 
 
 def write(path: Path, usual: Usual) -> None:

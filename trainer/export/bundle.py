@@ -24,12 +24,10 @@ from trainer.export.hindcast import hindcast_model
 from trainer.export.optimizer import export_optimizer, optimizer_signature
 from trainer.export.plan import plan_blocks, plan_model
 from trainer.export.signatures import signatures
-from trainer.model import HybridModel
+from trainer.model import CALIBRATED_ON_KEY, MISFIT_KEY, HybridModel
 from trainer.training.stage_file import stages_from_bytes, stages_to_bytes
 
 CROP_FILE = "crop.npz"
-MISFIT_KEY = "known_misfit"
-"""Where the manifest's `simulator` holds what the calibration could not explain."""
 MEMBERS = 3
 """Draws from the posterior that a bundle carries beside the mean, for cautious plans."""
 
@@ -88,6 +86,7 @@ def write_hybrid_bundle(folder: Path, model: HybridModel, *, created: datetime, 
             "lamp_efficacy": lamps.efficacy if lamps else 0.0,
             "leaf_area_index": 3.0,
             MISFIT_KEY: dict(model.known_misfit),
+            CALIBRATED_ON_KEY: model.calibrated_on,
             "conversion": model.crop.conversion,
             "maintenance": model.crop.maintenance,
             "reference_time": reference.astimezone(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
@@ -127,6 +126,7 @@ def read_hybrid_model(bundle: Bundle, site: Site) -> HybridModel:
     return HybridModel(
         site=site,
         posterior=posterior,
+        calibrated_on=str(manifest.simulator.get(CALIBRATED_ON_KEY, manifest.site)),
         actuation={name: float(given.get(f"actuation:{name}", rule.value)) for name, rule in actuation.RULES.items()},
         holding={name: float(given.get(f"holding:{name}", one.value)) for name, one in holding.PARAMETERS.items()},
         crop=CropStages(
