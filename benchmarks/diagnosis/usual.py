@@ -119,37 +119,41 @@ def _amplitudes(directions: Directions, family: Family) -> list[dict[str, float]
     return [usual.amplitudes(prepare(family, log, directions)) for log in simulate(family, SEASON)]
 
 
-def _directions(what: str, groups: Iterable[Sequence[usual.Traces]], count: int) -> list[dict[str, float]]:
-    """Return the directions of all groups of logs, and print how well they carry from one group to another."""
+def _directions(
+    what: str, groups: Iterable[Sequence[usual.Traces]], expected: int, count: int
+) -> list[dict[str, float]]:
+    """Return `count` directions of all groups of logs, and print how well they carry from one group to another."""
     traces: list[Sequence[usual.Traces]] = []
     for some in groups:
         traces.append(some)
-        print(f"{what}: traces of {len(traces)} of {count}", file=sys.stderr)
-    shares = ", ".join(f"{share:.0f}" for share in carried(traces))
+        print(f"{what}: traces of {len(traces)} of {expected}", file=sys.stderr)
+    shares = ", ".join(f"{share:.0f}" for share in carried(traces, count))
     print(f"{what}: log marginal likelihood of a log in houses not learned from, {FOLDS} folds: {shares}")
-    return usual.directions([log for logs in traces for log in logs])
+    return usual.directions([log for logs in traces for log in logs], count)
 
 
-def carried(traces: Sequence[Sequence[usual.Traces]]) -> list[float]:
+def carried(traces: Sequence[Sequence[usual.Traces]], count: int) -> list[float]:
     """Return how well directions carry to houses that they were not learned from: the evidence of each log there.
 
     Args:
-        traces: of the logs of each family; every fourth is left out in turn.
+        traces: of the logs of each family or place; every fourth is left out in turn.
+        count: of directions.
     """
     shares = []
     for turn in range(FOLDS):
         others = [log for number, logs in enumerate(traces) if number % FOLDS != turn for log in logs]
         unseen = [log for logs in traces[turn::FOLDS] for log in logs]
-        shares.append(usual.evidence(usual.directions(others), unseen) / len(unseen))
+        shares.append(usual.evidence(usual.directions(others, count), unseen) / len(unseen))
     return shares
 
 
 def learn(known: Sequence[Family], processes: int) -> usual.Usual:
     """Return what is usual between the greenhouses of families."""
     with ProcessPoolExecutor(processes) as pool:
-        directions = _directions("calibrated before", pool.map(_traces, known), len(known))
+        directions = _directions("calibrated before", pool.map(_traces, known), len(known), usual.DIRECTIONS)
         places = houses.elsewhere(PLACES, PLACES_SEED).values()
-        elsewhere = _directions("by the built-in bundle", pool.map(_traces_elsewhere, places), PLACES)
+        found = pool.map(_traces_elsewhere, places)
+        elsewhere = _directions("by the built-in bundle", found, PLACES, usual.DIRECTIONS_ELSEWHERE)
         shown: list[dict[str, float]] = []
         for number, seen in enumerate(pool.map(partial(_amplitudes, directions), known[:SEASONS_FROM]), 1):
             shown += seen

@@ -25,7 +25,8 @@ from trainer.diagnosis.factors import LogLikelihood
 from trainer.diagnosis.problem import LONG_DAYS, Problem
 
 FILE = "usual_misfit.json"
-DIRECTIONS = 8
+DIRECTIONS, DIRECTIONS_ELSEWHERE = 8, 16
+"""Of models calibrated on the greenhouse itself, and on another one."""
 TRIFLE = 1.0
 """Log-likelihood that an effect must gain in a scan to be fitted beside its own noise."""
 
@@ -78,7 +79,7 @@ def traces(problem: Problem) -> Traces:
     )
 
 
-def directions(logs: Sequence[Traces], count: int = DIRECTIONS) -> list[dict[str, float]]:
+def directions(logs: Sequence[Traces], count: int) -> list[dict[str, float]]:
     """Return the directions of the traces of logs for which nothing is missing, each at its usual size."""
     keys = sorted({key for one in logs for key in one.keys})
     place = {key: index for index, key in enumerate(keys)}
