@@ -3,10 +3,10 @@
     python -m benchmarks.diagnosis real DATA
 
 DATA is the folder with ``agc2019`` and ``agc2018``. Each compartment's model is calibrated on its first eight weeks
-and diagnosed on the four that follow. Then the known truth, in two ways: the model loses a term that it had (its
-parameter goes to its lowest value), and the diagnosis must name it; an actuator's column is taken out of the log, and
-the diagnosis must say that something is missing. Then the placebo: wind and rain of another half of the season,
-put in the place of the true ones, must not be found.
+and diagnosed on the four that follow, once more with the built-in bundle as it is. Then the known truth, in two
+ways: the model loses a term that it had (its parameter goes to its lowest value), and the diagnosis must name it; an
+actuator's column is taken out of the log, and the diagnosis must say that something is missing. Then the placebo: wind
+and rain of another half of the season, put in the place of the true ones, must not be found.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.diagnosis.logs import built_in
 from igrow_core.errors import IgrowError
 from igrow_core.simulator.hybrid.nominal import nominal
 from igrow_core.simulator.hybrid.parameters import PARAMETERS
@@ -118,6 +119,8 @@ def main(data: Path | None) -> int:
         diagnosis, _ = diagnose(one.after, one.site, model)
         say(one.name, diagnosis)
         found[one.name] = {finding.effect for finding in diagnosis.findings}
+        uncalibrated, _ = diagnose(one.after, one.site, built_in(one.site))
+        say("  with the built-in bundle", uncalibrated)
         for parameter, effect in LOST.items():
             told, _ = diagnose(one.after, one.site, lose(model, parameter))
             say(f"  model without {effect} ({parameter} was {model.parameters[parameter]:.3g})", told)
