@@ -25,7 +25,7 @@ from igrow_core.simulator.hybrid.parameters import PARAMETERS
 from igrow_core.site import Site
 from igrow_core.telemetry import Telemetry
 from trainer.calibration import calibrate, prior
-from trainer.diagnosis import Deployed, Diagnosis, alignment, diagnose, learn_misfit, runner
+from trainer.diagnosis import Deployed, Diagnosis, alignment, diagnose, learn_misfit, runner, structure
 from trainer.readers.open_log import open_log
 
 COMPARTMENTS = (
@@ -96,9 +96,13 @@ def without(log: Telemetry, name: str) -> Telemetry:
 
 def lose(model: Deployed, parameter: str) -> Deployed:
     """Return the model with a term at the lowest value that its parameter may have."""
-    low = {parameter: PARAMETERS[parameter].low}
+    own = structure.PARAMETER_PREFIX + parameter
     return replace(
-        model, parameters={**model.parameters, **low}, standard_deviation={**model.standard_deviation, parameter: 0.0}
+        model,
+        parameters={**model.parameters, parameter: PARAMETERS[parameter].low},
+        standard_deviation={**model.standard_deviation, parameter: 0.0},
+        # What the calibration log said of this parameter beside would bring a part of it back.
+        known_misfit={key: value for key, value in model.known_misfit.items() if key != own},
     )
 
 
