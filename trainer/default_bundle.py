@@ -13,7 +13,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from igrow_core.bundle import Span
+from igrow_core.bundle import BUILT_IN, Span
 from igrow_core.greenhouse import Season, generate_weather, recipe, simulate_many
 from igrow_core.greenhouse.described import parameters_of
 from igrow_core.quantities import SETPOINTS
@@ -111,7 +111,8 @@ def default_model(site: Site, *, seed: int = 0, report: Report = print) -> Hybri
     return HybridModel(
         site=site,
         posterior=posterior,
-        calibrated_on=site.name,
+        # A virtual greenhouse, however well it was described: the real one is another.
+        calibrated_on=BUILT_IN,
         actuation=rules,
         holding=held,
         crop=CropStages(growth, harvest, conversion, maintenance),

@@ -13,6 +13,7 @@ runs) and `policy.onnx`, further files that the manifest lists, `golden.npz`
 """
 
 from igrow_core.bundle.files import (
+    BUILT_IN,
     GOLDEN_FILE,
     GRAPHS,
     MANIFEST_FILE,
@@ -43,6 +44,7 @@ from igrow_core.bundle.self_test import Deviation, self_test
 from igrow_core.bundle.session import new_session, open_session, run_graph
 
 __all__ = [
+    "BUILT_IN",
     "FORMAT_VERSION",
     "GOLDEN_FILE",
     "GRAPHS",

@@ -113,6 +113,10 @@ def read_bundle(folder: Path) -> Bundle:
     return Bundle(folder, manifest, hashlib.sha256(text).hexdigest()[:16])
 
 
+BUILT_IN = "default"
+"""Site of the built-in bundle: a greenhouse with all defaults of a description."""
+
+
 def default_bundle_folder() -> Path:
     """Return the folder of the default bundle that is installed with igrow: a greenhouse that nobody has measured."""
     return Path(str(resources.files("igrow_core"))) / "default_bundle"

@@ -16,6 +16,7 @@ from trainer.diagnosis.prior import ELSEWHERE
 from trainer.export.bundle import read_hybrid_model, write_hybrid_bundle
 
 HERE = Site(name="here", latitude=52.0, longitude=4.5)
+LOW = replace(HERE, greenhouse=Greenhouse(mean_height=2.5))
 
 
 def test_a_bundle_knows_the_greenhouse_it_was_calibrated_on() -> None:
@@ -32,8 +33,18 @@ def test_of_another_greenhouse_it_says_less_and_follows_its_description() -> Non
     for name, known in manifest.parameters.items():
         assert same.parameters[name] == pytest.approx(known.mean)
         assert same.standard_deviation[name] >= ELSEWHERE * known.mean
-    low = from_manifest(manifest, replace(HERE, greenhouse=Greenhouse(mean_height=2.5)))
+    low = from_manifest(manifest, LOW)
     assert low.parameters["leakage_wind"] == pytest.approx(2.0 * same.parameters["leakage_wind"], rel=0.01)
+
+
+def test_an_exported_bundle_is_diagnosed_as_the_one_it_came_from(tmp_path: Path) -> None:
+    built_in = read_bundle(default_bundle_folder())
+    exported = write_hybrid_bundle(
+        tmp_path / "low", read_hybrid_model(built_in, LOW), created=datetime(2020, 1, 1, tzinfo=UTC)
+    )
+    direct, through = from_manifest(built_in.manifest, LOW), from_manifest(exported.manifest, LOW)
+    assert dict(through.parameters) == pytest.approx(dict(direct.parameters))
+    assert dict(through.standard_deviation) == pytest.approx(dict(direct.standard_deviation), rel=0.01)
 
 
 def test_a_bundle_exported_for_a_site_remembers_where_it_was_calibrated(tmp_path: Path) -> None:

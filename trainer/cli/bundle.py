@@ -6,6 +6,7 @@ import argparse
 import shutil
 from pathlib import Path
 
+from igrow_core.bundle import BUILT_IN
 from igrow_core.site import Site, load_site
 from trainer.default_bundle import CREATED, default_model
 from trainer.export.bundle import write_hybrid_bundle
@@ -22,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Build the bundle."""
-    site = load_site(arguments.site) if arguments.site else Site(name="default", latitude=52.0, longitude=4.5)
+    site = load_site(arguments.site) if arguments.site else Site(name=BUILT_IN, latitude=52.0, longitude=4.5)
     model = default_model(site, seed=arguments.seed)
     fresh = arguments.out.with_name(f"{arguments.out.name}.new")
     shutil.rmtree(fresh, ignore_errors=True)

@@ -7,11 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from igrow_core.bundle import Manifest
+from igrow_core.bundle import BUILT_IN, Manifest
 from igrow_core.effects import EFFECTS
 from igrow_core.errors import IgrowError
-from igrow_core.simulator.hybrid.nominal import nominal
-from igrow_core.simulator.hybrid.parameters import PARAMETERS
+from igrow_core.simulator.hybrid.nominal import as_described, nominal
 from igrow_core.simulator.hybrid.record import Record
 from igrow_core.site import Site
 from trainer.calibration import Posterior
@@ -21,9 +20,6 @@ from trainer.diagnosis.activation import ActiveTerm
 from trainer.diagnosis.prior import Prior
 from trainer.diagnosis.split import split_days
 from trainer.model import CALIBRATED_ON_KEY, MISFIT_KEY
-
-BUILT_IN = "default"
-"""Site of the built-in bundle, a greenhouse with all defaults of a description."""
 
 
 @dataclass(frozen=True)
@@ -92,22 +88,11 @@ def from_manifest(manifest: Manifest, site: Site) -> Deployed:
     mean = {name: one.mean for name, one in manifest.parameters.items()}
     deviation = {name: one.standard_deviation for name, one in manifest.parameters.items()}
     known = {str(key): float(value) for key, value in misfit.items()} if isinstance(misfit, dict) else {}
-    calibrated_on = manifest.simulator.get(CALIBRATED_ON_KEY, manifest.site)
-    if calibrated_on == site.name:
+    if manifest.simulator.get(CALIBRATED_ON_KEY, manifest.site) == site.name:
         return Deployed(mean, deviation, tuple(effects), known)
-    if calibrated_on == BUILT_IN:
+    if manifest.site == BUILT_IN:
         mean = as_described(mean, site)
     return Deployed(mean, priors.elsewhere(mean, deviation), tuple(effects))
-
-
-def as_described(parameters: Mapping[str, float], site: Site) -> dict[str, float]:
-    """Return the parameters of a greenhouse with all defaults, scaled to what a site's description changes of them."""
-    described = nominal(site)
-    scaled = {
-        name: value * (described[name] / PARAMETERS[name].value if PARAMETERS[name].value else 1.0)
-        for name, value in parameters.items()
-    }
-    return {name: float(np.clip(value, PARAMETERS[name].low, PARAMETERS[name].high)) for name, value in scaled.items()}
 
 
 def learn_misfit(

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from igrow_core.bundle import Bundle, BundleError, Golden, Manifest, Parameter, run_graph, write_bundle
+from igrow_core.bundle import BUILT_IN, Bundle, BundleError, Golden, Manifest, Parameter, run_graph, write_bundle
 from igrow_core.effects import EFFECTS
 from igrow_core.planner.evolution import EvolutionSettings
 from igrow_core.simulator import actuation, holding
 from igrow_core.simulator.crop import CropStages
-from igrow_core.simulator.hybrid.nominal import nominal
+from igrow_core.simulator.hybrid.nominal import as_described, nominal
 from igrow_core.simulator.hybrid.parameters import PARAMETERS
 from igrow_core.site import Site
 from trainer.calibration.posterior import Posterior, prior
@@ -113,7 +113,8 @@ def read_hybrid_model(bundle: Bundle, site: Site) -> HybridModel:
     known = [name for name in PARAMETERS if name in manifest.parameters]
     if not known:
         raise BundleError(f"{bundle.folder}: manifest.json: parameters: none of the simulator's stands there")
-    values = nominal(site) | {name: manifest.parameters[name].mean for name in known}
+    means = {name: manifest.parameters[name].mean for name in known}
+    values = nominal(site) | (as_described(means, site) if manifest.site == BUILT_IN else means)
     posterior = prior(values, {name: manifest.parameters[name].standard_deviation for name in known})
     if manifest.covariance is not None and tuple(manifest.parameters) == posterior.names:
         posterior = Posterior(posterior.names, posterior.mean, np.array(manifest.covariance))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -49,6 +50,18 @@ def nominal(site: Site) -> dict[str, float]:
     ):
         if screen is not None and reference is not None:
             scale(name, screen.saving, reference.saving)
+    return _within_bounds(values)
+
+
+def as_described(parameters: Mapping[str, float], site: Site) -> dict[str, float]:
+    """Return the parameters of a greenhouse with all defaults, scaled to what a site's description changes of them."""
+    described = nominal(site)
+    usual = {name: PARAMETERS[name].value for name in parameters}
+    ratio = {name: described[name] / value if value else 1.0 for name, value in usual.items()}
+    return _within_bounds({name: value * ratio[name] for name, value in parameters.items()})
+
+
+def _within_bounds(values: Mapping[str, float]) -> dict[str, float]:
     return {name: float(np.clip(value, PARAMETERS[name].low, PARAMETERS[name].high)) for name, value in values.items()}
 
 
