@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.diagnosis import houses
-from benchmarks.diagnosis.houses import LEARNING_SEED, PLACES_SEED, House, of_seasons
+from benchmarks.diagnosis.houses import LEARNING_SEED, PLACES_SEED, House, elsewhere, neighbours, of_seasons
 from benchmarks.diagnosis.logs import MISMATCH, built_in, reference
+from igrow_core.bundle import BUILT_IN
 from igrow_core.greenhouse import Disturbances, recipe, simulate_many
 from igrow_core.greenhouse.described import parameters_of
 from igrow_core.site import Site
@@ -35,7 +35,7 @@ FOLDS = 4
 """In which families are left out to see how well directions carry."""
 SEASONS_FROM = 2
 """Families, the first ones, that have logs of a season too."""
-DEFAULT_SITE = Site(name="default", latitude=52.03, longitude=4.52)
+DEFAULT_SITE = Site(name=BUILT_IN, latitude=52.03, longitude=4.52)
 
 Directions = Sequence[Mapping[str, float]]
 
@@ -53,7 +53,7 @@ class Family:
 def families(processes: int) -> list[Family]:
     """Calibrate the models of all families."""
     own = of_seasons()
-    learned = houses.elsewhere(HOUSES, LEARNING_SEED).values()
+    learned = elsewhere(HOUSES, LEARNING_SEED).values()
     known = [own["winter"], own["spring"], *learned]
     seeds = [20_000, 30_000, *(81_000 + 100 * number for number in range(HOUSES))]
     found: list[Family] = []
@@ -97,7 +97,7 @@ def _traces(family: Family) -> list[usual.Traces]:
 
 def _traces_elsewhere(place: House) -> list[usual.Traces]:
     """Return the traces of greenhouses at a place of which only the built-in bundle is known."""
-    some = houses.neighbours(place, NEIGHBOURS)
+    some = neighbours(place, NEIGHBOURS)
     end = place.start + np.timedelta64(MONTH, "D")
     logs = simulate_many(
         [one.plant for one in some],
@@ -151,14 +151,14 @@ def learn(known: Sequence[Family], processes: int) -> usual.Usual:
     """Return what is usual between the greenhouses of families."""
     with ProcessPoolExecutor(processes) as pool:
         directions = _directions("calibrated before", pool.map(_traces, known), len(known), usual.DIRECTIONS)
-        places = houses.elsewhere(PLACES, PLACES_SEED).values()
+        places = elsewhere(PLACES, PLACES_SEED).values()
         found = pool.map(_traces_elsewhere, places)
-        elsewhere = _directions("by the built-in bundle", found, PLACES, usual.DIRECTIONS_ELSEWHERE)
+        unknown = _directions("by the built-in bundle", found, PLACES, usual.DIRECTIONS_ELSEWHERE)
         shown: list[dict[str, float]] = []
         for number, seen in enumerate(pool.map(partial(_amplitudes, directions), known[:SEASONS_FROM]), 1):
             shown += seen
             print(f"seasons of {number} of {SEASONS_FROM} families", file=sys.stderr)
-    return usual.Usual(tuple(directions), tuple(elsewhere), usual.root_mean_squares(shown))
+    return usual.Usual(tuple(directions), tuple(unknown), usual.root_mean_squares(shown))
 
 
 def main(processes: int) -> int:

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from benchmarks.diagnosis.houses import elsewhere, of_seasons
+from benchmarks.diagnosis.houses import elsewhere, neighbours, of_seasons
 
 
 def test_houses_elsewhere_are_other_greenhouses_each_time_the_same() -> None:
@@ -16,6 +16,16 @@ def test_houses_elsewhere_are_other_greenhouses_each_time_the_same() -> None:
     assert len({house.plant.leakage for house in houses.values()}) == 4
     assert len({house.seed for house in houses.values()}) == 4
     assert [house.site.greenhouse.lamps is None for house in houses.values()] == [False, True, False, True]
+
+
+def test_neighbours_differ_under_one_sun_with_or_without_lamps() -> None:
+    for place in elsewhere(2).values():
+        some = neighbours(place, 3)
+        assert len({house.plant.leakage for house in some}) == len({house.seed for house in some}) == 3
+        for house in some:
+            assert (house.start, house.site.latitude) == (place.start, place.site.latitude)
+            assert (house.site.greenhouse.lamps is None) == (place.site.greenhouse.lamps is None)
+            assert house.site.greenhouse.mean_height == np.mean(house.plant.air_height)
 
 
 def test_the_seasons_share_one_greenhouse() -> None:

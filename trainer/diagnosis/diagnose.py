@@ -59,8 +59,8 @@ REGIME_SHARE = 0.25
 LARGEST_REMAINDER = 5.0
 """Bound of the remainder's amplitudes, in units of a pattern."""
 NOT_CALIBRATED = (
-    "The model was not calibrated on this greenhouse, and only large causes can be told from a greenhouse that is "
-    "another: calibrate it on weeks of the log that are known to be good (igrow-trainer calibrate)."
+    "What the model misses of this greenhouse when all is well is not known, so only large causes can be told from a "
+    "greenhouse that is another: calibrate it on weeks that are known to be good (igrow-trainer calibrate)."
 )
 
 

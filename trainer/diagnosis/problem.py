@@ -68,7 +68,7 @@ class Problem:
 
     @property
     def elsewhere(self) -> bool:
-        """The model was calibrated on another greenhouse: what it missed on this one is not known."""
+        """What the model misses of this greenhouse when all is well is not known: it was calibrated on another one."""
         return len(self.known) == 0
 
     @property
