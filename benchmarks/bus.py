@@ -2,8 +2,8 @@
 
 Three figures:
 
-- registers per second of `edge.bus` against pymodbus' own client, the same blocks from the same server (pymodbus',
-  in a process of its own), in turns within one run; the ratio is the median over the turns;
+- registers per second of `igrow.edge.bus` against pymodbus' own client, the same blocks from the same server
+  (pymodbus', in a process of its own), in turns within one run; the ratio is the median over the turns;
 - share of one core for ten units of 40 registers, polled every 5 s and decoded to values, measured over a minute;
 - milliseconds for one lock-step cycle with the virtual PLC (heartbeat, then all points), and what pymodbus' server
   needs for the same three requests.
@@ -26,14 +26,14 @@ from pymodbus.client import AsyncModbusTcpClient
 from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
-from edge.bus.modbus_bus import ModbusBus
-from edge.bus.plc import RegisterPlc
-from edge.bus.protocol import Priority, ReadRequest
-from edge.registers.loading import load_register_map
-from edge.registers.model import BusSettings, Device, Function, Point, RegisterMap, Transport
-from edge.registers.model import DataType as PointType
-from edge.virtual_plc.pace import Lockstep
-from edge.virtual_plc.virtual_plc import VirtualPlc
+from igrow.edge.bus.modbus_bus import ModbusBus
+from igrow.edge.bus.plc import RegisterPlc
+from igrow.edge.bus.protocol import Priority, ReadRequest
+from igrow.edge.registers.loading import load_register_map
+from igrow.edge.registers.model import BusSettings, Device, Function, Point, RegisterMap, Transport
+from igrow.edge.registers.model import DataType as PointType
+from igrow.edge.virtual_plc.pace import Lockstep
+from igrow.edge.virtual_plc.virtual_plc import VirtualPlc
 
 ROOT = Path(__file__).parents[1]
 UNITS = range(1, 11)

@@ -18,7 +18,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from igrow_core.bundle import default_bundle_folder
+from igrow.core.bundle import default_bundle_folder
 
 ROOT = Path(__file__).resolve().parents[1]
 MEMORY_GOAL, START_GOAL = 150.0, 3.0
@@ -37,7 +37,7 @@ class Site:
             "PYTHONPATH": str(ROOT),
         }
         register_map = ROOT / "config" / "register-maps" / "virtual-plc.yaml"
-        command = [sys.executable, "-m", "edge.cli", "simulate-plc", "--map", str(register_map), "--port", "0"]
+        command = [sys.executable, "-m", "igrow.edge.cli", "simulate-plc", "--map", str(register_map), "--port", "0"]
         self.plc = subprocess.Popen(
             [*command, "--pace", pace, "--days", "30"], stdout=subprocess.PIPE, env=self.environment
         )
@@ -52,7 +52,7 @@ class Site:
 
     def start(self) -> subprocess.Popen[bytes]:
         log = (self.folder / "daemon.log").open("ab")
-        command = [sys.executable, "-m", "edge.cli", "run", str(self.configuration)]
+        command = [sys.executable, "-m", "igrow.edge.cli", "run", str(self.configuration)]
         return subprocess.Popen(command, stdout=log, stderr=log, env=self.environment)
 
     def state(self) -> dict[str, object] | None:

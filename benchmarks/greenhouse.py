@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks import greenhouse_agc, greenhouse_wur
-from igrow_core.greenhouse import GreenhouseParameters, generate_weather, recipe, simulate, simulate_many
+from igrow.core.greenhouse import GreenhouseParameters, generate_weather, recipe, simulate, simulate_many
 
 START = np.datetime64("2020-03-01T00:00:00", "s")
 

@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.greenhouse import GreenhouseParameters, simulate
-from igrow_core.greenhouse.disturbances import QUIET
-from igrow_core.greenhouse.sensors import EXACT
-from igrow_core.telemetry import Telemetry, to_grid
-from trainer.readers.open_log import open_log
+from igrow.core.greenhouse import GreenhouseParameters, simulate
+from igrow.core.greenhouse.disturbances import QUIET
+from igrow.core.greenhouse.sensors import EXACT
+from igrow.core.telemetry import Telemetry, to_grid
+from igrow.trainer.readers.open_log import open_log
 
 LAMP_CAPACITY = 142.5
 """Sodium lamps and diodes at full power, W m-2."""

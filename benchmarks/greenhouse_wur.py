@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.greenhouse import Disturbances, GreenhouseParameters, Sensors, climate, tomato
-from igrow_core.greenhouse.climate_computer import ClimateComputer
-from igrow_core.greenhouse.parameters import stack
-from igrow_core.greenhouse.plant import Plant
-from igrow_core.greenhouse.weather_table import WeatherTable
-from igrow_core.telemetry import Telemetry
-from trainer.readers.wur2020 import Seasons, read_seasons
+from igrow.core.greenhouse import Disturbances, GreenhouseParameters, Sensors, climate, tomato
+from igrow.core.greenhouse.climate_computer import ClimateComputer
+from igrow.core.greenhouse.parameters import stack
+from igrow.core.greenhouse.plant import Plant
+from igrow.core.greenhouse.weather_table import WeatherTable
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.readers.wur2020 import Seasons, read_seasons
 
 Values = NDArray[np.float64]
 HOUR = 3600

@@ -11,10 +11,10 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.simulator.hybrid.record import Record
-from trainer.calibration.forecast import Predictor
-from trainer.training.simulator import layout
-from trainer.training.stage import StageData, TrainingPlan, run_windows, train_stage, untrained
+from igrow.core.simulator.hybrid.record import Record
+from igrow.trainer.calibration.forecast import Predictor
+from igrow.trainer.training.simulator import layout
+from igrow.trainer.training.stage import StageData, TrainingPlan, run_windows, train_stage, untrained
 
 Floats = NDArray[np.float64]
 

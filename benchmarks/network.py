@@ -24,7 +24,7 @@ import torch
 from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
-from igrow_core.bundle import new_session
+from igrow.core.bundle import new_session
 
 Weights = list[tuple[NDArray[np.float32], NDArray[np.float32]]]
 

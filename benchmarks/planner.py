@@ -21,19 +21,19 @@ from typing import Any
 
 import numpy as np
 
-from igrow_core.greenhouse import GreenhouseParameters, generate_weather
-from igrow_core.greenhouse import recipe as growers_recipe
-from igrow_core.planner import Budget, EvolutionSettings, NumpyGeneration, Objective, PlanningState, optimise
-from igrow_core.planner.evolution import draw
-from igrow_core.planner.objective import Simulator, Valuation
-from igrow_core.planner.onnx_generation import OnnxGeneration
-from igrow_core.planner.plant_simulator import PlantSimulator
-from igrow_core.planner.policy import HOURS, OnnxPolicy, to_setpoints
-from igrow_core.planner.template import for_site
-from igrow_core.quantities import SETPOINTS
-from igrow_core.site import Site, load_site
-from trainer.export.optimizer import export_optimizer
-from trainer.policies.environment import DailyGreenhouses, Scenario, hourly_weather
+from igrow.core.greenhouse import GreenhouseParameters, generate_weather
+from igrow.core.greenhouse import recipe as growers_recipe
+from igrow.core.planner import Budget, EvolutionSettings, NumpyGeneration, Objective, PlanningState, optimise
+from igrow.core.planner.evolution import draw
+from igrow.core.planner.objective import Simulator, Valuation
+from igrow.core.planner.onnx_generation import OnnxGeneration
+from igrow.core.planner.plant_simulator import PlantSimulator
+from igrow.core.planner.policy import HOURS, OnnxPolicy, to_setpoints
+from igrow.core.planner.template import for_site
+from igrow.core.quantities import SETPOINTS
+from igrow.core.site import Site, load_site
+from igrow.trainer.export.optimizer import export_optimizer
+from igrow.trainer.policies.environment import DailyGreenhouses, Scenario, hourly_weather
 
 DAY = np.timedelta64(86_400, "s")
 SETTINGS = EvolutionSettings(parents=24, offspring=48)
@@ -86,8 +86,8 @@ def plans(arguments: argparse.Namespace) -> None:
         plant.follow(recipe_table(site, start - DAY, 24))
         model: Simulator = plant
         if arguments.bundle:
-            from igrow_core.bundle import read_bundle  # noqa: PLC0415 - not every run has a bundle
-            from igrow_core.simulator.plan import BundleSimulator  # noqa: PLC0415
+            from igrow.core.bundle import read_bundle  # noqa: PLC0415 - not every run has a bundle
+            from igrow.core.simulator.plan import BundleSimulator  # noqa: PLC0415
 
             model = BundleSimulator(read_bundle(arguments.bundle), site.greenhouse)
         state = PlanningState(start, plant.measurements())

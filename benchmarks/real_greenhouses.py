@@ -21,25 +21,25 @@ from numpy.typing import NDArray
 from sklearn.ensemble import HistGradientBoostingRegressor
 
 from benchmarks.measured_network import network_predictor
-from igrow_core.economics import local_days
-from igrow_core.errors import IgrowError
-from igrow_core.planner.recent_use import used_in
-from igrow_core.simulator.hybrid.nominal import nominal, site_record
-from igrow_core.simulator.hybrid.record import Record
-from igrow_core.simulator.uncertainty import ErrorGrowth
-from igrow_core.telemetry import Telemetry
-from trainer.calibration.actuation import setpoint_columns
-from trainer.calibration.evaluation import Errors, errors_of, starts_within, summarise
-from trainer.calibration.forecast import Predictor, remembering
-from trainer.calibration.posterior import prior
-from trainer.calibration.site_model import SiteModel, adapt, fit_site, from_few_days
-from trainer.calibration.split import weeks
-from trainer.calibration.totals import coverage, daily_totals
-from trainer.export.plan import RANGED
-from trainer.model import known_range
-from trainer.readers import challenge
-from trainer.readers.log import Log
-from trainer.readers.open_log import open_log
+from igrow.core.economics import local_days
+from igrow.core.errors import IgrowError
+from igrow.core.planner.recent_use import used_in
+from igrow.core.simulator.hybrid.nominal import nominal, site_record
+from igrow.core.simulator.hybrid.record import Record
+from igrow.core.simulator.uncertainty import ErrorGrowth
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.calibration.actuation import setpoint_columns
+from igrow.trainer.calibration.evaluation import Errors, errors_of, starts_within, summarise
+from igrow.trainer.calibration.forecast import Predictor, remembering
+from igrow.trainer.calibration.posterior import prior
+from igrow.trainer.calibration.site_model import SiteModel, adapt, fit_site, from_few_days
+from igrow.trainer.calibration.split import weeks
+from igrow.trainer.calibration.totals import coverage, daily_totals
+from igrow.trainer.export.plan import RANGED
+from igrow.trainer.model import known_range
+from igrow.trainer.readers import challenge
+from igrow.trainer.readers.log import Log
+from igrow.trainer.readers.open_log import open_log
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -289,7 +289,7 @@ def print_range(house: Greenhouse, model: SiteModel, predict: Predictor, fit: Ma
     """Tell whether runs outside the training range are worse: by both measures, the error of 24 h runs.
 
     `bounds` is what a bundle's graph tells planning: the largest excess over the bounds of single quantities
-    (`trainer.model.known_range`). `TrainingRange` sees combinations that never occurred too.
+    (`igrow.trainer.model.known_range`). `TrainingRange` sees combinations that never occurred too.
     """
     record = house.record
     known = {**record.inputs, **record.measured, **house.setpoints}

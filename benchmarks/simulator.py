@@ -10,12 +10,12 @@ from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 
-from igrow_core.bundle import default_bundle_folder, read_bundle
-from igrow_core.quantities import SETPOINTS
-from igrow_core.simulator.hybrid import climate
-from igrow_core.simulator.hybrid.parameters import PARAMETERS
-from igrow_core.simulator.plan import STEPS_PER_HOUR, BundleSimulator
-from igrow_core.site import Greenhouse
+from igrow.core.bundle import default_bundle_folder, read_bundle
+from igrow.core.quantities import SETPOINTS
+from igrow.core.simulator.hybrid import climate
+from igrow.core.simulator.hybrid.parameters import PARAMETERS
+from igrow.core.simulator.plan import STEPS_PER_HOUR, BundleSimulator
+from igrow.core.site import Greenhouse
 
 CANDIDATES, HOURS, ROUNDS = 1000, 48, 20
 START = np.datetime64("2020-03-01T00:00:00")

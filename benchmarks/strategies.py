@@ -6,7 +6,7 @@ Every strategy leads the same greenhouses (each differs from the described one, 
 same weather, in winter and in spring. None of them has seen greenhouse or weather; all of them plan with the bundle's
 simulator, which is not the greenhouse. For each the table tells what the simulator expected of the coming hours
 whenever setpoints were chosen, and what the greenhouse then obtained, by the same rules of value
-(`igrow_core.planner.objective`). The spread is over greenhouses and seasons, of the gain over the recipe.
+(`igrow.core.planner.objective`). The spread is over greenhouses and seasons, of the gain over the recipe.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.planner import SITE, recipe_table
-from edge.planning.forecast import persistence
-from edge.planning.make_plan import RECENT_DAYS
-from igrow_core.bundle import default_bundle_folder, read_bundle
-from igrow_core.economics import harvest_income, local_days
-from igrow_core.planner import Objective, Outcome, PlanningState, Simulator, optimise
-from igrow_core.planner.policy import OnnxPolicy
-from igrow_core.planner.recent_use import SCALED, Scaled, factors, totals
-from igrow_core.planner.template import for_site
-from igrow_core.quantities import SETPOINTS
-from igrow_core.simulator.plan import BundleSimulator
-from igrow_core.site import Site, load_site
-from igrow_core.sun import unix_seconds
-from igrow_core.telemetry import Telemetry
-from trainer.policies.environment import DAY, Greenhouses, Scenario, hourly_weather
+from igrow.core.bundle import default_bundle_folder, read_bundle
+from igrow.core.economics import harvest_income, local_days
+from igrow.core.planner import Objective, Outcome, PlanningState, Simulator, optimise
+from igrow.core.planner.policy import OnnxPolicy
+from igrow.core.planner.recent_use import SCALED, Scaled, factors, totals
+from igrow.core.planner.template import for_site
+from igrow.core.quantities import SETPOINTS
+from igrow.core.simulator.plan import BundleSimulator
+from igrow.core.site import Site, load_site
+from igrow.core.sun import unix_seconds
+from igrow.core.telemetry import Telemetry
+from igrow.edge.planning.forecast import persistence
+from igrow.edge.planning.make_plan import RECENT_DAYS
+from igrow.trainer.policies.environment import DAY, Greenhouses, Scenario, hourly_weather
 
 Values = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from edge.ports import AlarmRecord
+from igrow.edge.ports import AlarmRecord
 
 
 class AlarmBoard:

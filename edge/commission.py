@@ -11,12 +11,12 @@ import time
 from datetime import timedelta
 from typing import Protocol
 
-from edge.bus.plc import Reading, RegisterPlc
-from edge.configuration import Configuration
-from edge.guard import GuardedWriter, GuardRules, GuardState, Request, guard
-from edge.image import Image
-from edge.registers.model import expected_unit
-from igrow_core.yaml_schema import duration
+from igrow.core.yaml_schema import duration
+from igrow.edge.bus.plc import Reading, RegisterPlc
+from igrow.edge.configuration import Configuration
+from igrow.edge.guard import GuardedWriter, GuardRules, GuardState, Request, guard
+from igrow.edge.image import Image
+from igrow.edge.registers.model import expected_unit
 
 READ_AGAIN = 2.0
 """Seconds after a write until it is read again."""

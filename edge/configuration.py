@@ -16,20 +16,20 @@ from enum import Enum
 from pathlib import Path
 from zoneinfo import ZoneInfo
 
-from edge.guard import DEFAULT_INTERLOCKS, Bound, GuardRules, Interlock
-from edge.guard.interlocks import SAFE, InterlockError
-from edge.guard.rules import GuardRuleError
-from edge.point_rules import point_rule
-from edge.registers.bus_load import estimate
-from edge.registers.loading import load_register_map
-from edge.registers.model import SYSTEM_POINTS, RegisterMap
-from edge.sensors.rules import SensorRule, default_rule
-from edge.sources.recipe import Recipe
-from igrow_core.errors import IgrowError
-from igrow_core.local_time import zone
-from igrow_core.quantities import ACTUATORS, QUANTITIES, SETPOINTS
-from igrow_core.site import SetpointLimits, Site, load_site
-from igrow_core.yaml_schema import SettingError, duration, load, place, setting
+from igrow.core.errors import IgrowError
+from igrow.core.local_time import zone
+from igrow.core.quantities import ACTUATORS, QUANTITIES, SETPOINTS
+from igrow.core.site import SetpointLimits, Site, load_site
+from igrow.core.yaml_schema import SettingError, duration, load, place, setting
+from igrow.edge.guard import DEFAULT_INTERLOCKS, Bound, GuardRules, Interlock
+from igrow.edge.guard.interlocks import SAFE, InterlockError
+from igrow.edge.guard.rules import GuardRuleError
+from igrow.edge.point_rules import point_rule
+from igrow.edge.registers.bus_load import estimate
+from igrow.edge.registers.loading import load_register_map
+from igrow.edge.registers.model import SYSTEM_POINTS, RegisterMap
+from igrow.edge.sensors.rules import SensorRule, default_rule
+from igrow.edge.sources.recipe import Recipe
 
 _SECOND = datetime.timedelta(seconds=1)
 _MINUTE = datetime.timedelta(minutes=1)

@@ -11,15 +11,15 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from edge.clock import Clock
-from edge.guard import GuardedWriter, GuardRules, GuardState, Readback, Request, Verdict, guard
-from edge.guard.core import begin_again, never_sent
-from edge.guard.readback import Outcome
-from edge.image import Image, Quality
-from edge.journal import Journal
-from edge.ports import SetpointStatus
-from edge.sensors import ImageBuilder, RawReading
-from edge.sources import Choice, Decision, Source, decide
+from igrow.edge.clock import Clock
+from igrow.edge.guard import GuardedWriter, GuardRules, GuardState, Readback, Request, Verdict, guard
+from igrow.edge.guard.core import begin_again, never_sent
+from igrow.edge.guard.readback import Outcome
+from igrow.edge.image import Image, Quality
+from igrow.edge.journal import Journal
+from igrow.edge.ports import SetpointStatus
+from igrow.edge.sensors import ImageBuilder, RawReading
+from igrow.edge.sources import Choice, Decision, Source, decide
 
 
 class ReadablePlc(Protocol):

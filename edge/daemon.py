@@ -10,14 +10,14 @@ from collections.abc import Coroutine, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
-from edge.configuration import Configuration, load_configuration
-from edge.cycle import CycleResult
-from edge.journal import Journal
-from edge.notify import Notifier
-from edge.ports import Plan, Snapshot
-from edge.state_lock import sole_use
-from edge.wiring import Control, Services, build_control, open_services, remember
-from igrow_core.errors import IgrowError
+from igrow.core.errors import IgrowError
+from igrow.edge.configuration import Configuration, load_configuration
+from igrow.edge.cycle import CycleResult
+from igrow.edge.journal import Journal
+from igrow.edge.notify import Notifier
+from igrow.edge.ports import Plan, Snapshot
+from igrow.edge.state_lock import sole_use
+from igrow.edge.wiring import Control, Services, build_control, open_services, remember
 
 STOP_SECONDS = 5.0
 """Longest time that the safe setpoints may take on the way out."""

@@ -24,10 +24,10 @@ from typing import Protocol
 
 import numpy as np
 
-from edge.store.store import read_records, read_telemetry
-from igrow_core.errors import IgrowError
-from igrow_core.telemetry import write_csv
-from igrow_core.whole_files import write_whole
+from igrow.core.errors import IgrowError
+from igrow.core.telemetry import write_csv
+from igrow.core.whole_files import write_whole
+from igrow.edge.store.store import read_records, read_telemetry
 
 DAY = 86_400
 GRACE_SECONDS = 120
@@ -44,7 +44,7 @@ class FlushingStore(Protocol):
 
 
 class FolderExchange:
-    """The exchange as a folder; implements `edge.ports.Exchange`."""
+    """The exchange as a folder; implements `igrow.edge.ports.Exchange`."""
 
     def __init__(self, root: Path, site: str, store: FlushingStore) -> None:
         self._root = root

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from edge.state_file import read_state, write_state
+from igrow.edge.state_file import read_state, write_state
 
 
 class HoldFile:

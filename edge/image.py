@@ -1,7 +1,7 @@
 """The process image: what one control cycle knows, frozen for the length of that cycle.
 
 Every value carries its quality and its age, so that nothing downstream has to guess whether a number may be
-believed. `edge.sensors` builds an image from raw readings; decisions, guard and log only read it.
+believed. `igrow.edge.sensors` builds an image from raw readings; decisions, guard and log only read it.
 """
 
 from __future__ import annotations

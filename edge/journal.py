@@ -11,14 +11,14 @@ import math
 from collections import deque
 from collections.abc import Mapping, Sequence
 
-from edge.alarms import AlarmBoard
-from edge.guard import Clamp, Finding, WriteOutcome
-from edge.guard.readback import Outcome
-from edge.image import Image, Value
-from edge.ports import AlarmRecord, Store, WriteRecord
-from edge.sensors.consequences import CONSEQUENCES
-from edge.sentences import log_event
-from igrow_core.quantities import QUANTITIES
+from igrow.core.quantities import QUANTITIES
+from igrow.edge.alarms import AlarmBoard
+from igrow.edge.guard import Clamp, Finding, WriteOutcome
+from igrow.edge.guard.readback import Outcome
+from igrow.edge.image import Image, Value
+from igrow.edge.ports import AlarmRecord, Store, WriteRecord
+from igrow.edge.sensors.consequences import CONSEQUENCES
+from igrow.edge.sentences import log_event
 
 WAITING_ROWS = 20_000
 """Undated rows kept in memory: more than two days at one each 10 s."""

@@ -7,16 +7,16 @@ import time
 from collections.abc import Collection, Mapping
 from typing import Protocol
 
-from edge.clock import PlcClock
-from edge.cycle import ReadablePlc
-from edge.sensors import RawReading
+from igrow.edge.clock import PlcClock
+from igrow.edge.cycle import ReadablePlc
+from igrow.edge.sensors import RawReading
 
 PATIENCE = 2.0
 """Wall-clock seconds for a simulated plant to move on; then a cycle runs without it, as it would on a dead line."""
 
 
 class SignOfLife(Protocol):
-    """Hears that a wait goes on as it should (`edge.notify.Notifier`)."""
+    """Hears that a wait goes on as it should (`igrow.edge.notify.Notifier`)."""
 
     feed_every: float
     """Seconds between two signs that it can rely on; may be infinite."""

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from zoneinfo import ZoneInfo
 
-from edge.image import Image
-from edge.ports import ActiveBundle, PlanningService, PlanRequest, Store
-from edge.sensors.consequences import usable_for_planning
-from edge.sources.recipe import Recipe, recipe_course
-from igrow_core.errors import IgrowError
-from igrow_core.telemetry import Telemetry, read_csv
+from igrow.core.errors import IgrowError
+from igrow.core.telemetry import Telemetry, read_csv
+from igrow.edge.image import Image
+from igrow.edge.ports import ActiveBundle, PlanningService, PlanRequest, Store
+from igrow.edge.sensors.consequences import usable_for_planning
+from igrow.edge.sources.recipe import Recipe, recipe_course
 
 log = logging.getLogger("igrow.edge")
 

@@ -6,10 +6,10 @@ exactly; between two such values rounding stays between them.
 
 from __future__ import annotations
 
-from edge.guard.rules import GuardRuleError, PointRule
-from edge.registers.codec import decode, encode
-from edge.registers.model import DataType, Point
-from igrow_core.site import SetpointLimits
+from igrow.core.site import SetpointLimits
+from igrow.edge.guard.rules import GuardRuleError, PointRule
+from igrow.edge.registers.codec import decode, encode
+from igrow.edge.registers.model import DataType, Point
 
 _FLOATS = (DataType.FLOAT32, DataType.FLOAT64)
 

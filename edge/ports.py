@@ -1,6 +1,6 @@
 """What the control cycle needs from the rest of the gateway, as Protocols, and the records that cross.
 
-The cycle is written against this file alone (and `edge.bus.plc` for the PLC). The store, the planning process,
+The cycle is written against this file alone (and `igrow.edge.bus.plc` for the PLC). The store, the planning process,
 the bundle updates and the status page implement it; tests implement it with a few lines each.
 
 Times: `time` is seconds since 1970 UTC, or None while the clock cannot be trusted (`clock_ok` is false); a record
@@ -15,8 +15,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
-from edge.image import Value
-from igrow_core.telemetry import Telemetry
+from igrow.core.telemetry import Telemetry
+from igrow.edge.image import Value
 
 # --- records --------------------------------------------------------------------------------------------------
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Iterator, Sequence
 
-from edge.bus.errors import BusError, RefusedError
-from edge.bus.modbus_bus import ModbusBus
-from edge.bus.protocol import Bus, Priority, ReadRequest
-from edge.registers.codec import decode_raw
-from edge.registers.model import BusSettings, ByteOrder, DataType, Function
+from igrow.edge.bus.errors import BusError, RefusedError
+from igrow.edge.bus.modbus_bus import ModbusBus
+from igrow.edge.bus.protocol import Bus, Priority, ReadRequest
+from igrow.edge.registers.codec import decode_raw
+from igrow.edge.registers.model import BusSettings, ByteOrder, DataType, Function
 
 _BY_WIDTH = {
     1: (DataType.INT16, DataType.UINT16),

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
-from igrow_core.whole_files import write_whole
+from igrow.core.whole_files import write_whole
 
 
 def read_state(path: Path) -> dict[str, object]:

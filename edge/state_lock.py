@@ -8,7 +8,7 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from igrow_core.errors import IgrowError
+from igrow.core.errors import IgrowError
 
 LOCK_FILE = "lock"
 

@@ -8,27 +8,27 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from edge.bus.plc import RegisterPlc
-from edge.clock import Clock, PlcClock, SystemClock
-from edge.configuration import ClockSource, Configuration
-from edge.cycle import ControlCycle
-from edge.exchange import FolderExchange
-from edge.guard import GuardedWriter, GuardState, Readback
-from edge.guard.core import with_earlier_writes
-from edge.holds import HoldFile
-from edge.journal import Journal
-from edge.pace import FollowedPlant, Pace, TickPace
-from edge.planning import PlanningProcess, ProcessLimits
-from edge.planning_schedule import PlanningRules, PlanningSchedule
-from edge.ports import Exchange, Plan, PlanningService, StatusService, Store, UpdateService
-from edge.registers.model import TWIN_SUFFIX
-from edge.sensors import ImageBuilder, TwinSensors
-from edge.sources import FreshPlan, GrowerOverride, HandsOff, LastValidPlan, PlanKeeper, RecipeSource
-from edge.status import StatusServer
-from edge.store import SqliteStore, StoreLimits
-from edge.updates import BundleUpdates, SignedSource, UpdateRules
-from igrow_core.simulator.hindcast import HindcastPredictor
-from igrow_core.sun import position
+from igrow.core.simulator.hindcast import HindcastPredictor
+from igrow.core.sun import position
+from igrow.edge.bus.plc import RegisterPlc
+from igrow.edge.clock import Clock, PlcClock, SystemClock
+from igrow.edge.configuration import ClockSource, Configuration
+from igrow.edge.cycle import ControlCycle
+from igrow.edge.exchange import FolderExchange
+from igrow.edge.guard import GuardedWriter, GuardState, Readback
+from igrow.edge.guard.core import with_earlier_writes
+from igrow.edge.holds import HoldFile
+from igrow.edge.journal import Journal
+from igrow.edge.pace import FollowedPlant, Pace, TickPace
+from igrow.edge.planning import PlanningProcess, ProcessLimits
+from igrow.edge.planning_schedule import PlanningRules, PlanningSchedule
+from igrow.edge.ports import Exchange, Plan, PlanningService, StatusService, Store, UpdateService
+from igrow.edge.registers.model import TWIN_SUFFIX
+from igrow.edge.sensors import ImageBuilder, TwinSensors
+from igrow.edge.sources import FreshPlan, GrowerOverride, HandsOff, LastValidPlan, PlanKeeper, RecipeSource
+from igrow.edge.status import StatusServer
+from igrow.edge.store import SqliteStore, StoreLimits
+from igrow.edge.updates import BundleUpdates, SignedSource, UpdateRules
 
 OVERRIDE_FILE = "override.json"
 HOLD_FILE = "holds.json"

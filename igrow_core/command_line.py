@@ -12,7 +12,7 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 
-from igrow_core.errors import IgrowError
+from igrow.core.errors import IgrowError
 
 
 def run_command(

@@ -14,8 +14,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from igrow_core.local_time import hour_of_day, to_local
-from igrow_core.site import Prices
+from igrow.core.local_time import hour_of_day, to_local
+from igrow.core.site import Prices
 
 Times = NDArray[np.datetime64]
 Values = NDArray[np.float64]

@@ -24,11 +24,11 @@ from pathlib import Path
 
 import numpy as np
 
-from igrow_core import yaml_schema
-from igrow_core.local_time import from_local, zone
-from igrow_core.quantities import QUANTITIES
-from igrow_core.telemetry import Telemetry, TelemetryError, Times, Values, from_rows, parse_numbers, read_cells
-from igrow_core.yaml_schema import nearest, setting
+from igrow.core import yaml_schema
+from igrow.core.local_time import from_local, zone
+from igrow.core.quantities import QUANTITIES
+from igrow.core.telemetry import Telemetry, TelemetryError, Times, Values, from_rows, parse_numbers, read_cells
+from igrow.core.yaml_schema import nearest, setting
 
 _EXCEL_EPOCH = np.datetime64("1899-12-30T00:00:00", "s")
 

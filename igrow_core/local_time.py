@@ -8,7 +8,7 @@ from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.errors import IgrowError
+from igrow.core.errors import IgrowError
 
 Times = NDArray[np.datetime64]
 

@@ -17,11 +17,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from itertools import pairwise
 
-from igrow_core import yaml_schema
-from igrow_core.errors import IgrowError
-from igrow_core.local_time import zone
-from igrow_core.quantities import ACTUATORS, CLIMATE, QUANTITIES, SETPOINTS, WEATHER
-from igrow_core.yaml_schema import SettingError, setting
+from igrow.core import yaml_schema
+from igrow.core.errors import IgrowError
+from igrow.core.local_time import zone
+from igrow.core.quantities import ACTUATORS, CLIMATE, QUANTITIES, SETPOINTS, WEATHER
+from igrow.core.yaml_schema import SettingError, setting
 
 
 @dataclass(frozen=True)

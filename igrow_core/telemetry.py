@@ -22,9 +22,9 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.errors import IgrowError
-from igrow_core.quantities import QUANTITIES
-from igrow_core.whole_files import write_whole
+from igrow.core.errors import IgrowError
+from igrow.core.quantities import QUANTITIES
+from igrow.core.whole_files import write_whole
 
 Times = NDArray[np.datetime64]
 Values = NDArray[np.float64]

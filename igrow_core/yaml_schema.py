@@ -36,7 +36,7 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 
 import yaml
 
-from igrow_core.errors import IgrowError
+from igrow.core.errors import IgrowError
 
 T = TypeVar("T")
 

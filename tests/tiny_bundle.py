@@ -9,7 +9,7 @@ import numpy as np
 import onnx
 from onnx import TensorProto, helper
 
-from igrow_core.bundle import (
+from igrow.core.bundle import (
     Bundle,
     EffectRecord,
     Estimate,

@@ -7,13 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core import sun
-from igrow_core.simulator import actuation
-from igrow_core.simulator.closed_loop import closed_run
-from igrow_core.simulator.hybrid import record as records
-from igrow_core.simulator.hybrid.nominal import nominal, site_record
-from igrow_core.site import Site
-from igrow_core.telemetry import Telemetry
+from igrow.core import sun
+from igrow.core.simulator import actuation
+from igrow.core.simulator.closed_loop import closed_run
+from igrow.core.simulator.hybrid import record as records
+from igrow.core.simulator.hybrid.nominal import nominal, site_record
+from igrow.core.site import Site
+from igrow.core.telemetry import Telemetry
 
 Floats = NDArray[np.float64]
 

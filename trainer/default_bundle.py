@@ -13,24 +13,24 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from igrow_core.bundle import BUILT_IN, Span
-from igrow_core.greenhouse import Season, generate_weather, recipe, simulate_many
-from igrow_core.greenhouse.described import parameters_of
-from igrow_core.quantities import SETPOINTS
-from igrow_core.simulator import holding
-from igrow_core.simulator.crop import CropStages
-from igrow_core.simulator.hybrid.nominal import nominal, site_record
-from igrow_core.site import Site
-from igrow_core.telemetry import Telemetry
-from trainer.calibration.actuation import fit_actuation, setpoint_columns
-from trainer.calibration.fit import calibrate
-from trainer.calibration.holding import fit_holding
-from trainer.calibration.posterior import Posterior, prior
-from trainer.diagnosis.deployed import from_site, learn_misfit
-from trainer.diagnosis.runner import open_record
-from trainer.export.plan import RANGED
-from trainer.model import HybridModel, known_range
-from trainer.training.crop import fit_net_growth, train_networks
+from igrow.core.bundle import BUILT_IN, Span
+from igrow.core.greenhouse import Season, generate_weather, recipe, simulate_many
+from igrow.core.greenhouse.described import parameters_of
+from igrow.core.quantities import SETPOINTS
+from igrow.core.simulator import holding
+from igrow.core.simulator.crop import CropStages
+from igrow.core.simulator.hybrid.nominal import nominal, site_record
+from igrow.core.site import Site
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.calibration.actuation import fit_actuation, setpoint_columns
+from igrow.trainer.calibration.fit import calibrate
+from igrow.trainer.calibration.holding import fit_holding
+from igrow.trainer.calibration.posterior import Posterior, prior
+from igrow.trainer.diagnosis.deployed import from_site, learn_misfit
+from igrow.trainer.diagnosis.runner import open_record
+from igrow.trainer.export.plan import RANGED
+from igrow.trainer.model import HybridModel, known_range
+from igrow.trainer.training.crop import fit_net_growth, train_networks
 
 START = np.datetime64("2020-01-20T00:00:00")
 CREATED = datetime(2020, 6, 1, tzinfo=UTC)

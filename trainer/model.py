@@ -8,10 +8,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.bundle import EffectRecord, HeldOutError, Span
-from igrow_core.simulator.crop import CropStages
-from igrow_core.site import Site
-from trainer.calibration.posterior import Posterior
+from igrow.core.bundle import EffectRecord, HeldOutError, Span
+from igrow.core.simulator.crop import CropStages
+from igrow.core.site import Site
+from igrow.trainer.calibration.posterior import Posterior
 
 MISFIT_KEY, CALIBRATED_ON_KEY = "known_misfit", "calibrated_on"
 """Where the `simulator` of a bundle's manifest holds what the trainer knows beside the parameters."""
@@ -36,11 +36,11 @@ class HybridModel:
     training_range: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     errors: tuple[HeldOutError, ...] = ()
     known_misfit: Mapping[str, float] = field(default_factory=dict)
-    """What the calibration could not explain on its own log, which is no finding later (`trainer.diagnosis`)."""
+    """What the calibration could not explain on its own log, which is no finding later (`igrow.trainer.diagnosis`)."""
 
     @property
     def active_effects(self) -> dict[str, dict[str, float]]:
-        """Parameter values of the effects by name, as `igrow_core.simulator.hybrid` takes them."""
+        """Parameter values of the effects by name, as `igrow.core.simulator.hybrid` takes them."""
         return {
             effect.name: {name: estimate.value for name, estimate in effect.parameters.items()}
             for effect in self.effects

@@ -22,7 +22,7 @@ from benchmarks.diagnosis.cases import SEASONS, Case, draw
 from benchmarks.diagnosis.houses import elsewhere, of_seasons
 from benchmarks.diagnosis.logs import Reference, built_in, reference, simulate_cases
 from benchmarks.diagnosis.scoring import Outcome, judge, show, table
-from igrow_core.telemetry import Telemetry
+from igrow.core.telemetry import Telemetry
 
 WHAT = ("scoring", "tuning", "elsewhere", "uncalibrated", "matched", "usual", "real")
 HOUSES_ELSEWHERE = 8

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from igrow_core.effects import EFFECTS
-from igrow_core.greenhouse import HiddenEffect
-from igrow_core.greenhouse.uncatalogued import UNCATALOGUED
+from igrow.core.effects import EFFECTS
+from igrow.core.greenhouse import HiddenEffect
+from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
 
 SEASONS = {"winter": "2020-01-20", "spring": "2020-04-01", "autumn": "2020-10-05"}
 """First day of the log; the reference log of the calibration ends there."""

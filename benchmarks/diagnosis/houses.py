@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.diagnosis.cases import SEASONS
-from igrow_core.greenhouse import GreenhouseParameters, generate_weather
-from igrow_core.greenhouse.weather import WeatherClimate
-from igrow_core.site import Greenhouse, Lamps, Site
-from igrow_core.telemetry import Telemetry
+from igrow.core.greenhouse import GreenhouseParameters, generate_weather
+from igrow.core.greenhouse.weather import WeatherClimate
+from igrow.core.site import Greenhouse, Lamps, Site
+from igrow.core.telemetry import Telemetry
 
 ELSEWHERE_SEED, LEARNING_SEED, PLACES_SEED = 60_000, 80_000, 90_000
 """Of houses that cases are drawn for, of those that what is usual is learned from, and of places at which it is learned

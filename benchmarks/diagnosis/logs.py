@@ -9,19 +9,19 @@ import numpy as np
 
 from benchmarks.diagnosis.cases import Case, hidden
 from benchmarks.diagnosis.houses import House
-from igrow_core.bundle import default_bundle_folder, read_bundle
-from igrow_core.effects import EFFECTS
-from igrow_core.greenhouse import Disturbances, recipe, simulate_many
-from igrow_core.greenhouse.uncatalogued import UNCATALOGUED
-from igrow_core.simulator.hybrid.nominal import nominal
-from igrow_core.simulator.hybrid.record import Record
-from igrow_core.site import Site
-from igrow_core.telemetry import Telemetry
-from trainer.calibration import calibrate, prior
-from trainer.diagnosis import freerun, linearisation, split
-from trainer.diagnosis.deployed import Deployed, from_manifest, from_posterior, from_site, learn_misfit
-from trainer.diagnosis.linearisation import unit_fluxes
-from trainer.diagnosis.runner import open_record
+from igrow.core.bundle import default_bundle_folder, read_bundle
+from igrow.core.effects import EFFECTS
+from igrow.core.greenhouse import Disturbances, recipe, simulate_many
+from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
+from igrow.core.simulator.hybrid.nominal import nominal
+from igrow.core.simulator.hybrid.record import Record
+from igrow.core.site import Site
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.calibration import calibrate, prior
+from igrow.trainer.diagnosis import freerun, linearisation, split
+from igrow.trainer.diagnosis.deployed import Deployed, from_manifest, from_posterior, from_site, learn_misfit
+from igrow.trainer.diagnosis.linearisation import unit_fluxes
+from igrow.trainer.diagnosis.runner import open_record
 
 REFERENCE_DAYS = 56
 MISMATCH = 0.08

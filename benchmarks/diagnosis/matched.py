@@ -18,15 +18,15 @@ from numpy.typing import NDArray
 from benchmarks.diagnosis.cases import REACHABLE, Case
 from benchmarks.diagnosis.houses import of_seasons
 from benchmarks.diagnosis.logs import MISMATCH, Reference, reference, simulate_cases
-from igrow_core.effects import EFFECTS
-from igrow_core.simulator.hybrid.nominal import site_record
-from igrow_core.simulator.hybrid.parameters import PARAMETERS
-from igrow_core.simulator.hybrid.record import free_run, observe
-from igrow_core.telemetry import Telemetry, to_grid
-from trainer.diagnosis import diagnose
-from trainer.diagnosis.activation import ActiveTerm, activate
-from trainer.diagnosis.deployed import Deployed
-from trainer.diagnosis.linearisation import STEP
+from igrow.core.effects import EFFECTS
+from igrow.core.simulator.hybrid.nominal import site_record
+from igrow.core.simulator.hybrid.parameters import PARAMETERS
+from igrow.core.simulator.hybrid.record import free_run, observe
+from igrow.core.telemetry import Telemetry, to_grid
+from igrow.trainer.diagnosis import diagnose
+from igrow.trainer.diagnosis.activation import ActiveTerm, activate
+from igrow.trainer.diagnosis.deployed import Deployed
+from igrow.trainer.diagnosis.linearisation import STEP
 
 Floats = NDArray[np.float64]
 

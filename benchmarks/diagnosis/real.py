@@ -19,14 +19,14 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.diagnosis.logs import built_in
-from igrow_core.errors import IgrowError
-from igrow_core.simulator.hybrid.nominal import nominal
-from igrow_core.simulator.hybrid.parameters import PARAMETERS
-from igrow_core.site import Site
-from igrow_core.telemetry import Telemetry
-from trainer.calibration import calibrate, prior
-from trainer.diagnosis import Deployed, Diagnosis, alignment, diagnose, learn_misfit, runner, structure
-from trainer.readers.open_log import open_log
+from igrow.core.errors import IgrowError
+from igrow.core.simulator.hybrid.nominal import nominal
+from igrow.core.simulator.hybrid.parameters import PARAMETERS
+from igrow.core.site import Site
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.calibration import calibrate, prior
+from igrow.trainer.diagnosis import Deployed, Diagnosis, alignment, diagnose, learn_misfit, runner, structure
+from igrow.trainer.readers.open_log import open_log
 
 COMPARTMENTS = (
     ("agc2019", "Reference"),

@@ -12,16 +12,16 @@ import numpy as np
 
 from benchmarks.diagnosis.cases import Case, hidden
 from benchmarks.diagnosis.logs import Reference
-from igrow_core.effects import EFFECTS
-from igrow_core.greenhouse import HiddenEffect
-from igrow_core.greenhouse.uncatalogued import UNCATALOGUED
-from igrow_core.site import Site
-from igrow_core.telemetry import Telemetry
-from trainer.diagnosis import diagnose, freefit, likelihood, linearisation, search, selection, structure
-from trainer.diagnosis.activation import ActiveTerm, activate
-from trainer.diagnosis.diagnose import Evidence, Stage
-from trainer.diagnosis.gram import Term
-from trainer.diagnosis.problem import Problem
+from igrow.core.effects import EFFECTS
+from igrow.core.greenhouse import HiddenEffect
+from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
+from igrow.core.site import Site
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.diagnosis import diagnose, freefit, likelihood, linearisation, search, selection, structure
+from igrow.trainer.diagnosis.activation import ActiveTerm, activate
+from igrow.trainer.diagnosis.diagnose import Evidence, Stage
+from igrow.trainer.diagnosis.gram import Term
+from igrow.trainer.diagnosis.problem import Problem
 
 NOISE = {"air_temperature": 0.5, "air_humidity": 2.0, "air_co2": 35.0}
 """Scales under which errors of different quantities are added."""

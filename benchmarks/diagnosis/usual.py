@@ -14,14 +14,14 @@ import numpy as np
 
 from benchmarks.diagnosis.houses import LEARNING_SEED, PLACES_SEED, House, elsewhere, neighbours, of_seasons
 from benchmarks.diagnosis.logs import MISMATCH, built_in, reference
-from igrow_core.bundle import BUILT_IN
-from igrow_core.greenhouse import Disturbances, recipe, simulate_many
-from igrow_core.greenhouse.described import parameters_of
-from igrow_core.site import Site
-from igrow_core.telemetry import Telemetry
-from trainer.diagnosis import Deployed, problem, runner, usual
-from trainer.diagnosis.problem import Problem
-from trainer.diagnosis.split import split_days
+from igrow.core.bundle import BUILT_IN
+from igrow.core.greenhouse import Disturbances, recipe, simulate_many
+from igrow.core.greenhouse.described import parameters_of
+from igrow.core.site import Site
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.diagnosis import Deployed, problem, runner, usual
+from igrow.trainer.diagnosis.problem import Problem
+from igrow.trainer.diagnosis.split import split_days
 
 HOUSES = 12
 """Drawn as those elsewhere are, beside the house of the cases in winter and spring and that of the default bundle."""
@@ -164,7 +164,7 @@ def learn(known: Sequence[Family], processes: int) -> usual.Usual:
 def main(processes: int) -> int:
     """Write what is usual into the package."""
     found = learn(families(processes), processes)
-    path = Path(str(files("trainer.diagnosis"))) / usual.FILE
+    path = Path(str(files("igrow.trainer.diagnosis"))) / usual.FILE
     usual.write(path, found)
     print(f"wrote {len(found.directions)} directions and {len(found.season)} usual amplitudes to {path}")
     return 0

@@ -6,16 +6,16 @@ from pathlib import Path
 
 import numpy as np
 
-from igrow_core.bundle import read_bundle
-from igrow_core.effects import EFFECTS
-from igrow_core.greenhouse.described import parse_effect
-from igrow_core.simulator.hybrid.measurement import PREDICTED
-from igrow_core.site import load_site
-from trainer.diagnosis import freefit
-from trainer.diagnosis.activation import ActiveTerm, activate
-from trainer.diagnosis.deployed import from_manifest
-from trainer.diagnosis.diagnose import Stage, diagnose
-from trainer.readers.open_log import open_log
+from igrow.core.bundle import read_bundle
+from igrow.core.effects import EFFECTS
+from igrow.core.greenhouse.described import parse_effect
+from igrow.core.simulator.hybrid.measurement import PREDICTED
+from igrow.core.site import load_site
+from igrow.trainer.diagnosis import freefit
+from igrow.trainer.diagnosis.activation import ActiveTerm, activate
+from igrow.trainer.diagnosis.deployed import from_manifest
+from igrow.trainer.diagnosis.diagnose import Stage, diagnose
+from igrow.trainer.readers.open_log import open_log
 
 
 def ideal_errors(out: Path, effect: str) -> dict[str, float]:

@@ -14,13 +14,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.bundle import read_bundle
-from igrow_core.planner.objective import Objective, Outcome
-from igrow_core.quantities import QUANTITIES
-from igrow_core.simulator.hindcast import HindcastPredictor
-from igrow_core.site import Site, load_site
-from igrow_core.telemetry import Telemetry, read_csv, to_grid
-from trainer.publishing import read_exchange
+from igrow.core.bundle import read_bundle
+from igrow.core.planner.objective import Objective, Outcome
+from igrow.core.quantities import QUANTITIES
+from igrow.core.simulator.hindcast import HindcastPredictor
+from igrow.core.site import Site, load_site
+from igrow.core.telemetry import Telemetry, read_csv, to_grid
+from igrow.trainer.publishing import read_exchange
 
 PREDICTED = ("air_temperature", "air_humidity", "air_co2")
 DAY = 288

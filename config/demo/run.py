@@ -20,9 +20,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from igrow_core.quantities import WEATHER
-from igrow_core.telemetry import write_csv
-from trainer.readers.open_log import open_log
+from igrow.core.quantities import WEATHER
+from igrow.core.telemetry import write_csv
+from igrow.trainer.readers.open_log import open_log
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]

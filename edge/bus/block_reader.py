@@ -5,10 +5,10 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterable, Mapping
 
-from edge.bus.errors import AddressRefusedError, BusError
-from edge.bus.protocol import Bus, Priority, ReadRequest
-from edge.registers.model import Device, Point, needed_for_control
-from edge.registers.read_planner import Block, plan_reads, split
+from igrow.edge.bus.errors import AddressRefusedError, BusError
+from igrow.edge.bus.protocol import Bus, Priority, ReadRequest
+from igrow.edge.registers.model import Device, Point, needed_for_control
+from igrow.edge.registers.read_planner import Block, plan_reads, split
 
 _log = logging.getLogger(__name__)
 

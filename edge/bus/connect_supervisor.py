@@ -7,7 +7,7 @@ import logging
 from collections.abc import Awaitable, Callable
 from typing import Protocol
 
-from edge.bus.errors import NotConnectedError
+from igrow.edge.bus.errors import NotConnectedError
 
 _log = logging.getLogger(__name__)
 

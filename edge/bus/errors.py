@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from igrow_core.errors import IgrowError
+from igrow.core.errors import IgrowError
 
 
 class BusError(IgrowError):

@@ -7,8 +7,8 @@ import time
 from collections.abc import Awaitable, Callable, Mapping
 from typing import TypeVar
 
-from edge.bus.connect_supervisor import ConnectSupervisor
-from edge.bus.errors import (
+from igrow.edge.bus.connect_supervisor import ConnectSupervisor
+from igrow.edge.bus.errors import (
     BadAnswerError,
     ConnectionLostError,
     NoAnswerError,
@@ -16,12 +16,12 @@ from edge.bus.errors import (
     RefusedError,
     UnitRestingError,
 )
-from edge.bus.pacing import Pacer
-from edge.bus.protocol import Priority, ReadRequest, WriteRequest
-from edge.bus.pymodbus_link import QUIET, PymodbusLink
-from edge.bus.request_slot import RequestSlot, Turn
-from edge.bus.unit_health import HealthBook
-from edge.registers.model import BusSettings
+from igrow.edge.bus.pacing import Pacer
+from igrow.edge.bus.protocol import Priority, ReadRequest, WriteRequest
+from igrow.edge.bus.pymodbus_link import QUIET, PymodbusLink
+from igrow.edge.bus.request_slot import RequestSlot, Turn
+from igrow.edge.bus.unit_health import HealthBook
+from igrow.edge.registers.model import BusSettings
 
 T = TypeVar("T")
 
@@ -31,7 +31,7 @@ connection whose other end was switched off looks open for a quarter of an hour.
 
 
 class ModbusBus:
-    """The Bus of `edge.bus.protocol` over one Modbus line."""
+    """The Bus of `igrow.edge.bus.protocol` over one Modbus line."""
 
     def __init__(
         self,

@@ -8,12 +8,12 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-from edge.bus.block_reader import BlockReader
-from edge.bus.errors import BusError, NoValueError, UnknownPointError, ValueDoesNotFitError
-from edge.bus.modbus_bus import ModbusBus
-from edge.bus.protocol import Bus, Priority, WriteRequest
-from edge.registers.codec import NotEncodableError, decode, encode
-from edge.registers.model import BusSettings, Device, Point, RegisterMap
+from igrow.edge.bus.block_reader import BlockReader
+from igrow.edge.bus.errors import BusError, NoValueError, UnknownPointError, ValueDoesNotFitError
+from igrow.edge.bus.modbus_bus import ModbusBus
+from igrow.edge.bus.protocol import Bus, Priority, WriteRequest
+from igrow.edge.registers.codec import NotEncodableError, decode, encode
+from igrow.edge.registers.model import BusSettings, Device, Point, RegisterMap
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Protocol
 
-from edge.registers.model import Function
+from igrow.edge.registers.model import Function
 
 
 class Priority(IntEnum):

@@ -27,7 +27,7 @@ from pymodbus.pdu.register_message import (
 )
 from pymodbus.transport.serialtransport import create_serial_connection
 
-from edge.bus.answer_check import (
+from igrow.edge.bus.answer_check import (
     MisfitError,
     TornStreamError,
     check_pdu,
@@ -35,9 +35,16 @@ from edge.bus.answer_check import (
     first_tcp_frame,
     only_whole_frames,
 )
-from edge.bus.errors import BadAnswerError, BusError, ConnectionLostError, NoAnswerError, NotConnectedError, refusal
-from edge.bus.protocol import ReadRequest, WriteRequest
-from edge.registers.model import BusSettings, Function, Parity, Transport
+from igrow.edge.bus.errors import (
+    BadAnswerError,
+    BusError,
+    ConnectionLostError,
+    NoAnswerError,
+    NotConnectedError,
+    refusal,
+)
+from igrow.edge.bus.protocol import ReadRequest, WriteRequest
+from igrow.edge.registers.model import BusSettings, Function, Parity, Transport
 
 _READS: dict[Function, type[ModbusPDU]] = {
     Function.COIL: ReadCoilsRequest,

@@ -6,8 +6,8 @@ import asyncio
 import heapq
 from types import TracebackType
 
-from edge.bus.errors import NotConnectedError, QueueFullError
-from edge.bus.protocol import Priority
+from igrow.edge.bus.errors import NotConnectedError, QueueFullError
+from igrow.edge.bus.protocol import Priority
 
 
 class RequestSlot:

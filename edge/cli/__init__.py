@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from igrow_core.command_line import run_command
+from igrow.core.command_line import run_command
 
 COMMANDS = {
-    "run": ("edge.cli.run", "control the greenhouse until told to stop"),
-    "check-config": ("edge.cli.check_config", "check the configuration and say what it means"),
-    "probe": ("edge.cli.probe", "show what a Modbus device answers, raw and decoded in every way"),
-    "simulate-plc": ("edge.cli.simulate_plc", "serve a simulated greenhouse over Modbus"),
-    "status": ("edge.cli.status", "show what the daemon does, and why"),
-    "plan": ("edge.cli.plan", "compute one plan now, from the bundle in force and the log, and print it"),
-    "override": ("edge.cli.override", "set a setpoint by hand for some time, or give it back"),
-    "commission": ("edge.cli.commission", "walk through the checks with a new PLC"),
-    "backup": ("edge.cli.backup", "copy the daemon's log and ledger into one file, also while it runs"),
-    "restore": ("edge.cli.restore", "put a backup in the place of the log and ledger"),
-    "export": ("edge.cli.export", "write log and ledger as CSV files"),
+    "run": ("igrow.edge.cli.run", "control the greenhouse until told to stop"),
+    "check-config": ("igrow.edge.cli.check_config", "check the configuration and say what it means"),
+    "probe": ("igrow.edge.cli.probe", "show what a Modbus device answers, raw and decoded in every way"),
+    "simulate-plc": ("igrow.edge.cli.simulate_plc", "serve a simulated greenhouse over Modbus"),
+    "status": ("igrow.edge.cli.status", "show what the daemon does, and why"),
+    "plan": ("igrow.edge.cli.plan", "compute one plan now, from the bundle in force and the log, and print it"),
+    "override": ("igrow.edge.cli.override", "set a setpoint by hand for some time, or give it back"),
+    "commission": ("igrow.edge.cli.commission", "walk through the checks with a new PLC"),
+    "backup": ("igrow.edge.cli.backup", "copy the daemon's log and ledger into one file, also while it runs"),
+    "restore": ("igrow.edge.cli.restore", "put a backup in the place of the log and ledger"),
+    "export": ("igrow.edge.cli.export", "write log and ledger as CSV files"),
 }
 
 

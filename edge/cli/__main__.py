@@ -1,7 +1,7 @@
-"""Lets `python -m edge.cli` do what `igrow-edge` does."""
+"""Lets `python -m igrow.edge.cli` do what `igrow-edge` does."""
 
 import sys
 
-from edge.cli import main
+from igrow.edge.cli import main
 
 sys.exit(main())

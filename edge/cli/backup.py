@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from edge.cli.common import configuration_of, store_folder
-from edge.store import backup
+from igrow.edge.cli.common import configuration_of, store_folder
+from igrow.edge.store import backup
 
 EXAMPLE = "igrow-edge backup /etc/igrow/daemon.yaml /media/usb/igrow-backup.tar.gz"
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 
-from edge.cli.common import add_configuration, configuration_of
-from edge.configuration import STATUS_PORT, ClockSource, Configuration
-from edge.registers.bus_load import estimate
-from edge.registers.model import SYSTEM_POINTS
+from igrow.edge.cli.common import add_configuration, configuration_of
+from igrow.edge.configuration import STATUS_PORT, ClockSource, Configuration
+from igrow.edge.registers.bus_load import estimate
+from igrow.edge.registers.model import SYSTEM_POINTS
 
 EXAMPLE = "igrow-edge check-config /etc/igrow/daemon.yaml"
 

@@ -6,9 +6,9 @@ import argparse
 import asyncio
 import contextlib
 
-from edge.cli.common import add_configuration, configuration_of
-from edge.commission import Commissioning, Console
-from edge.state_lock import daemon_stopped
+from igrow.edge.cli.common import add_configuration, configuration_of
+from igrow.edge.commission import Commissioning, Console
+from igrow.edge.state_lock import daemon_stopped
 
 EXAMPLE = "igrow-edge commission /etc/igrow/daemon.yaml"
 

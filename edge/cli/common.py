@@ -6,8 +6,8 @@ import argparse
 import datetime
 from pathlib import Path
 
-from edge.configuration import Configuration, load_configuration
-from igrow_core.errors import IgrowError
+from igrow.core.errors import IgrowError
+from igrow.edge.configuration import Configuration, load_configuration
 
 DEFAULT_CONFIGURATION = Path("/etc/igrow/daemon.yaml")
 

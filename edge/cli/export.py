@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from edge.cli.common import configuration_of, parse_time, store_folder
-from edge.store import export
+from igrow.edge.cli.common import configuration_of, parse_time, store_folder
+from igrow.edge.store import export
 
 EXAMPLE = "igrow-edge export /etc/igrow/daemon.yaml export/ --from 2026-03-01 --until 2026-04-01"
 

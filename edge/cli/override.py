@@ -6,11 +6,11 @@ import argparse
 from datetime import timedelta
 from pathlib import Path
 
-from edge.cli.common import configuration_of, parse_duration, parse_setpoint
-from edge.sources.override import Lease, read_leases, write_leases
-from edge.wiring import override_file
-from igrow_core.errors import IgrowError
-from igrow_core.yaml_schema import duration
+from igrow.core.errors import IgrowError
+from igrow.core.yaml_schema import duration
+from igrow.edge.cli.common import configuration_of, parse_duration, parse_setpoint
+from igrow.edge.sources.override import Lease, read_leases, write_leases
+from igrow.edge.wiring import override_file
 
 EXAMPLE = 'igrow-edge override /etc/igrow/daemon.yaml heating_setpoint=18 --for "2 h"'
 

@@ -8,16 +8,16 @@ from datetime import datetime
 from pathlib import Path
 from zoneinfo import ZoneInfo
 
-from edge.cli.common import add_configuration, configuration_of, parse_time, store_folder
-from edge.configuration import Configuration
-from edge.planning.make_plan import make_plan
-from edge.ports import Plan, PlanRequest
-from edge.sources.recipe import recipe_course
-from edge.store import read_telemetry
-from edge.updates.state import load_state
-from igrow_core.errors import IgrowError
-from igrow_core.quantities import QUANTITIES
-from igrow_core.telemetry import read_csv
+from igrow.core.errors import IgrowError
+from igrow.core.quantities import QUANTITIES
+from igrow.core.telemetry import read_csv
+from igrow.edge.cli.common import add_configuration, configuration_of, parse_time, store_folder
+from igrow.edge.configuration import Configuration
+from igrow.edge.planning.make_plan import make_plan
+from igrow.edge.ports import Plan, PlanRequest
+from igrow.edge.sources.recipe import recipe_course
+from igrow.edge.store import read_telemetry
+from igrow.edge.updates.state import load_state
 
 EXAMPLE = "igrow-edge plan /etc/igrow/daemon.yaml"
 

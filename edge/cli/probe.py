@@ -6,10 +6,10 @@ import argparse
 import asyncio
 from dataclasses import replace
 
-from edge.probe import probe, scan
-from edge.registers.loading import load_register_map
-from edge.registers.model import BusSettings, Function, Parity, Transport
-from igrow_core.errors import IgrowError
+from igrow.core.errors import IgrowError
+from igrow.edge.probe import probe, scan
+from igrow.edge.registers.loading import load_register_map
+from igrow.edge.registers.model import BusSettings, Function, Parity, Transport
 
 EXAMPLE = "igrow-edge probe --tcp 192.168.1.20 --units 1 --function input --first 0 --count 20"
 

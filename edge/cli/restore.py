@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from edge.cli.common import configuration_of, store_folder
-from edge.state_lock import daemon_stopped
-from edge.store import restore
+from igrow.edge.cli.common import configuration_of, store_folder
+from igrow.edge.state_lock import daemon_stopped
+from igrow.edge.store import restore
 
 EXAMPLE = "sudo -u igrow igrow-edge restore /etc/igrow/daemon.yaml igrow-backup.tar.gz"
 

@@ -9,8 +9,8 @@ import logging
 import os
 import sys
 
-from edge.cli.common import add_configuration
-from edge.daemon import run_daemon
+from igrow.edge.cli.common import add_configuration
+from igrow.edge.daemon import run_daemon
 
 EXAMPLE = "igrow-edge run /etc/igrow/daemon.yaml"
 

@@ -10,16 +10,16 @@ from pathlib import Path
 
 import numpy as np
 
-from edge.cli.common import parse_time
-from edge.registers.loading import load_register_map
-from edge.registers.model import Parity, RegisterMap
-from edge.virtual_plc.pace import parse_pace
-from edge.virtual_plc.virtual_plc import VirtualPlc
-from igrow_core.greenhouse import GreenhouseParameters, HiddenEffect, VirtualGreenhouse, generate_weather
-from igrow_core.greenhouse.described import parameters_of, parse_effect
-from igrow_core.greenhouse.weather import WeatherClimate
-from igrow_core.site import Site, load_site
-from igrow_core.telemetry import Telemetry, read_csv
+from igrow.core.greenhouse import GreenhouseParameters, HiddenEffect, VirtualGreenhouse, generate_weather
+from igrow.core.greenhouse.described import parameters_of, parse_effect
+from igrow.core.greenhouse.weather import WeatherClimate
+from igrow.core.site import Site, load_site
+from igrow.core.telemetry import Telemetry, read_csv
+from igrow.edge.cli.common import parse_time
+from igrow.edge.registers.loading import load_register_map
+from igrow.edge.registers.model import Parity, RegisterMap
+from igrow.edge.virtual_plc.pace import parse_pace
+from igrow.edge.virtual_plc.virtual_plc import VirtualPlc
 
 EXAMPLE = (
     "igrow-edge simulate-plc --site config/site.yaml --map config/register-maps/virtual-plc.yaml \\\n"

@@ -12,11 +12,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from edge.cli.common import add_configuration, configuration_of
-from edge.state_file import read_state
-from edge.wiring import STATUS_FILE
-from igrow_core.errors import IgrowError
-from igrow_core.quantities import QUANTITIES
+from igrow.core.errors import IgrowError
+from igrow.core.quantities import QUANTITIES
+from igrow.edge.cli.common import add_configuration, configuration_of
+from igrow.edge.state_file import read_state
+from igrow.edge.wiring import STATUS_FILE
 
 EXAMPLE = "igrow-edge status /etc/igrow/daemon.yaml"
 

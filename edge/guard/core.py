@@ -21,9 +21,9 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from edge.guard.interlocks import Force, evaluate
-from edge.guard.rules import GuardRules, PointRule
-from edge.image import Image
+from igrow.edge.guard.interlocks import Force, evaluate
+from igrow.edge.guard.rules import GuardRules, PointRule
+from igrow.edge.image import Image
 
 DAY = 86_400.0
 LONGEST_RAMP = 900.0

@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from edge.image import Image
-from edge.sensors.consequences import usable_for_control
-from igrow_core.errors import IgrowError
+from igrow.core.errors import IgrowError
+from igrow.edge.image import Image
+from igrow.edge.sensors.consequences import usable_for_control
 
 SAFE = "safe"
 """A bound that stands for the point's own safe value."""

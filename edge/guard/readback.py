@@ -12,9 +12,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
-from edge.guard.core import Write
-from edge.guard.rules import PointRule
-from edge.image import Image, Quality, Value
+from igrow.edge.guard.core import Write
+from igrow.edge.guard.rules import PointRule
+from igrow.edge.image import Image, Quality, Value
 
 
 class Outcome(Enum):

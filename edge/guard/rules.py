@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from edge.guard.interlocks import Interlock
-from igrow_core.errors import IgrowError
+from igrow.core.errors import IgrowError
+from igrow.edge.guard.interlocks import Interlock
 
 
 class GuardRuleError(IgrowError):

@@ -1,6 +1,6 @@
 """The one place from which anything is written to a PLC.
 
-It takes `Write`s, which only `edge.guard.core.guard` makes, and the heartbeat. A test reads the sources and fails
+It takes `Write`s, which only `igrow.edge.guard.core.guard` makes, and the heartbeat. A test reads the sources and fails
 when a second place calls `write`.
 """
 
@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from edge.bus.errors import BusError
-from edge.guard.core import Write
-from igrow_core.errors import IgrowError
+from igrow.core.errors import IgrowError
+from igrow.edge.bus.errors import BusError
+from igrow.edge.guard.core import Write
 
 HEARTBEAT = "heartbeat"
 HEARTBEAT_MODULUS = 65_536

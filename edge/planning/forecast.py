@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.errors import IgrowError
-from igrow_core.quantities import QUANTITIES, WEATHER
-from igrow_core.telemetry import Telemetry, to_grid
+from igrow.core.errors import IgrowError
+from igrow.core.quantities import QUANTITIES, WEATHER
+from igrow.core.telemetry import Telemetry, to_grid
 
 NEEDED = WEATHER[:6]
 """The weather that plans are made from, in the registry's order."""

@@ -9,18 +9,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.planning.forecast import from_forecast, hourly, persistence, without_gaps
-from edge.ports import Plan, PlanRequest
-from igrow_core.bundle import Bundle, read_bundle
-from igrow_core.errors import IgrowError
-from igrow_core.planner import Budget, PlanningState, Simulator, optimise
-from igrow_core.planner.onnx_generation import OnnxGeneration
-from igrow_core.planner.recent_use import SCALED, Scaled, factors, totals, used_in
-from igrow_core.planner.template import for_site
-from igrow_core.quantities import SETPOINTS
-from igrow_core.simulator.plan import BundleSimulator
-from igrow_core.site import Greenhouse, Site
-from igrow_core.telemetry import Telemetry
+from igrow.core.bundle import Bundle, read_bundle
+from igrow.core.errors import IgrowError
+from igrow.core.planner import Budget, PlanningState, Simulator, optimise
+from igrow.core.planner.onnx_generation import OnnxGeneration
+from igrow.core.planner.recent_use import SCALED, Scaled, factors, totals, used_in
+from igrow.core.planner.template import for_site
+from igrow.core.quantities import SETPOINTS
+from igrow.core.simulator.plan import BundleSimulator
+from igrow.core.site import Greenhouse, Site
+from igrow.core.telemetry import Telemetry
+from igrow.edge.planning.forecast import from_forecast, hourly, persistence, without_gaps
+from igrow.edge.ports import Plan, PlanRequest
 
 HOUR = 3600
 DAY = 24 * HOUR

@@ -1,4 +1,4 @@
-"""The daemon's side of the planning process: `edge.ports.PlanningService`."""
+"""The daemon's side of the planning process: `igrow.edge.ports.PlanningService`."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import IO
 
-from edge.planning.messages import MessageError, receive, send
-from edge.ports import Plan, PlanRequest
-from igrow_core.site import Site
+from igrow.core.site import Site
+from igrow.edge.planning.messages import MessageError, receive, send
+from igrow.edge.ports import Plan, PlanRequest
 
 _log = logging.getLogger("igrow.edge.planning")
 
@@ -40,7 +40,7 @@ class PlanningProcess:
         site: Site,
         limits: ProcessLimits | None = None,
         *,
-        planner: tuple[str, str] = ("edge.planning.make_plan", "make_plan"),
+        planner: tuple[str, str] = ("igrow.edge.planning.make_plan", "make_plan"),
     ) -> None:
         """`planner` names the function (site, request) -> Plan that the process calls, by module and name."""
         self._site = site
@@ -73,7 +73,7 @@ class PlanningProcess:
         """Empty when all is well, else one line."""
         return self._problem
 
-    async def wait(self, timeout: float) -> None:  # noqa: ASYNC109  # the signature is edge.ports.PlanningService's
+    async def wait(self, timeout: float) -> None:  # noqa: ASYNC109  # the signature is igrow.edge.ports.PlanningService's
         """Return when no plan is being made any more, or after `timeout` seconds of wall clock."""
         if self._task is not None:
             await asyncio.wait([asyncio.wrap_future(self._task)], timeout=timeout)
@@ -118,7 +118,7 @@ class PlanningProcess:
                 command = [
                     sys.executable,
                     "-m",
-                    "edge.planning.worker",
+                    "igrow.edge.planning.worker",
                     *self._planner,
                     str(self._limits.idle_seconds),
                     str(self._limits.memory_bytes),

@@ -1,6 +1,6 @@
 """The planning process: reads requests from its standard input, answers each with a plan or one line of error.
 
-`python -m edge.planning.worker MODULE FUNCTION IDLE MEMORY` calls MODULE.FUNCTION(site, request) for each
+`python -m igrow.edge.planning.worker MODULE FUNCTION IDLE MEMORY` calls MODULE.FUNCTION(site, request) for each
 request, ends after IDLE seconds without one, and never takes more than MEMORY bytes of data.
 """
 
@@ -13,8 +13,8 @@ import sys
 import threading
 import time
 
-from edge.planning.messages import MessageError, receive, send
-from igrow_core.errors import IgrowError
+from igrow.core.errors import IgrowError
+from igrow.edge.planning.messages import MessageError, receive, send
 
 
 def main(arguments: list[str]) -> int:

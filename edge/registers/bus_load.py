@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import defaultdict
 from dataclasses import dataclass
 
-from edge.registers.model import BusSettings, Device, Parity, Point, RegisterMap
-from edge.registers.read_planner import Block, plan_reads
+from igrow.edge.registers.model import BusSettings, Device, Parity, Point, RegisterMap
+from igrow.edge.registers.read_planner import Block, plan_reads
 
 HIGHEST_LOAD = 0.5
 """Share of the time above which a bus has no room left for retries, writes and a slow device."""

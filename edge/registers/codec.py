@@ -6,8 +6,8 @@ import math
 import struct
 from collections.abc import Sequence
 
-from edge.registers.model import ByteOrder, DataType, Point
-from igrow_core.errors import IgrowError
+from igrow.core.errors import IgrowError
+from igrow.edge.registers.model import ByteOrder, DataType, Point
 
 _FORMATS = {
     DataType.INT16: ">h",

@@ -11,9 +11,10 @@ from datetime import timedelta
 from pathlib import Path
 from typing import Literal
 
-from edge.registers.bus_load import estimate
-from edge.registers.codec import NotEncodableError, encode
-from edge.registers.model import (
+from igrow.core.yaml_schema import SettingError, load, parse, setting
+from igrow.edge.registers.bus_load import estimate
+from igrow.edge.registers.codec import NotEncodableError, encode
+from igrow.edge.registers.model import (
     POINT_NAMES,
     BusSettings,
     ByteOrder,
@@ -27,7 +28,6 @@ from edge.registers.model import (
     expected_unit,
     valid_range,
 )
-from igrow_core.yaml_schema import SettingError, load, parse, setting
 
 _ZERO = timedelta(0)
 _SECOND = timedelta(seconds=1)
@@ -327,10 +327,10 @@ def _device(name: str, device: DeviceSettings) -> Device:
 
 
 def load_register_map(path: str | os.PathLike[str]) -> RegisterMap:
-    """Read and check a register map; raises igrow_core.yaml_schema.SchemaError."""
+    """Read and check a register map; raises igrow.core.yaml_schema.SchemaError."""
     return load(path, MapFile).register_map(Path(path))
 
 
 def parse_register_map(text: str, name: str = "text") -> RegisterMap:
-    """Read and check a register map from YAML text; raises igrow_core.yaml_schema.SchemaError."""
+    """Read and check a register map from YAML text; raises igrow.core.yaml_schema.SchemaError."""
     return parse(text, MapFile, name).register_map()

@@ -8,7 +8,7 @@ from enum import Enum
 from pathlib import Path
 from types import MappingProxyType
 
-from igrow_core.quantities import QUANTITIES, Kind, Quantity
+from igrow.core.quantities import QUANTITIES, Kind, Quantity
 
 
 class Transport(Enum):

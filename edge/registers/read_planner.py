@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import groupby
 
-from edge.registers.model import Device, Function, Point
+from igrow.edge.registers.model import Device, Function, Point
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,9 +1,9 @@
 """From raw readings to a process image with quality: range, rate, frozen, missing, implausible pairs."""
 
-from edge.sensors.builder import ImageBuilder, RawReading
-from edge.sensors.consequences import CONSEQUENCES, Consequence, usable_for_control, usable_for_planning
-from edge.sensors.pairs import TwinSensors
-from edge.sensors.rules import SensorRule, default_rule
+from igrow.edge.sensors.builder import ImageBuilder, RawReading
+from igrow.edge.sensors.consequences import CONSEQUENCES, Consequence, usable_for_control, usable_for_planning
+from igrow.edge.sensors.pairs import TwinSensors
+from igrow.edge.sensors.rules import SensorRule, default_rule
 
 __all__ = [
     "CONSEQUENCES",

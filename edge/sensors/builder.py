@@ -11,9 +11,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from edge.image import MISSING, Image, Quality, Value
-from edge.sensors.pairs import PAIR_CHECKS, PairContext, TwinSensors, suspects
-from edge.sensors.rules import SensorRule
+from igrow.edge.image import MISSING, Image, Quality, Value
+from igrow.edge.sensors.pairs import PAIR_CHECKS, PairContext, TwinSensors, suspects
+from igrow.edge.sensors.rules import SensorRule
 
 
 class RawReading(Protocol):

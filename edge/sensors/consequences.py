@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from edge.image import Quality, Value
+from igrow.edge.image import Quality, Value
 
 
 @dataclass(frozen=True)

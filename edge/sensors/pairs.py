@@ -10,8 +10,8 @@ import math
 from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass
 
-from edge.image import Quality, Value
-from igrow_core import air
+from igrow.core import air
+from igrow.edge.image import Quality, Value
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from edge.registers.model import TWIN_SUFFIX
-from igrow_core.quantities import QUANTITIES, Kind
+from igrow.core.quantities import QUANTITIES, Kind
+from igrow.edge.registers.model import TWIN_SUFFIX
 
 INFINITE = float("inf")
 

@@ -1,10 +1,10 @@
 """Where setpoints come from, in order: override, valid plan, last valid plan, recipe, hands off."""
 
-from edge.sources.decision import Choice, Decision, Offer, Source, decide
-from edge.sources.hands_off import HandsOff
-from edge.sources.override import GrowerOverride, Lease
-from edge.sources.plans import FreshPlan, LastValidPlan, PlanKeeper
-from edge.sources.recipe import Period, Recipe, RecipeSource, recipe_at, recipe_course
+from igrow.edge.sources.decision import Choice, Decision, Offer, Source, decide
+from igrow.edge.sources.hands_off import HandsOff
+from igrow.edge.sources.override import GrowerOverride, Lease
+from igrow.edge.sources.plans import FreshPlan, LastValidPlan, PlanKeeper
+from igrow.edge.sources.recipe import Period, Recipe, RecipeSource, recipe_at, recipe_course
 
 __all__ = [
     "Choice",

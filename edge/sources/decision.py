@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from edge.image import Image
+from igrow.edge.image import Image
 
 
 @dataclass(frozen=True, slots=True)

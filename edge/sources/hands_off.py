@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from edge.image import Image
-from edge.sources.decision import Offer
+from igrow.edge.image import Image
+from igrow.edge.sources.decision import Offer
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from edge.image import Image
-from edge.sources.decision import Offer
-from edge.state_file import read_state, write_state
+from igrow.edge.image import Image
+from igrow.edge.sources.decision import Offer
+from igrow.edge.state_file import read_state, write_state
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,9 +10,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from edge.image import Image
-from edge.ports import Plan
-from edge.sources.decision import Offer
+from igrow.edge.image import Image
+from igrow.edge.ports import Plan
+from igrow.edge.sources.decision import Offer
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,11 +9,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from zoneinfo import ZoneInfo
 
-from edge.image import Image
-from edge.sensors.consequences import usable_for_control
-from edge.sources.decision import Offer
-from igrow_core.quantities import QUANTITIES, SETPOINTS
-from igrow_core.yaml_schema import SettingError, setting
+from igrow.core.quantities import QUANTITIES, SETPOINTS
+from igrow.core.yaml_schema import SettingError, setting
+from igrow.edge.image import Image
+from igrow.edge.sensors.consequences import usable_for_control
+from igrow.edge.sources.decision import Offer
 
 DAYLIGHT = 20.0
 """Global radiation in W m-2 above which it is day, when the clock cannot tell."""

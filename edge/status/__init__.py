@@ -4,6 +4,6 @@ Read-only, on localhost, without a framework: the cycle publishes one snapshot, 
 asks. To look at it from elsewhere, forward the port: `ssh -L 8420:localhost:8420 gateway`.
 """
 
-from edge.status.server import StatusServer
+from igrow.edge.status.server import StatusServer
 
 __all__ = ["StatusServer"]

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta, tzinfo
 
-from edge.status.history import Series
+from igrow.edge.status.history import Series
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import deque
 
-from edge.image import Quality
-from edge.ports import Snapshot
+from igrow.edge.image import Quality
+from igrow.edge.ports import Snapshot
 
 SPACING = 300.0
 """Seconds of plant time between two points."""

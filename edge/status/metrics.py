@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 
-from edge.ports import Snapshot
-from igrow_core.quantities import QUANTITIES
+from igrow.core.quantities import QUANTITIES
+from igrow.edge.ports import Snapshot
 
 Sample = tuple[Mapping[str, str], float | None]
 

@@ -7,12 +7,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime, tzinfo
 from html import escape
 
-from edge.image import Quality
-from edge.ports import Plan, Snapshot
-from edge.status.charts import Line, day_chart, sparkline
-from edge.status.history import History, Series
-from edge.status.style import STYLE
-from igrow_core.quantities import QUANTITIES
+from igrow.core.quantities import QUANTITIES
+from igrow.edge.image import Quality
+from igrow.edge.ports import Plan, Snapshot
+from igrow.edge.status.charts import Line, day_chart, sparkline
+from igrow.edge.status.history import History, Series
+from igrow.edge.status.style import STYLE
 
 SOURCES = {
     "override": "You control",

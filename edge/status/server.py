@@ -1,4 +1,4 @@
-"""A small HTTP server for four read-only pages; implements `edge.ports.StatusService`."""
+"""A small HTTP server for four read-only pages; implements `igrow.edge.ports.StatusService`."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from datetime import UTC, tzinfo
 from enum import Enum
 from pathlib import Path
 
-from edge.ports import Snapshot
-from edge.status.history import History
-from edge.status.metrics import render_metrics
-from edge.status.page import render_page
+from igrow.edge.ports import Snapshot
+from igrow.edge.status.history import History
+from igrow.edge.status.metrics import render_metrics
+from igrow.edge.status.page import render_page
 
 _log = logging.getLogger("igrow.edge.status")
 CONNECTIONS = 16

@@ -17,7 +17,7 @@ from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from edge.store.database import Synchronous, describe, is_damage, is_full, open_database, set_aside
+from igrow.edge.store.database import Synchronous, describe, is_damage, is_full, open_database, set_aside
 
 SCHEMA = """
 CREATE TABLE IF NOT EXISTS records (

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from edge.store.ledger import NAMES
-from edge.store.store import TELEMETRY_FILE, StoreError, read_records, read_telemetry
-from igrow_core.telemetry import write_csv
+from igrow.core.telemetry import write_csv
+from igrow.edge.store.ledger import NAMES
+from igrow.edge.store.store import TELEMETRY_FILE, StoreError, read_records, read_telemetry
 
 FILES = (TELEMETRY_FILE, *NAMES)
 _LARGEST = 2**32

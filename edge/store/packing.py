@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.image import Quality, Value
-from igrow_core.quantities import QUANTITIES
+from igrow.core.quantities import QUANTITIES
+from igrow.edge.image import Quality, Value
 
 QUALITIES = tuple(Quality)
 """A quality is stored as its place in this tuple; Quality.GOOD is the first."""

@@ -1,4 +1,4 @@
-"""The store as the control cycle sees it: `edge.ports.Store` over two kinds of file."""
+"""The store as the control cycle sees it: `igrow.edge.ports.Store` over two kinds of file."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from edge.image import Value
-from edge.ports import AlarmRecord, WriteRecord
-from edge.sentences import log_event
-from edge.store.database import Synchronous, describe
-from edge.store.ledger import NAMES, RESERVE_BYTES, Ledger, Record, read_newest
-from edge.store.packing import Row, pack
-from edge.store.telemetry_file import TelemetryFile, read_file, to_telemetry
-from igrow_core.errors import IgrowError
-from igrow_core.telemetry import Telemetry, concatenate
+from igrow.core.errors import IgrowError
+from igrow.core.telemetry import Telemetry, concatenate
+from igrow.edge.image import Value
+from igrow.edge.ports import AlarmRecord, WriteRecord
+from igrow.edge.sentences import log_event
+from igrow.edge.store.database import Synchronous, describe
+from igrow.edge.store.ledger import NAMES, RESERVE_BYTES, Ledger, Record, read_newest
+from igrow.edge.store.packing import Row, pack
+from igrow.edge.store.telemetry_file import TelemetryFile, read_file, to_telemetry
 
 TELEMETRY_FILE = "telemetry.db"
 
@@ -45,7 +45,7 @@ class StoreLimits:
 
 
 class SqliteStore:
-    """The gateway's memory in one folder; implements `edge.ports.Store`.
+    """The gateway's memory in one folder; implements `igrow.edge.ports.Store`.
 
     Safe to call from several threads; other processes read with `read_telemetry` and `read_records`.
     """

@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.store.database import (
+from igrow.core.telemetry import Telemetry, concatenate, from_rows
+from igrow.edge.store.database import (
     Synchronous,
     describe,
     is_damage,
@@ -19,8 +20,7 @@ from edge.store.database import (
     open_database,
     set_aside,
 )
-from edge.store.packing import Row, unpack_good
-from igrow_core.telemetry import Telemetry, concatenate, from_rows
+from igrow.edge.store.packing import Row, unpack_good
 
 SCHEMA = """
 CREATE TABLE IF NOT EXISTS layouts (layout INTEGER PRIMARY KEY, names TEXT NOT NULL UNIQUE);

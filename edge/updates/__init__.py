@@ -10,11 +10,11 @@
    in the exchange.
 """
 
-from edge.updates.rules import UpdateRules
-from edge.updates.service import BundleUpdates
-from edge.updates.shadow import Comparison, Predictor, compare, hindcast_errors
-from edge.updates.shelf import Shelf
-from edge.updates.signed_source import SignedSource, UpdateError
+from igrow.edge.updates.rules import UpdateRules
+from igrow.edge.updates.service import BundleUpdates
+from igrow.edge.updates.shadow import Comparison, Predictor, compare, hindcast_errors
+from igrow.edge.updates.shelf import Shelf
+from igrow.edge.updates.signed_source import SignedSource, UpdateError
 
 __all__ = [
     "BundleUpdates",

@@ -12,16 +12,16 @@ from pathlib import Path
 
 import numpy as np
 
-from edge.ports import ActiveBundle
-from edge.sentences import log_event
-from edge.store.store import StoreError, read_telemetry
-from edge.updates.rules import ReportBox, UpdateRules, UpdateStore
-from edge.updates.shadow import Comparison, Predictor, compare, hindcast_errors
-from edge.updates.shelf import Shelf
-from edge.updates.signed_source import RefusedError, SignedSource, UpdateError
-from edge.updates.state import load_state, save_state
-from igrow_core.bundle import Bundle, BundleError
-from igrow_core.telemetry import Telemetry, to_grid
+from igrow.core.bundle import Bundle, BundleError
+from igrow.core.telemetry import Telemetry, to_grid
+from igrow.edge.ports import ActiveBundle
+from igrow.edge.sentences import log_event
+from igrow.edge.store.store import StoreError, read_telemetry
+from igrow.edge.updates.rules import ReportBox, UpdateRules, UpdateStore
+from igrow.edge.updates.shadow import Comparison, Predictor, compare, hindcast_errors
+from igrow.edge.updates.shelf import Shelf
+from igrow.edge.updates.signed_source import RefusedError, SignedSource, UpdateError
+from igrow.edge.updates.state import load_state, save_state
 
 _log = logging.getLogger(__name__)
 HOUR = 3600.0
@@ -31,7 +31,7 @@ KEPT_ERRORS = 400
 
 
 class BundleUpdates:
-    """Implements `edge.ports.UpdateService`; all long work runs in one thread of its own."""
+    """Implements `igrow.edge.ports.UpdateService`; all long work runs in one thread of its own."""
 
     def __init__(
         self,
@@ -71,7 +71,7 @@ class BundleUpdates:
         if self._state.active is None and first_bundle is not None:
             self._adopt_first(first_bundle)
 
-    # --- edge.ports.UpdateService ---------------------------------------------------------------------------
+    # --- igrow.edge.ports.UpdateService ---------------------------------------------------------------------------
 
     def active(self) -> ActiveBundle | None:
         """Return the bundle in force."""
@@ -96,7 +96,7 @@ class BundleUpdates:
             self._store.flush()
             self._task = self._worker.submit(self._work, time)
 
-    async def wait(self, timeout: float) -> None:  # noqa: ASYNC109  # the signature is edge.ports.UpdateService's
+    async def wait(self, timeout: float) -> None:  # noqa: ASYNC109  # the signature is igrow.edge.ports.UpdateService's
         """Return when not busy, or after `timeout` seconds of wall clock."""
         if self._task is not None:
             await asyncio.wait([asyncio.wrap_future(self._task)], timeout=timeout)

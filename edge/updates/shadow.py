@@ -15,8 +15,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.bundle import Bundle
-from igrow_core.telemetry import Telemetry
+from igrow.core.bundle import Bundle
+from igrow.core.telemetry import Telemetry
 
 HORIZONS = (1, 24)
 """Hours."""

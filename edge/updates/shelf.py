@@ -8,9 +8,9 @@ import shutil
 import tarfile
 from pathlib import Path
 
-from edge.updates.signed_source import LARGEST_BUNDLE, RefusedError, UpdateError
-from igrow_core.bundle import Bundle, BundleError, read_bundle, self_test
-from igrow_core.quantities import QUANTITIES
+from igrow.core.bundle import Bundle, BundleError, read_bundle, self_test
+from igrow.core.quantities import QUANTITIES
+from igrow.edge.updates.signed_source import LARGEST_BUNDLE, RefusedError, UpdateError
 
 SPARE_BYTES = 16 * 2**20
 """Left free on the disk after unpacking, for the log."""

@@ -25,8 +25,8 @@ from tuf.api.exceptions import (
 from tuf.ngclient.fetcher import FetcherInterface
 from tuf.ngclient.updater import Updater
 
-from edge.clock import EARLIEST_PLAUSIBLE
-from igrow_core.errors import IgrowError
+from igrow.core.errors import IgrowError
+from igrow.edge.clock import EARLIEST_PLAUSIBLE
 
 LARGEST_BUNDLE = 512 * 2**20
 """Bytes."""

@@ -7,7 +7,7 @@ import json
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from igrow_core.whole_files import write_whole
+from igrow.core.whole_files import write_whole
 
 
 @dataclass

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from edge.registers.codec import NotEncodableError, decode, encode, encode_raw
-from edge.registers.model import DataType, Function, Point, RegisterMap
+from igrow.edge.registers.codec import NotEncodableError, decode, encode, encode_raw
+from igrow.edge.registers.model import DataType, Function, Point, RegisterMap
 
 ILLEGAL_ADDRESS = 2
 

@@ -12,9 +12,9 @@ import struct
 from collections.abc import Mapping, Sequence
 from typing import Protocol, cast
 
-from edge.bus.pymodbus_link import open_serial_port
-from edge.registers.model import Function, Parity
-from edge.virtual_plc.memory import AnswerWithExceptionError
+from igrow.edge.bus.pymodbus_link import open_serial_port
+from igrow.edge.registers.model import Function, Parity
+from igrow.edge.virtual_plc.memory import AnswerWithExceptionError
 
 ILLEGAL_FUNCTION = 1
 ILLEGAL_VALUE = 3

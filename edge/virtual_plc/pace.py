@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from igrow_core.errors import IgrowError
+from igrow.core.errors import IgrowError
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,12 @@ from types import MappingProxyType
 
 import numpy as np
 
-from edge.registers.model import Function, Parity, RegisterMap
-from edge.virtual_plc.memory import DeviceMemory
-from edge.virtual_plc.modbus_server import ModbusServer
-from edge.virtual_plc.pace import Lockstep, Pace, Realtime
-from edge.virtual_plc.plant import Plant
-from igrow_core.quantities import QUANTITIES, SETPOINTS
+from igrow.core.quantities import QUANTITIES, SETPOINTS
+from igrow.edge.registers.model import Function, Parity, RegisterMap
+from igrow.edge.virtual_plc.memory import DeviceMemory
+from igrow.edge.virtual_plc.modbus_server import ModbusServer
+from igrow.edge.virtual_plc.pace import Lockstep, Pace, Realtime
+from igrow.edge.virtual_plc.plant import Plant
 
 _log = logging.getLogger(__name__)
 

@@ -12,7 +12,7 @@ runs) and `policy.onnx`, further files that the manifest lists, `golden.npz`
 3. `self_test` runs the golden inputs through onnxruntime on the machine that will use the bundle.
 """
 
-from igrow_core.bundle.files import (
+from igrow.core.bundle.files import (
     BUILT_IN,
     GOLDEN_FILE,
     GRAPHS,
@@ -25,7 +25,7 @@ from igrow_core.bundle.files import (
     read_golden,
     write_bundle,
 )
-from igrow_core.bundle.manifest import (
+from igrow.core.bundle.manifest import (
     FORMAT_VERSION,
     BundleError,
     EffectRecord,
@@ -40,8 +40,8 @@ from igrow_core.bundle.manifest import (
     manifest_from_json,
     manifest_to_json,
 )
-from igrow_core.bundle.self_test import Deviation, self_test
-from igrow_core.bundle.session import new_session, open_session, run_graph
+from igrow.core.bundle.self_test import Deviation, self_test
+from igrow.core.bundle.session import new_session, open_session, run_graph
 
 __all__ = [
     "BUILT_IN",

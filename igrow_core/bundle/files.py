@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.bundle.manifest import BundleError, Manifest, manifest_from_json, manifest_to_json
-from igrow_core.whole_files import sync_folder, write_through
+from igrow.core.bundle.manifest import BundleError, Manifest, manifest_from_json, manifest_to_json
+from igrow.core.whole_files import sync_folder, write_through
 
 MANIFEST_FILE = "manifest.json"
 GOLDEN_FILE = "golden.npz"

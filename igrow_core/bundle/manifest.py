@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any, Literal, cast
 
-from igrow_core.errors import IgrowError
+from igrow.core.errors import IgrowError
 
 FORMAT_VERSION = 1
 """Raised by one whenever an older reader would misunderstand a newer bundle."""

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.bundle.files import REQUIRED_GRAPHS, Bundle, read_golden
-from igrow_core.bundle.manifest import BundleError
-from igrow_core.bundle.session import open_session, run_graph
+from igrow.core.bundle.files import REQUIRED_GRAPHS, Bundle, read_golden
+from igrow.core.bundle.manifest import BundleError
+from igrow.core.bundle.session import open_session, run_graph
 
 
 @dataclass(frozen=True)

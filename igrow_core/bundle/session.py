@@ -9,7 +9,7 @@ from typing import Any
 import onnxruntime
 from numpy.typing import NDArray
 
-from igrow_core.bundle.manifest import BundleError
+from igrow.core.bundle.manifest import BundleError
 
 
 def new_session(graph: Path | bytes, *, threads: int = 1) -> Any:

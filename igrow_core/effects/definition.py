@@ -26,7 +26,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from igrow_core.errors import IgrowError
+from igrow.core.errors import IgrowError
 
 Array = Any
 """An array of the namespace `xp`, or a float."""

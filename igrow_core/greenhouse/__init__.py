@@ -13,14 +13,14 @@ electronic appendix; D. Katzin et al. (2020), GreenLight, Biosystems Engineering
 Wageningen; C. Stanghellini (1987), Transpiration of greenhouse crops, PhD thesis, Wageningen.
 """
 
-from igrow_core.greenhouse.disturbances import Disturbances
-from igrow_core.greenhouse.hidden import HiddenEffect
-from igrow_core.greenhouse.parameters import GreenhouseParameters
-from igrow_core.greenhouse.recipe import recipe
-from igrow_core.greenhouse.season import Season, simulate, simulate_many
-from igrow_core.greenhouse.sensors import Sensors
-from igrow_core.greenhouse.virtual import VirtualGreenhouse
-from igrow_core.greenhouse.weather import generate_weather
+from igrow.core.greenhouse.disturbances import Disturbances
+from igrow.core.greenhouse.hidden import HiddenEffect
+from igrow.core.greenhouse.parameters import GreenhouseParameters
+from igrow.core.greenhouse.recipe import recipe
+from igrow.core.greenhouse.season import Season, simulate, simulate_many
+from igrow.core.greenhouse.sensors import Sensors
+from igrow.core.greenhouse.virtual import VirtualGreenhouse
+from igrow.core.greenhouse.weather import generate_weather
 
 __all__ = [
     "Disturbances",

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from igrow_core.air import LATENT_HEAT
-from igrow_core.greenhouse import climate, tomato
-from igrow_core.greenhouse.climate import Climate, Ledger
-from igrow_core.greenhouse.light import Light
-from igrow_core.greenhouse.namespace import Array
-from igrow_core.greenhouse.parameters import GreenhouseParameters
-from igrow_core.greenhouse.state import ACCUMULATED, PlantState, add
+from igrow.core.air import LATENT_HEAT
+from igrow.core.greenhouse import climate, tomato
+from igrow.core.greenhouse.climate import Climate, Ledger
+from igrow.core.greenhouse.light import Light
+from igrow.core.greenhouse.namespace import Array
+from igrow.core.greenhouse.parameters import GreenhouseParameters
+from igrow.core.greenhouse.state import ACCUMULATED, PlantState, add
 
 
 class Inflow(NamedTuple):

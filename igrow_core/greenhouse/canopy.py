@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from igrow_core.greenhouse.namespace import Array, sigmoid
-from igrow_core.greenhouse.parameters import GreenhouseParameters
+from igrow.core.greenhouse.namespace import Array, sigmoid
+from igrow.core.greenhouse.parameters import GreenhouseParameters
 
 GAS_CONSTANT = 8.314
 """J mol-1 K-1."""

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from igrow_core.air import (
+from igrow.core.air import (
     LATENT_HEAT,
     SPECIFIC_HEAT_AIR,
     STEFAN_BOLTZMANN,
@@ -23,10 +23,10 @@ from igrow_core.air import (
     saturation_concentration,
     vapour_concentration,
 )
-from igrow_core.greenhouse.linear import ZERO, solve
-from igrow_core.greenhouse.namespace import Array
-from igrow_core.greenhouse.parameters import GreenhouseParameters
-from igrow_core.greenhouse.ventilation import past_screens
+from igrow.core.greenhouse.linear import ZERO, solve
+from igrow.core.greenhouse.namespace import Array
+from igrow.core.greenhouse.parameters import GreenhouseParameters
+from igrow.core.greenhouse.ventilation import past_screens
 
 AIR_HEAT = 1.2 * SPECIFIC_HEAT_AIR
 """Volumetric heat capacity of air, J m-3 K-1; constant, so that heat is conserved."""

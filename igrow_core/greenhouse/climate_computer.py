@@ -14,8 +14,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from igrow_core.greenhouse.namespace import Array, clip, ramp
-from igrow_core.greenhouse.parameters import GreenhouseParameters
+from igrow.core.greenhouse.namespace import Array, clip, ramp
+from igrow.core.greenhouse.parameters import GreenhouseParameters
 
 SAFE_SETPOINTS: Mapping[str, float] = {
     "heating_setpoint": 17.0,

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from igrow_core.errors import IgrowError
-from igrow_core.greenhouse.hidden import HiddenEffect
-from igrow_core.greenhouse.parameters import GreenhouseParameters
-from igrow_core.site import Site
+from igrow.core.errors import IgrowError
+from igrow.core.greenhouse.hidden import HiddenEffect
+from igrow.core.greenhouse.parameters import GreenhouseParameters
+from igrow.core.site import Site
 
 
 def parameters_of(site: Site) -> GreenhouseParameters:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from igrow_core.greenhouse.namespace import Array, namespace
+from igrow.core.greenhouse.namespace import Array, namespace
 
 INTERVAL = 300.0
 """Seconds between two innovations."""

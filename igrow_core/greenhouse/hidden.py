@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from igrow_core.effects import EFFECTS, Effect
-from igrow_core.errors import IgrowError
-from igrow_core.greenhouse.namespace import Array
-from igrow_core.greenhouse.uncatalogued import UNCATALOGUED
-from igrow_core.sun import unix_seconds
+from igrow.core.effects import EFFECTS, Effect
+from igrow.core.errors import IgrowError
+from igrow.core.greenhouse.namespace import Array
+from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
+from igrow.core.sun import unix_seconds
 
 REFERENCE_DRIVERS: Mapping[str, float] = {
     "outdoor_temperature": 8.0, "outdoor_humidity": 80.0, "outdoor_co2": 415.0, "global_radiation": 300.0,

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from igrow_core.greenhouse.namespace import Array
-from igrow_core.greenhouse.parameters import GreenhouseParameters
+from igrow.core.greenhouse.namespace import Array
+from igrow.core.greenhouse.parameters import GreenhouseParameters
 
 JOULE_PER_MICROMOLE = 1.0 / 4.6
 """Energy of PAR photons of daylight, J umol-1."""

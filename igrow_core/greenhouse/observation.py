@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from igrow_core.air import co2_fraction, relative_humidity, vapour_pressure_deficit
-from igrow_core.greenhouse import tomato
-from igrow_core.greenhouse.climate_computer import Readings
-from igrow_core.greenhouse.namespace import Array
-from igrow_core.greenhouse.parameters import GreenhouseParameters
-from igrow_core.greenhouse.state import ACCUMULATED, PlantState
-from igrow_core.greenhouse.weather_table import WeatherRow
-from igrow_core.quantities import SETPOINTS
-from igrow_core.sun import position
+from igrow.core.air import co2_fraction, relative_humidity, vapour_pressure_deficit
+from igrow.core.greenhouse import tomato
+from igrow.core.greenhouse.climate_computer import Readings
+from igrow.core.greenhouse.namespace import Array
+from igrow.core.greenhouse.parameters import GreenhouseParameters
+from igrow.core.greenhouse.state import ACCUMULATED, PlantState
+from igrow.core.greenhouse.weather_table import WeatherRow
+from igrow.core.quantities import SETPOINTS
+from igrow.core.sun import position
 
 SENSOR_CHANNELS = frozenset(
     {"air_temperature", "air_humidity", "air_co2", "rail_pipe_temperature", "grow_pipe_temperature", "par"}

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from igrow_core.errors import IgrowError
+from igrow.core.errors import IgrowError
 
 Number = Any
 """A float, or an array of shape (N,) where a batch of greenhouses differs."""

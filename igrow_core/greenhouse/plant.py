@@ -12,20 +12,20 @@ from typing import Any
 
 import numpy as np
 
-from igrow_core.air import co2_fraction, saturation_pressure
-from igrow_core.errors import IgrowError
-from igrow_core.greenhouse import books, canopy, climate, observation, tomato, ventilation
-from igrow_core.greenhouse.climate import Climate, Conditions
-from igrow_core.greenhouse.climate_computer import ClimateComputer, at_rest, control
-from igrow_core.greenhouse.disturbances import Disturbances
-from igrow_core.greenhouse.hidden import EffectBank, HiddenEffect
-from igrow_core.greenhouse.light import distribute
-from igrow_core.greenhouse.namespace import Array, clip, namespace
-from igrow_core.greenhouse.parameters import GreenhouseParameters
-from igrow_core.greenhouse.sensors import Sensors
-from igrow_core.greenhouse.state import PlantState, add
-from igrow_core.greenhouse.tomato import Crop
-from igrow_core.greenhouse.weather_table import WeatherTable
+from igrow.core.air import co2_fraction, saturation_pressure
+from igrow.core.errors import IgrowError
+from igrow.core.greenhouse import books, canopy, climate, observation, tomato, ventilation
+from igrow.core.greenhouse.climate import Climate, Conditions
+from igrow.core.greenhouse.climate_computer import ClimateComputer, at_rest, control
+from igrow.core.greenhouse.disturbances import Disturbances
+from igrow.core.greenhouse.hidden import EffectBank, HiddenEffect
+from igrow.core.greenhouse.light import distribute
+from igrow.core.greenhouse.namespace import Array, clip, namespace
+from igrow.core.greenhouse.parameters import GreenhouseParameters
+from igrow.core.greenhouse.sensors import Sensors
+from igrow.core.greenhouse.state import PlantState, add
+from igrow.core.greenhouse.tomato import Crop
+from igrow.core.greenhouse.weather_table import WeatherTable
 
 __all__ = ["SCAN", "SLOW", "TICK", "Plant", "PlantState"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from igrow_core.sun import solar_hour
+from igrow.core.sun import solar_hour
 
 
 def recipe(time: np.datetime64, longitude: float = 4.53) -> dict[str, float]:

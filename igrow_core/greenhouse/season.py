@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.errors import IgrowError
-from igrow_core.greenhouse.climate_computer import ClimateComputer
-from igrow_core.greenhouse.disturbances import Disturbances, combined
-from igrow_core.greenhouse.hidden import HiddenEffect
-from igrow_core.greenhouse.parameters import GreenhouseParameters, stack
-from igrow_core.greenhouse.plant import TICK, Plant
-from igrow_core.greenhouse.sensors import Sensors
-from igrow_core.greenhouse.tomato import Crop
-from igrow_core.greenhouse.weather_table import WeatherTable
-from igrow_core.quantities import QUANTITIES, SETPOINTS
-from igrow_core.sun import unix_seconds
-from igrow_core.telemetry import Telemetry
+from igrow.core.errors import IgrowError
+from igrow.core.greenhouse.climate_computer import ClimateComputer
+from igrow.core.greenhouse.disturbances import Disturbances, combined
+from igrow.core.greenhouse.hidden import HiddenEffect
+from igrow.core.greenhouse.parameters import GreenhouseParameters, stack
+from igrow.core.greenhouse.plant import TICK, Plant
+from igrow.core.greenhouse.sensors import Sensors
+from igrow.core.greenhouse.tomato import Crop
+from igrow.core.greenhouse.weather_table import WeatherTable
+from igrow.core.quantities import QUANTITIES, SETPOINTS
+from igrow.core.sun import unix_seconds
+from igrow.core.telemetry import Telemetry
 
 Schedule = Callable[[np.datetime64], Mapping[str, Any]]
 """Setpoints at a time (UTC); values are floats or, for a batch, arrays (N,)."""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.air import STEFAN_BOLTZMANN, saturation_pressure
+from igrow.core.air import STEFAN_BOLTZMANN, saturation_pressure
 
 
 def sky_temperature(temperature: Any, humidity: Any, cloud: Any) -> NDArray[np.float64]:

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from igrow_core.greenhouse.climate import Climate
-from igrow_core.greenhouse.climate_computer import Control
-from igrow_core.greenhouse.light import Light
-from igrow_core.greenhouse.namespace import Array
-from igrow_core.greenhouse.parameters import GreenhouseParameters
-from igrow_core.greenhouse.tomato import Crop, Rates
+from igrow.core.greenhouse.climate import Climate
+from igrow.core.greenhouse.climate_computer import Control
+from igrow.core.greenhouse.light import Light
+from igrow.core.greenhouse.namespace import Array
+from igrow.core.greenhouse.parameters import GreenhouseParameters
+from igrow.core.greenhouse.tomato import Crop, Rates
 
 ACCUMULATED = ("vent_lee", "vent_wind", "energy_screen", "blackout_screen", "lamp_power", "co2_dosing", "irrigation")
 """Actuators that a log shows as the mean since the row before."""

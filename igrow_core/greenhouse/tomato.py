@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.greenhouse.namespace import Array, clip, ramp, sigmoid
-from igrow_core.greenhouse.parameters import GreenhouseParameters
+from igrow.core.greenhouse.namespace import Array, clip, ramp, sigmoid
+from igrow.core.greenhouse.parameters import GreenhouseParameters
 
 CARBOHYDRATE_PER_MOL = 0.030026
 """kg CH2O in a mol of CO2 fixed."""

@@ -9,9 +9,9 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any, Literal
 
-from igrow_core.air import LATENT_HEAT
-from igrow_core.effects import Effect, Memory, Parameter
-from igrow_core.effects.definition import Array, Balance, Drivers, Values
+from igrow.core.air import LATENT_HEAT
+from igrow.core.effects import Effect, Memory, Parameter
+from igrow.core.effects.definition import Array, Balance, Drivers, Values
 
 _SOURCE = "invented for tests"
 

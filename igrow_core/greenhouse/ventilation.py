@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from igrow_core.greenhouse.namespace import Array
-from igrow_core.greenhouse.parameters import GreenhouseParameters
+from igrow.core.greenhouse.namespace import Array
+from igrow.core.greenhouse.parameters import GreenhouseParameters
 
 GRAVITY = 9.81
 """m s-2."""

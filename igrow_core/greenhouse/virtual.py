@@ -6,17 +6,17 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from igrow_core.greenhouse.climate_computer import SAFE_SETPOINTS, ClimateComputer
-from igrow_core.greenhouse.disturbances import Disturbances
-from igrow_core.greenhouse.hidden import HiddenEffect
-from igrow_core.greenhouse.parameters import GreenhouseParameters
-from igrow_core.greenhouse.plant import Plant
-from igrow_core.greenhouse.sensors import Sensors
-from igrow_core.greenhouse.state import PlantState
-from igrow_core.greenhouse.tomato import Crop
-from igrow_core.greenhouse.weather_table import WeatherTable
-from igrow_core.sun import unix_seconds
-from igrow_core.telemetry import Telemetry
+from igrow.core.greenhouse.climate_computer import SAFE_SETPOINTS, ClimateComputer
+from igrow.core.greenhouse.disturbances import Disturbances
+from igrow.core.greenhouse.hidden import HiddenEffect
+from igrow.core.greenhouse.parameters import GreenhouseParameters
+from igrow.core.greenhouse.plant import Plant
+from igrow.core.greenhouse.sensors import Sensors
+from igrow.core.greenhouse.state import PlantState
+from igrow.core.greenhouse.tomato import Crop
+from igrow.core.greenhouse.weather_table import WeatherTable
+from igrow.core.sun import unix_seconds
+from igrow.core.telemetry import Telemetry
 
 
 class VirtualGreenhouse:

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.errors import IgrowError
-from igrow_core.greenhouse.sky import sky_temperature
-from igrow_core.sun import elevation, solar_hour, unix_seconds
-from igrow_core.telemetry import Telemetry
+from igrow.core.errors import IgrowError
+from igrow.core.greenhouse.sky import sky_temperature
+from igrow.core.sun import elevation, solar_hour, unix_seconds
+from igrow.core.telemetry import Telemetry
 
 STEP = 300
 """Seconds between rows."""

@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.air import co2_concentration, vapour_concentration
-from igrow_core.errors import IgrowError
-from igrow_core.greenhouse.namespace import Array
-from igrow_core.greenhouse.sky import sky_temperature
-from igrow_core.sun import unix_seconds
-from igrow_core.telemetry import Telemetry
+from igrow.core.air import co2_concentration, vapour_concentration
+from igrow.core.errors import IgrowError
+from igrow.core.greenhouse.namespace import Array
+from igrow.core.greenhouse.sky import sky_temperature
+from igrow.core.sun import unix_seconds
+from igrow.core.telemetry import Telemetry
 
 GRID = 300
 """Seconds between rows."""

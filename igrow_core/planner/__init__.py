@@ -6,10 +6,10 @@ evolution  one generation as a pure function, the same in numpy and as optimizer
 optimise   the loop: decode, simulate, value, select; the recipe competes and is returned when nothing beats it
 """
 
-from igrow_core.planner.evolution import EvolutionSettings, NumpyGeneration
-from igrow_core.planner.objective import Objective, Outcome, Simulator
-from igrow_core.planner.optimise import Budget, PlanningState, PlanResult, optimise
-from igrow_core.planner.template import Template
+from igrow.core.planner.evolution import EvolutionSettings, NumpyGeneration
+from igrow.core.planner.objective import Objective, Outcome, Simulator
+from igrow.core.planner.optimise import Budget, PlanningState, PlanResult, optimise
+from igrow.core.planner.template import Template
 
 __all__ = [
     "Budget",

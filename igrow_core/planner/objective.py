@@ -11,7 +11,7 @@ falls behind the crop's end date is worth nothing (unripe fruit is not sold), an
 of the wait. This leaves out that warm air ripens fruit sooner and that a plant without fruit cannot use growth;
 `mean_temperature_low` of the crop stands in for the first.
 
-Costs are those of `igrow_core.economics`, with CO2 in tiers from what the crop has had before.
+Costs are those of `igrow.core.economics`, with CO2 in tiers from what the crop has had before.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.economics import Balance, local_days, product_price, running_costs
-from igrow_core.site import Site
+from igrow.core.economics import Balance, local_days, product_price, running_costs
+from igrow.core.site import Site
 
 Values = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.bundle import open_session
-from igrow_core.errors import IgrowError
-from igrow_core.planner.evolution import EvolutionSettings, Fitness, Genes, fixed_inputs
+from igrow.core.bundle import open_session
+from igrow.core.errors import IgrowError
+from igrow.core.planner.evolution import EvolutionSettings, Fitness, Genes, fixed_inputs
 
 OUTPUTS = ("survivors", "survivor_fitness", "next_offspring")
 """Results of the graph, in the order of `evolution.generation`'s."""

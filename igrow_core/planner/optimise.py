@@ -9,12 +9,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.errors import IgrowError
-from igrow_core.planner.evolution import WORST, Generation, NumpyGeneration, draw
-from igrow_core.planner.objective import Objective, Outcome, Simulator, Valuation, cautious
-from igrow_core.planner.template import Setpoints, Template, for_site
-from igrow_core.quantities import SETPOINTS
-from igrow_core.site import Site
+from igrow.core.errors import IgrowError
+from igrow.core.planner.evolution import WORST, Generation, NumpyGeneration, draw
+from igrow.core.planner.objective import Objective, Outcome, Simulator, Valuation, cautious
+from igrow.core.planner.template import Setpoints, Template, for_site
+from igrow.core.quantities import SETPOINTS
+from igrow.core.site import Site
 
 Values = NDArray[np.float64]
 

@@ -12,16 +12,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.greenhouse import GreenhouseParameters
-from igrow_core.greenhouse.disturbances import QUIET
-from igrow_core.greenhouse.plant import Plant
-from igrow_core.greenhouse.sensors import EXACT
-from igrow_core.greenhouse.state import PlantState
-from igrow_core.greenhouse.weather_table import WeatherTable
-from igrow_core.planner.objective import Outcome
-from igrow_core.quantities import SETPOINTS
-from igrow_core.sun import unix_seconds
-from igrow_core.telemetry import Telemetry
+from igrow.core.greenhouse import GreenhouseParameters
+from igrow.core.greenhouse.disturbances import QUIET
+from igrow.core.greenhouse.plant import Plant
+from igrow.core.greenhouse.sensors import EXACT
+from igrow.core.greenhouse.state import PlantState
+from igrow.core.greenhouse.weather_table import WeatherTable
+from igrow.core.planner.objective import Outcome
+from igrow.core.quantities import SETPOINTS
+from igrow.core.sun import unix_seconds
+from igrow.core.telemetry import Telemetry
 
 Values = NDArray[np.float64]
 _TOTALS = {"heat": ("boiler_in", 1e-6), "electricity": ("electricity", 1 / 3.6e6), "co2": ("co2_dosed", 1.0)}

@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.bundle import open_session
-from igrow_core.errors import IgrowError
-from igrow_core.planner.objective import Objective
-from igrow_core.planner.template import Setpoints
-from igrow_core.quantities import SETPOINTS, WEATHER
-from igrow_core.site import Site
+from igrow.core.bundle import open_session
+from igrow.core.errors import IgrowError
+from igrow.core.planner.objective import Objective
+from igrow.core.planner.template import Setpoints
+from igrow.core.quantities import SETPOINTS, WEATHER
+from igrow.core.site import Site
 
 HOURS = 24
 FORECAST = {"outdoor_temperature": (10.0, 10.0), "outdoor_humidity": (75.0, 20.0), "global_radiation": (150.0, 250.0)}

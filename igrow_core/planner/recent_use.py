@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.planner.objective import Outcome, Simulator
-from igrow_core.site import Greenhouse
-from igrow_core.telemetry import Telemetry
+from igrow.core.planner.objective import Outcome, Simulator
+from igrow.core.site import Greenhouse
+from igrow.core.telemetry import Telemetry
 
 Values = NDArray[np.float64]
 

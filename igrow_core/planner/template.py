@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.local_time import to_local
-from igrow_core.quantities import SETPOINTS
-from igrow_core.site import Site
+from igrow.core.local_time import to_local
+from igrow.core.quantities import SETPOINTS
+from igrow.core.site import Site
 
 Setpoints = NDArray[np.float64]
 """(..., H, 4) in the units of the registry, in its order."""

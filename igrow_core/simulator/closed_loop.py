@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.effects.definition import Array, Values
-from igrow_core.quantities import SETPOINTS
-from igrow_core.simulator import actuation
-from igrow_core.simulator.hybrid import climate, measurement
-from igrow_core.simulator.hybrid.climate import ActiveEffects
-from igrow_core.simulator.hybrid.record import SUBSTEP, Record
+from igrow.core.effects.definition import Array, Values
+from igrow.core.quantities import SETPOINTS
+from igrow.core.simulator import actuation
+from igrow.core.simulator.hybrid import climate, measurement
+from igrow.core.simulator.hybrid.climate import ActiveEffects
+from igrow.core.simulator.hybrid.record import SUBSTEP, Record
 
 Floats = NDArray[np.float64]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from igrow_core.effects.definition import Array
-from igrow_core.simulator.network import Stage
+from igrow.core.effects.definition import Array
+from igrow.core.simulator.network import Stage
 
 
 @dataclass(frozen=True)

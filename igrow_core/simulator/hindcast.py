@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.bundle import Bundle, BundleError, open_session
-from igrow_core.simulator.hybrid.measurement import PREDICTED
-from igrow_core.simulator.hybrid.record import Record, make_record
-from igrow_core.telemetry import Telemetry
+from igrow.core.bundle import Bundle, BundleError, open_session
+from igrow.core.simulator.hybrid.measurement import PREDICTED
+from igrow.core.simulator.hybrid.record import Record, make_record
+from igrow.core.telemetry import Telemetry
 
 Floats = NDArray[np.float64]
 

@@ -14,8 +14,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
-from igrow_core.effects.definition import Array, Values
-from igrow_core.simulator.actuation import Rule
+from igrow.core.effects.definition import Array, Values
+from igrow.core.simulator.actuation import Rule
 
 _ROWS = (
     ("heating_offset", "K", 0.0, -3.0, 3.0, "air above the heating setpoint while the PLC heats"),

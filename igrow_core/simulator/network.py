@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.simulator.leaf_picking import LeafPicking
+from igrow.core.simulator.leaf_picking import LeafPicking
 
 Array = Any
 """An array of the namespace `xp`."""

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.simulator.leaf_picking import pick
-from igrow_core.simulator.network import HOURS, NetworkSimulator, Stage, advance, initial_memory
+from igrow.core.simulator.leaf_picking import pick
+from igrow.core.simulator.network import HOURS, NetworkSimulator, Stage, advance, initial_memory
 
 Values = NDArray[np.float64]
 Array = Any

@@ -7,14 +7,14 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core import sun
-from igrow_core.bundle import Bundle, BundleError, open_session
-from igrow_core.errors import IgrowError
-from igrow_core.planner.objective import Outcome
-from igrow_core.quantities import GROWTH, WEATHER
-from igrow_core.simulator.hindcast import SimulatorSettings
-from igrow_core.simulator.hybrid.measurement import PREDICTED
-from igrow_core.site import Greenhouse
+from igrow.core import sun
+from igrow.core.bundle import Bundle, BundleError, open_session
+from igrow.core.errors import IgrowError
+from igrow.core.planner.objective import Outcome
+from igrow.core.quantities import GROWTH, WEATHER
+from igrow.core.simulator.hindcast import SimulatorSettings
+from igrow.core.simulator.hybrid.measurement import PREDICTED
+from igrow.core.site import Greenhouse
 
 Floats = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ _USUAL = {
 
 
 class BundleSimulator:
-    """Runs simulator.onnx of a bundle; implements `igrow_core.planner.objective.Simulator`."""
+    """Runs simulator.onnx of a bundle; implements `igrow.core.planner.objective.Simulator`."""
 
     def __init__(self, bundle: Bundle, greenhouse: Greenhouse, *, threads: int = 1, members: int | None = None) -> None:
         """Open the graph.
@@ -77,7 +77,7 @@ class BundleSimulator:
         self._heat_paid = _heat_paid(greenhouse, dict(zip(names, self._parameters.T, strict=True)))
 
     def simulate(self, initial: dict[str, float], weather: Floats, setpoints: Floats, start: np.datetime64) -> Outcome:
-        """Return what candidates do; see `igrow_core.planner.objective.Simulator`.
+        """Return what candidates do; see `igrow.core.planner.objective.Simulator`.
 
         Raises:
             IgrowError: the horizon is not a number of whole days.

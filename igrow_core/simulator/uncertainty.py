@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.effects.definition import Array, Values
+from igrow.core.effects.definition import Array, Values
 
 Floats = NDArray[np.float64]
 

@@ -9,9 +9,9 @@ import pytest
 
 from benchmarks import measured_network
 from benchmarks.measured_network import network_predictor
-from igrow_core.simulator.hybrid.record import Record, make_record
-from igrow_core.telemetry import Telemetry
-from trainer.training.stage import TrainingPlan
+from igrow.core.simulator.hybrid.record import Record, make_record
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.training.stage import TrainingPlan
 
 DAY = 288
 

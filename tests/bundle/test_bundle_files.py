@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from tiny_bundle import write_tiny_bundle
 
-from igrow_core.bundle import (
+from igrow.core.bundle import (
     Bundle,
     BundleError,
     Golden,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from edge.registers.model import Function
-from edge.virtual_plc.memory import AnswerWithExceptionError
+from igrow.edge.registers.model import Function
+from igrow.edge.virtual_plc.memory import AnswerWithExceptionError
 
 READABLE = range(256)
 """Addresses with coded content, in every table."""
@@ -22,7 +22,7 @@ def code(device_id: int, function: Function, address: int) -> int:
 
 
 class CodedUnit:
-    """A unit for `edge.virtual_plc.modbus_server`."""
+    """A unit for `igrow.edge.virtual_plc.modbus_server`."""
 
     def __init__(self, device_id: int, refused: Sequence[int] = ()) -> None:
         self.device_id = device_id

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import cast
 
-from edge.virtual_plc.modbus_server import crc
+from igrow.edge.virtual_plc.modbus_server import crc
 
 
 class Fault(Enum):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from edge.bus.answer_check import (
+from igrow.edge.bus.answer_check import (
     MisfitError,
     TornStreamError,
     check_pdu,
@@ -14,9 +14,9 @@ from edge.bus.answer_check import (
     first_tcp_frame,
     only_whole_frames,
 )
-from edge.registers.codec import decode
-from edge.registers.loading import load_register_map
-from edge.virtual_plc.modbus_server import crc
+from igrow.edge.registers.codec import decode
+from igrow.edge.registers.loading import load_register_map
+from igrow.edge.virtual_plc.modbus_server import crc
 
 MAPS = Path(__file__).parents[2] / "config" / "register-maps"
 

@@ -7,11 +7,11 @@ import asyncio
 import pytest
 
 from bus.simulated_loop import run
-from edge.bus.errors import NotConnectedError, QueueFullError
-from edge.bus.pacing import Pacer
-from edge.bus.protocol import Priority
-from edge.bus.request_slot import RequestSlot, Turn
-from edge.bus.unit_health import HealthBook
+from igrow.edge.bus.errors import NotConnectedError, QueueFullError
+from igrow.edge.bus.pacing import Pacer
+from igrow.edge.bus.protocol import Priority
+from igrow.edge.bus.request_slot import RequestSlot, Turn
+from igrow.edge.bus.unit_health import HealthBook
 
 
 class FakeClock:

@@ -16,19 +16,19 @@ from control.control_fakes import MemoryStore
 
 from bus.fault_proxy import FaultProxy
 from bus.simulated_loop import run
-from edge.bus.modbus_bus import ModbusBus
-from edge.bus.plc import RegisterPlc
-from edge.cycle import ControlCycle
-from edge.guard import GuardedWriter, GuardRules, PointRule, Readback
-from edge.image import Image
-from edge.journal import Journal
-from edge.registers.codec import decode
-from edge.registers.loading import parse_register_map
-from edge.registers.model import BusSettings, Function, Transport
-from edge.sensors import ImageBuilder, SensorRule
-from edge.sources import HandsOff, Offer
-from edge.virtual_plc.memory import DeviceMemory
-from edge.virtual_plc.modbus_server import ModbusServer
+from igrow.edge.bus.modbus_bus import ModbusBus
+from igrow.edge.bus.plc import RegisterPlc
+from igrow.edge.cycle import ControlCycle
+from igrow.edge.guard import GuardedWriter, GuardRules, PointRule, Readback
+from igrow.edge.image import Image
+from igrow.edge.journal import Journal
+from igrow.edge.registers.codec import decode
+from igrow.edge.registers.loading import parse_register_map
+from igrow.edge.registers.model import BusSettings, Function, Transport
+from igrow.edge.sensors import ImageBuilder, SensorRule
+from igrow.edge.sources import HandsOff, Offer
+from igrow.edge.virtual_plc.memory import DeviceMemory
+from igrow.edge.virtual_plc.modbus_server import ModbusServer
 
 MAP = parse_register_map("""
 title: a small greenhouse

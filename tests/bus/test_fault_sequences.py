@@ -15,11 +15,11 @@ import pytest
 from bus.coded_unit import CodedUnit, code
 from bus.fault_proxy import NETWORK, SERIAL, Fault, FaultProxy
 from bus.simulated_loop import run
-from edge.bus.errors import BusError
-from edge.bus.modbus_bus import ModbusBus
-from edge.bus.protocol import Priority, ReadRequest, WriteRequest
-from edge.registers.model import BusSettings, Function, Transport
-from edge.virtual_plc.modbus_server import ModbusServer
+from igrow.edge.bus.errors import BusError
+from igrow.edge.bus.modbus_bus import ModbusBus
+from igrow.edge.bus.protocol import Priority, ReadRequest, WriteRequest
+from igrow.edge.registers.model import BusSettings, Function, Transport
+from igrow.edge.virtual_plc.modbus_server import ModbusServer
 
 TIMEOUT = 0.5
 PATIENCE = 30.0
@@ -144,7 +144,7 @@ def test_these_sequences_do_find_a_bus_that_trusts_a_late_answer(monkeypatch: py
         self._unsure.discard(device_id)
 
     monkeypatch.setattr(ModbusBus, "_settle", careless)
-    monkeypatch.setattr("edge.bus.unit_health.HealthBook.rest_left", lambda self, device_id: 0.0)
+    monkeypatch.setattr("igrow.edge.bus.unit_health.HealthBook.rest_left", lambda self, device_id: 0.0)
     with pytest.raises(AssertionError, match="wrong values"):
         play(range(1, 401, 2))
 

@@ -11,7 +11,7 @@ import pytest
 from bus.coded_unit import CodedUnit, code
 from bus.fault_proxy import Fault, FaultProxy
 from bus.simulated_loop import run
-from edge.bus.errors import (
+from igrow.edge.bus.errors import (
     AddressRefusedError,
     BadAnswerError,
     BusError,
@@ -23,10 +23,10 @@ from edge.bus.errors import (
     UnitBusyError,
     UnitRestingError,
 )
-from edge.bus.modbus_bus import ModbusBus
-from edge.bus.protocol import Priority, ReadRequest, WriteRequest
-from edge.registers.model import BusSettings, Function, Transport
-from edge.virtual_plc.modbus_server import ModbusServer
+from igrow.edge.bus.modbus_bus import ModbusBus
+from igrow.edge.bus.protocol import Priority, ReadRequest, WriteRequest
+from igrow.edge.registers.model import BusSettings, Function, Transport
+from igrow.edge.virtual_plc.modbus_server import ModbusServer
 
 PORT = 5020
 TRANSPORTS = pytest.mark.parametrize("transport", [Transport.TCP, Transport.RTU_OVER_TCP], ids=lambda t: t.value)

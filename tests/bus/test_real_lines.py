@@ -14,11 +14,11 @@ from typing import Any
 import pytest
 
 from bus.coded_unit import CodedUnit, code
-from edge.bus.errors import NotConnectedError
-from edge.bus.modbus_bus import ModbusBus
-from edge.bus.protocol import Priority, ReadRequest, WriteRequest
-from edge.registers.model import BusSettings, Function, Parity, Transport
-from edge.virtual_plc.modbus_server import ModbusServer, _SerialConnection, _TcpConnection
+from igrow.edge.bus.errors import NotConnectedError
+from igrow.edge.bus.modbus_bus import ModbusBus
+from igrow.edge.bus.protocol import Priority, ReadRequest, WriteRequest
+from igrow.edge.registers.model import BusSettings, Function, Parity, Transport
+from igrow.edge.virtual_plc.modbus_server import ModbusServer, _SerialConnection, _TcpConnection
 
 
 async def exchange(settings: BusSettings, unit: CodedUnit) -> None:

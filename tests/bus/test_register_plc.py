@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from bus.simulated_loop import run
-from edge.bus.errors import (
+from igrow.edge.bus.errors import (
     AddressRefusedError,
     BusError,
     NoAnswerError,
@@ -17,10 +17,10 @@ from edge.bus.errors import (
     UnknownPointError,
     ValueDoesNotFitError,
 )
-from edge.bus.plc import RegisterPlc
-from edge.bus.protocol import Priority, ReadRequest, WriteRequest
-from edge.registers.loading import parse_register_map
-from edge.registers.model import Function
+from igrow.edge.bus.plc import RegisterPlc
+from igrow.edge.bus.protocol import Priority, ReadRequest, WriteRequest
+from igrow.edge.registers.loading import parse_register_map
+from igrow.edge.registers.model import Function
 
 MAP = """
 title: a small site

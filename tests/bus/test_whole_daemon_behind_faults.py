@@ -15,13 +15,13 @@ import pytest
 from control.daemon_bench import Plant, free_port, running, until, write_files
 
 from bus.fault_proxy import NETWORK, Fault, FaultProxy
-from edge import pace
-from edge.bus import plc as bus_of_plc
-from edge.bus.modbus_bus import ModbusBus
-from edge.registers.codec import decode
-from edge.registers.model import BusSettings, Device, Function
-from edge.sources.override import Lease, write_leases
-from edge.store import read_records, read_telemetry
+from igrow.edge import pace
+from igrow.edge.bus import plc as bus_of_plc
+from igrow.edge.bus.modbus_bus import ModbusBus
+from igrow.edge.registers.codec import decode
+from igrow.edge.registers.model import BusSettings, Device, Function
+from igrow.edge.sources.override import Lease, write_leases
+from igrow.edge.store import read_records, read_telemetry
 
 TIMEOUT = 0.05
 SENSORS = {

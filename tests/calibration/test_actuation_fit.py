@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from virtual_log import SITE, virtual_log
 
-from igrow_core.simulator import actuation
-from igrow_core.simulator.hybrid.nominal import nominal, site_record
-from trainer.calibration.actuation import fit_actuation, setpoint_columns
-from trainer.calibration.posterior import prior
-from trainer.calibration.site_model import fit_site
-from trainer.calibration.totals import daily_totals
+from igrow.core.simulator import actuation
+from igrow.core.simulator.hybrid.nominal import nominal, site_record
+from igrow.trainer.calibration.actuation import fit_actuation, setpoint_columns
+from igrow.trainer.calibration.posterior import prior
+from igrow.trainer.calibration.site_model import fit_site
+from igrow.trainer.calibration.totals import daily_totals
 
 
 def test_rules_fitted_to_a_log_do_what_its_computer_did() -> None:

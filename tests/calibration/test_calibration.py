@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from virtual_log import SITE, virtual_log
 
-from igrow_core.errors import IgrowError
-from igrow_core.simulator.hybrid.disturbance import missing_fluxes
-from igrow_core.simulator.hybrid.nominal import nominal, site_record
-from igrow_core.simulator.hybrid.record import Record
-from trainer.calibration import calibrate, evaluate, prior, split_weeks
-from trainer.calibration.evaluation import starts_within
-from trainer.calibration.forecast import fit_combination
-from trainer.calibration.remainder import fit_remainder
-from trainer.calibration.split import alternate_weeks, weeks
+from igrow.core.errors import IgrowError
+from igrow.core.simulator.hybrid.disturbance import missing_fluxes
+from igrow.core.simulator.hybrid.nominal import nominal, site_record
+from igrow.core.simulator.hybrid.record import Record
+from igrow.trainer.calibration import calibrate, evaluate, prior, split_weeks
+from igrow.trainer.calibration.evaluation import starts_within
+from igrow.trainer.calibration.forecast import fit_combination
+from igrow.trainer.calibration.remainder import fit_remainder
+from igrow.trainer.calibration.split import alternate_weeks, weeks
 
 TRUTH = {"transmissivity": 1.2, "leakage_wind": 1.3, "transpiration_deficit": 0.75, "assimilation_maximum": 1.25}
 """Factors of the virtual greenhouse's parameters."""

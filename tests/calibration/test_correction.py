@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from virtual_log import SITE, virtual_log
 
-from igrow_core.simulator.hybrid.nominal import site_record
-from igrow_core.simulator.hybrid.record import Record
-from trainer.calibration.actuation import setpoint_columns
-from trainer.calibration.correction import all_runs, apply_correction, fit_correction
-from trainer.calibration.forecast import Combination
+from igrow.core.simulator.hybrid.nominal import site_record
+from igrow.core.simulator.hybrid.record import Record
+from igrow.trainer.calibration.actuation import setpoint_columns
+from igrow.trainer.calibration.correction import all_runs, apply_correction, fit_correction
+from igrow.trainer.calibration.forecast import Combination
 
 DAY = 288
 

@@ -7,17 +7,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from edge.bus.errors import BusError, NoAnswerError
-from edge.bus.plc import Reading
-from edge.clock import FakeClock
-from edge.cycle import ControlCycle
-from edge.guard import GuardedWriter, GuardRules, Interlock, PointRule, Readback
-from edge.image import Image, Quality, Value
-from edge.journal import Journal
-from edge.ports import AlarmRecord, WriteRecord
-from edge.sensors import ImageBuilder, SensorRule
-from edge.sources import HandsOff, Source
-from igrow_core.telemetry import Telemetry
+from igrow.core.telemetry import Telemetry
+from igrow.edge.bus.errors import BusError, NoAnswerError
+from igrow.edge.bus.plc import Reading
+from igrow.edge.clock import FakeClock
+from igrow.edge.cycle import ControlCycle
+from igrow.edge.guard import GuardedWriter, GuardRules, Interlock, PointRule, Readback
+from igrow.edge.image import Image, Quality, Value
+from igrow.edge.journal import Journal
+from igrow.edge.ports import AlarmRecord, WriteRecord
+from igrow.edge.sensors import ImageBuilder, SensorRule
+from igrow.edge.sources import HandsOff, Source
 
 SETPOINTS = ("heating_setpoint", "co2_setpoint")
 
@@ -102,7 +102,7 @@ class FixedSource:
     name: str = "plan"
 
     def offer(self, image: Image):
-        from edge.sources import Offer
+        from igrow.edge.sources import Offer
 
         return Offer("as told", self.setpoints)
 

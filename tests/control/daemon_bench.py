@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from edge.configuration import load_configuration
-from edge.daemon import Daemon
-from edge.registers.loading import load_register_map
-from edge.virtual_plc.pace import Lockstep, Pace
-from edge.virtual_plc.virtual_plc import VirtualPlc
+from igrow.edge.configuration import load_configuration
+from igrow.edge.daemon import Daemon
+from igrow.edge.registers.loading import load_register_map
+from igrow.edge.virtual_plc.pace import Lockstep, Pace
+from igrow.edge.virtual_plc.virtual_plc import VirtualPlc
 
 MAP = """
 title: test plant

@@ -2,7 +2,7 @@
 
 from datetime import UTC, datetime
 
-from edge.clock import PlcClock, SystemClock, TrustedTime
+from igrow.edge.clock import PlcClock, SystemClock, TrustedTime
 
 NOW = datetime(2026, 3, 1, tzinfo=UTC).timestamp()
 

@@ -15,16 +15,16 @@ import numpy as np
 import pytest
 from daemon_bench import Plant, free_port, running, until, write_files
 
-from edge.cli import COMMANDS, main
-from edge.cli.common import parse_duration, parse_time
-from edge.cli.plan import table
-from edge.cli.probe import parse_units
-from edge.cli.simulate_plc import make_plant, parse_effect
-from edge.cli.status import lines
-from edge.ports import Plan
-from edge.sources.override import read_leases
-from edge.state_lock import sole_use
-from igrow_core.errors import IgrowError
+from igrow.core.errors import IgrowError
+from igrow.edge.cli import COMMANDS, main
+from igrow.edge.cli.common import parse_duration, parse_time
+from igrow.edge.cli.plan import table
+from igrow.edge.cli.probe import parse_units
+from igrow.edge.cli.simulate_plc import make_plant, parse_effect
+from igrow.edge.cli.status import lines
+from igrow.edge.ports import Plan
+from igrow.edge.sources.override import read_leases
+from igrow.edge.state_lock import sole_use
 
 
 def call(capsys, *arguments: object) -> tuple[int, str, str]:
@@ -160,7 +160,7 @@ def test_a_store_is_restored_only_while_no_daemon_has_it(tmp_path, capsys):
 def test_a_walk_before_the_first_start_leaves_no_folder_that_the_service_could_not_write_to(
     tmp_path, capsys, monkeypatch
 ):
-    monkeypatch.setattr("edge.commission.LINE_SECONDS", 0.1)
+    monkeypatch.setattr("igrow.edge.commission.LINE_SECONDS", 0.1)
     path = write_files(tmp_path, free_port())
     code, out, _ = call(capsys, "commission", path)
     assert code == 1
@@ -185,7 +185,7 @@ def test_a_user_who_cannot_see_the_lock_is_told_whose_rights_it_takes(tmp_path, 
             raise PermissionError(errno.EACCES, "Permission denied", str(file))
         return real(file, *arguments, **named)
 
-    monkeypatch.setattr("edge.state_lock.os.open", barred)
+    monkeypatch.setattr("igrow.edge.state_lock.os.open", barred)
     code, _, err = call(capsys, "commission", path)
     assert code == 2
     assert "cannot be told: Permission denied" in err
@@ -224,7 +224,7 @@ def test_simulate_plc_serves_what_mean_commands_ask_for(tmp_path):
     write_files(tmp_path, 0)
     (tmp_path / "map.yaml").write_text((tmp_path / "map.yaml").read_text().replace("port: 0", "port: 1"))
     process = subprocess.Popen(
-        [sys.executable, "-m", "edge.cli", "simulate-plc", "--map", str(tmp_path / "map.yaml"), "--port", "0",
+        [sys.executable, "-m", "igrow.edge.cli", "simulate-plc", "--map", str(tmp_path / "map.yaml"), "--port", "0",
          "--pace", "lockstep", "--days", "3", "--effect", "wind_infiltration@2020-01-16"],
         stdout=subprocess.PIPE, text=True,
     )  # fmt: skip
@@ -235,7 +235,7 @@ def test_simulate_plc_serves_what_mean_commands_ask_for(tmp_path):
         probe = [
             sys.executable,
             "-m",
-            "edge.cli",
+            "igrow.edge.cli",
             "probe",
             "--tcp",
             f"127.0.0.1:{port}",

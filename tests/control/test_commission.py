@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from daemon_bench import Plant, free_port, write_files
 
-from edge.commission import Commissioning
-from edge.configuration import load_configuration
-from edge.virtual_plc.pace import Lockstep, Realtime
+from igrow.edge.commission import Commissioning
+from igrow.edge.configuration import load_configuration
+from igrow.edge.virtual_plc.pace import Lockstep, Realtime
 
 
 class Script:
@@ -96,7 +96,7 @@ async def test_a_value_far_off_points_to_scale_and_byte_order(tmp_path):
 
 
 async def test_a_plc_that_never_falls_back_does_not_pass(tmp_path, monkeypatch):
-    monkeypatch.setattr("edge.commission.PATIENCE", 0.1)
+    monkeypatch.setattr("igrow.edge.commission.PATIENCE", 0.1)
     person = Script()
     # In lock-step no plant time passes without a heartbeat, so this PLC never notices that it has stopped.
     passed, _ = await walk(tmp_path, person, pace=Lockstep(1.0))
@@ -105,7 +105,7 @@ async def test_a_plc_that_never_falls_back_does_not_pass(tmp_path, monkeypatch):
 
 
 async def test_a_dead_line_ends_the_walk_with_its_reason(tmp_path, monkeypatch):
-    monkeypatch.setattr("edge.commission.LINE_SECONDS", 0.5)
+    monkeypatch.setattr("igrow.edge.commission.LINE_SECONDS", 0.5)
     person = Script()
     configuration = load_configuration(write_files(tmp_path, free_port()))
     assert not await Commissioning(configuration, person).run()
@@ -115,7 +115,7 @@ async def test_a_dead_line_ends_the_walk_with_its_reason(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("answer", ["y", "n"])
 def test_a_person_is_asked_until_the_answer_is_clear(monkeypatch, answer):
-    from edge.commission import Console
+    from igrow.edge.commission import Console
 
     answers = iter(["", "perhaps", answer])
     monkeypatch.setattr("builtins.input", lambda prompt: next(answers))

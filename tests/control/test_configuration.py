@@ -8,15 +8,15 @@ from daemon_bench import MAP, write_files
 from hypothesis import given
 from hypothesis import strategies as st
 
-from edge.configuration import ConfigurationError, DaemonFile, load_configuration
-from edge.guard.rules import GuardRuleError
-from edge.point_rules import point_rule
-from edge.registers.codec import decode, encode
-from edge.registers.loading import parse_register_map
-from edge.registers.model import DataType, Function, Point
-from igrow_core.errors import IgrowError
-from igrow_core.site import SetpointLimits
-from igrow_core.yaml_schema import parse
+from igrow.core.errors import IgrowError
+from igrow.core.site import SetpointLimits
+from igrow.core.yaml_schema import parse
+from igrow.edge.configuration import ConfigurationError, DaemonFile, load_configuration
+from igrow.edge.guard.rules import GuardRuleError
+from igrow.edge.point_rules import point_rule
+from igrow.edge.registers.codec import decode, encode
+from igrow.edge.registers.loading import parse_register_map
+from igrow.edge.registers.model import DataType, Function, Point
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from control_fakes import CO2, HEATING, FixedSource, make_bench
 
-from edge.bus.errors import NoAnswerError, UnitRestingError
-from edge.guard import Bound, Interlock
+from igrow.edge.bus.errors import NoAnswerError, UnitRestingError
+from igrow.edge.guard import Bound, Interlock
 
 FAST = {"heating_setpoint": replace(HEATING, slew=None, minimum_interval=0.0), "co2_setpoint": CO2}
 

@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 from daemon_bench import MAP, Plant, free_port, running, until, write_files
 
-from edge.image import Quality
-from edge.planning import PlanningProcess, ProcessLimits
-from edge.ports import ActiveBundle
-from edge.store import read_records, read_telemetry
-from edge.virtual_plc.pace import Realtime
+from igrow.edge.image import Quality
+from igrow.edge.planning import PlanningProcess, ProcessLimits
+from igrow.edge.ports import ActiveBundle
+from igrow.edge.store import read_records, read_telemetry
+from igrow.edge.virtual_plc.pace import Realtime
 
 
 def kinds(folder: Path) -> list[str]:
@@ -105,7 +105,7 @@ async def test_a_setpoint_changed_at_the_plc_is_respected_also_across_kill_9(tmp
     path = write_files(tmp_path, port, clock="system", interval="1 s")
     plant = Plant(tmp_path, port, pace=Realtime())
     await plant.up()
-    command = [sys.executable, "-m", "edge.cli", "run", str(path)]
+    command = [sys.executable, "-m", "igrow.edge.cli", "run", str(path)]
     process = await asyncio.create_subprocess_exec(*command)
     try:
         await until(lambda: plant.shows("co2_setpoint") > 400.0)

@@ -6,11 +6,11 @@ from dataclasses import replace
 import pytest
 from control_fakes import image_of
 
-from edge.guard import Bound, GuardRules, GuardState, Interlock, PointRule, PointState, Request, guard
-from edge.guard.core import with_earlier_writes
-from edge.guard.interlocks import DEFAULT_INTERLOCKS, SAFE, InterlockError
-from edge.guard.rules import GuardRuleError
-from edge.image import Image, Quality, Value
+from igrow.edge.guard import Bound, GuardRules, GuardState, Interlock, PointRule, PointState, Request, guard
+from igrow.edge.guard.core import with_earlier_writes
+from igrow.edge.guard.interlocks import DEFAULT_INTERLOCKS, SAFE, InterlockError
+from igrow.edge.guard.rules import GuardRuleError
+from igrow.edge.image import Image, Quality, Value
 
 POINT = PointRule(low=10.0, high=30.0, safe=18.0)
 

@@ -6,9 +6,9 @@ from control_fakes import image_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from edge.guard import Bound, GuardRules, GuardState, Interlock, PointRule, Request, guard
-from edge.guard.core import DAY
-from edge.image import Image, Quality, Value
+from igrow.edge.guard import Bound, GuardRules, GuardState, Interlock, PointRule, Request, guard
+from igrow.edge.guard.core import DAY
+from igrow.edge.image import Image, Quality, Value
 
 ANY_FLOAT = st.one_of(
     st.floats(allow_nan=True, allow_infinity=True),

@@ -2,8 +2,8 @@
 
 import socket
 
-from edge.notify import Notifier
-from edge.pace import TickPace
+from igrow.edge.notify import Notifier
+from igrow.edge.pace import TickPace
 
 
 def test_each_cycle_feeds_the_watchdog_and_a_new_status_is_sent_once(tmp_path):

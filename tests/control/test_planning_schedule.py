@@ -9,11 +9,11 @@ from zoneinfo import ZoneInfo
 import numpy as np
 import pytest
 
-from edge.image import Image, Quality, Value
-from edge.planning_schedule import ESSENTIAL, PlanningRules, PlanningSchedule
-from edge.ports import ActiveBundle, Plan, PlanRequest
-from edge.sources import Recipe
-from igrow_core.telemetry import Telemetry, write_csv
+from igrow.core.telemetry import Telemetry, write_csv
+from igrow.edge.image import Image, Quality, Value
+from igrow.edge.planning_schedule import ESSENTIAL, PlanningRules, PlanningSchedule
+from igrow.edge.ports import ActiveBundle, Plan, PlanRequest
+from igrow.edge.sources import Recipe
 
 T0 = 1_772_323_200.0
 HOUR = 3600.0

@@ -5,12 +5,12 @@ import math
 import pytest
 from control_fakes import image_of
 
-from edge.bus.errors import NoAnswerError
-from edge.bus.plc import Reading
-from edge.guard import DEFAULT_INTERLOCKS, GuardRules, GuardState, PointRule, Request, guard
-from edge.image import Image, Quality, Value
-from edge.sensors import CONSEQUENCES, ImageBuilder, SensorRule, TwinSensors, default_rule
-from edge.sensors.consequences import usable_for_control, usable_for_planning
+from igrow.edge.bus.errors import NoAnswerError
+from igrow.edge.bus.plc import Reading
+from igrow.edge.guard import DEFAULT_INTERLOCKS, GuardRules, GuardState, PointRule, Request, guard
+from igrow.edge.image import Image, Quality, Value
+from igrow.edge.sensors import CONSEQUENCES, ImageBuilder, SensorRule, TwinSensors, default_rule
+from igrow.edge.sensors.consequences import usable_for_control, usable_for_planning
 
 RULE = SensorRule(-20.0, 60.0, rate=0.01, jump=1.0, frozen_after=3600.0, stale_after=30.0, missing_after=600.0)
 
@@ -161,7 +161,7 @@ def test_a_line_that_answers_nothing_is_told_from_points_that_were_not_due():
     assert bench.fail(10.0).link_ok
 
 
-# What each quality does to control: the table in edge.sensors.consequences, checked against the guard itself.
+# What each quality does to control: the table in igrow.edge.sensors.consequences, checked against the guard itself.
 
 EXPECTED = {
     Quality.GOOD: (True, True, True),

@@ -7,11 +7,11 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from edge.bus.plc import Reading
-from edge.image import Quality
-from edge.sensors import ImageBuilder, default_rule
-from edge.wiring import sun_elevation
-from trainer.readers.open_log import open_log
+from igrow.edge.bus.plc import Reading
+from igrow.edge.image import Quality
+from igrow.edge.sensors import ImageBuilder, default_rule
+from igrow.edge.wiring import sun_elevation
+from igrow.trainer.readers.open_log import open_log
 
 DAYS = 40
 DOUBT = (Quality.FROZEN, Quality.IMPLAUSIBLE, Quality.OUT_OF_RANGE)

@@ -6,9 +6,10 @@ from zoneinfo import ZoneInfo
 import pytest
 from control_fakes import image_of
 
-from edge.image import Image, Quality, Value
-from edge.ports import Plan
-from edge.sources import (
+from igrow.core.yaml_schema import SchemaError, parse
+from igrow.edge.image import Image, Quality, Value
+from igrow.edge.ports import Plan
+from igrow.edge.sources import (
     FreshPlan,
     GrowerOverride,
     HandsOff,
@@ -21,8 +22,7 @@ from edge.sources import (
     recipe_at,
     recipe_course,
 )
-from edge.sources.override import read_leases, write_leases
-from igrow_core.yaml_schema import SchemaError, parse
+from igrow.edge.sources.override import read_leases, write_leases
 
 T0 = 1_772_323_200.0
 AMSTERDAM = ZoneInfo("Europe/Amsterdam")

@@ -7,9 +7,9 @@ import urllib.request
 
 from daemon_bench import Plant, free_port, running, until, write_files
 
-from edge.configuration import load_configuration
-from edge.status import StatusServer
-from edge.wiring import open_services
+from igrow.edge.configuration import load_configuration
+from igrow.edge.status import StatusServer
+from igrow.edge.wiring import open_services
 
 
 async def test_the_page_shows_the_time_of_the_site(tmp_path):

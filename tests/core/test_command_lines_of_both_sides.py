@@ -9,10 +9,10 @@ import types
 
 import pytest
 
-import edge.cli
-import trainer.cli
-from igrow_core.command_line import run_command
-from igrow_core.errors import IgrowError
+import igrow.edge.cli
+import igrow.trainer.cli
+from igrow.core.command_line import run_command
+from igrow.core.errors import IgrowError
 
 
 def end_with(monkeypatch, error: BaseException) -> int:
@@ -47,7 +47,7 @@ def test_a_fault_of_ours_is_not_hidden(monkeypatch):
 def test_an_unreadable_file_at_the_trainer_is_one_line_and_exit_code_2(tmp_path, capsys):
     keys = tmp_path / "keys"
     keys.write_text("a file where a folder is needed")
-    code = trainer.cli.main(["publish", "--init", "--keys", str(keys), "--exchange", str(tmp_path / "exchange")])
+    code = igrow.trainer.cli.main(["publish", "--init", "--keys", str(keys), "--exchange", str(tmp_path / "exchange")])
     printed = capsys.readouterr()
     assert (code, printed.out) == (2, "")
     assert printed.err.count("\n") == 1
@@ -56,7 +56,7 @@ def test_an_unreadable_file_at_the_trainer_is_one_line_and_exit_code_2(tmp_path,
 
 def test_a_reader_who_has_enough_ends_a_command_quietly():
     talkative = (
-        "import sys, types; from igrow_core.command_line import run_command\n"
+        "import sys, types; from igrow.core.command_line import run_command\n"
         "def talk(options):\n    while True: print('a line')\n"
         "module = types.ModuleType('talk'); module.EXAMPLE = 'program talk'; module.run = talk\n"
         "module.add_arguments = lambda parser: None; sys.modules['talk'] = module\n"
@@ -71,7 +71,7 @@ def test_a_reader_who_has_enough_ends_a_command_quietly():
     assert process.wait() == 0
 
 
-@pytest.mark.parametrize("side", [edge.cli, trainer.cli])
+@pytest.mark.parametrize("side", [igrow.edge.cli, igrow.trainer.cli])
 def test_every_module_of_the_tables_is_there(side):
     for module, _ in side.COMMANDS.values():
         assert importlib.util.find_spec(module) is not None

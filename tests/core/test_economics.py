@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from igrow_core.economics import co2_cost, electricity_price, is_peak, product_price, running_costs, season_balance
-from igrow_core.site import ElectricityTariff, Prices, Tier
+from igrow.core.economics import co2_cost, electricity_price, is_peak, product_price, running_costs, season_balance
+from igrow.core.site import ElectricityTariff, Prices, Tier
 
 PRICES = Prices()
 

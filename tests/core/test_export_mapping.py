@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from igrow_core.export_mapping import ExportMapping, load_mapping, read_export
-from igrow_core.telemetry import Telemetry, TelemetryError
-from igrow_core.yaml_schema import SchemaError, parse
+from igrow.core.export_mapping import ExportMapping, load_mapping, read_export
+from igrow.core.telemetry import Telemetry, TelemetryError
+from igrow.core.yaml_schema import SchemaError, parse
 
 DUTCH = """
 delimiter: ";"

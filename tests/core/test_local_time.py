@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from igrow_core.errors import IgrowError
-from igrow_core.local_time import from_local, hour_of_day, to_local
+from igrow.core.errors import IgrowError
+from igrow.core.local_time import from_local, hour_of_day, to_local
 
 ZONE = "Europe/Amsterdam"
 

@@ -12,11 +12,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from igrow_core.errors import IgrowError
-from igrow_core.quantities import QUANTITIES, SETPOINTS
-from igrow_core.site import Screen, Site, load_site
-from igrow_core.yaml_schema import SchemaError, parse
-from igrow_core.yaml_template import dump
+from igrow.core.errors import IgrowError
+from igrow.core.quantities import QUANTITIES, SETPOINTS
+from igrow.core.site import Screen, Site, load_site
+from igrow.core.yaml_schema import SchemaError, parse
+from igrow.core.yaml_template import dump
 
 GOLDEN = Path(__file__).parent / "golden"
 CONFIG = Path(__file__).resolve().parents[2] / "config" / "site.yaml"

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from igrow_core.telemetry import (
+from igrow.core.telemetry import (
     Telemetry,
     TelemetryError,
     concatenate,

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from igrow_core.whole_files import write_whole
+from igrow.core.whole_files import write_whole
 
 
 def test_new_content_takes_the_place_of_the_old(tmp_path):

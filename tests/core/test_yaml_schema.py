@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from igrow_core.yaml_schema import SchemaError, SettingError, load, parse, setting
+from igrow.core.yaml_schema import SchemaError, SettingError, load, parse, setting
 
 
 class Order(Enum):

@@ -9,10 +9,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from igrow_core.simulator.hybrid.nominal import nominal
-from igrow_core.telemetry import Telemetry
+from igrow.core.simulator.hybrid.nominal import nominal
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.diagnosis import Deployed
 from tests.virtual_log import SITE, virtual_log, weather
-from trainer.diagnosis import Deployed
 
 Floats = NDArray[np.float64]
 DAYS = 20

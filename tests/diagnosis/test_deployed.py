@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from igrow_core.bundle import default_bundle_folder, read_bundle
-from igrow_core.site import Greenhouse, Site
-from trainer.cli import main
-from trainer.diagnosis import from_manifest
-from trainer.diagnosis.prior import ELSEWHERE
-from trainer.export.bundle import read_hybrid_model, write_hybrid_bundle
+from igrow.core.bundle import default_bundle_folder, read_bundle
+from igrow.core.site import Greenhouse, Site
+from igrow.trainer.cli import main
+from igrow.trainer.diagnosis import from_manifest
+from igrow.trainer.diagnosis.prior import ELSEWHERE
+from igrow.trainer.export.bundle import read_hybrid_model, write_hybrid_bundle
 
 HERE = Site(name="here", latitude=52.0, longitude=4.5)
 LOW = replace(HERE, greenhouse=Greenhouse(mean_height=2.5))

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from igrow_core.errors import IgrowError
-from igrow_core.telemetry import Telemetry
+from igrow.core.errors import IgrowError
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.diagnosis import Diagnosis, Evidence, diagnose
+from igrow.trainer.report import render_report
 from tests.diagnosis.conftest import deployed_model
 from tests.virtual_log import SITE
-from trainer.diagnosis import Diagnosis, Evidence, diagnose
-from trainer.report import render_report
 
 
 @pytest.fixture(scope="module")

@@ -1,12 +1,12 @@
 from __future__ import annotations
 
-from igrow_core.effects import EFFECTS
-from trainer.diagnosis.activation import ActiveTerm
-from trainer.diagnosis.candidates import Candidate
-from trainer.diagnosis.estimate import Estimated, within_bounds
-from trainer.diagnosis.gram import Term
-from trainer.diagnosis.result import Interval
-from trainer.diagnosis.selection import Hypothesis
+from igrow.core.effects import EFFECTS
+from igrow.trainer.diagnosis.activation import ActiveTerm
+from igrow.trainer.diagnosis.candidates import Candidate
+from igrow.trainer.diagnosis.estimate import Estimated, within_bounds
+from igrow.trainer.diagnosis.gram import Term
+from igrow.trainer.diagnosis.result import Interval
+from igrow.trainer.diagnosis.selection import Hypothesis
 
 BOUNDS = EFFECTS["co2_valve_leak"].amplitude
 

@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import multivariate_normal
 
-from trainer.diagnosis import factors, usual
-from trainer.diagnosis.factors import LogLikelihood
+from igrow.trainer.diagnosis import factors, usual
+from igrow.trainer.diagnosis.factors import LogLikelihood
 
 SIZE, ROWS = 12, 40
 

@@ -5,15 +5,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from igrow_core.effects import EFFECTS
-from igrow_core.telemetry import Telemetry
+from igrow.core.effects import EFFECTS
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.diagnosis import (
+    gram,
+    likelihood,
+    linearisation,
+    problem,
+    runner,
+    search,
+    selection,
+    structure,
+    usual,
+)
+from igrow.trainer.diagnosis.gram import RESIDUAL, DailyGrams, Term
+from igrow.trainer.diagnosis.linearisation import DivergenceError
+from igrow.trainer.diagnosis.problem import Problem
+from igrow.trainer.diagnosis.split import split_days
 from tests.diagnosis.conftest import deployed_model
 from tests.virtual_log import SITE
-from trainer.diagnosis import gram, likelihood, linearisation, problem, runner, search, selection, structure, usual
-from trainer.diagnosis.gram import RESIDUAL, DailyGrams, Term
-from trainer.diagnosis.linearisation import DivergenceError
-from trainer.diagnosis.problem import Problem
-from trainer.diagnosis.split import split_days
 
 
 @pytest.fixture(scope="module")

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from igrow_core.errors import IgrowError
-from igrow_core.site import Site
-from trainer.cli.recalibrate import read_history, recalibrate, relative_gain
-from trainer.diagnosis import Diagnosis
+from igrow.core.errors import IgrowError
+from igrow.core.site import Site
+from igrow.trainer.cli.recalibrate import read_history, recalibrate, relative_gain
+from igrow.trainer.diagnosis import Diagnosis
 
 SITE = Site(name="house", latitude=52.0, longitude=4.5)
 NOON = datetime(2020, 3, 1, 12, tzinfo=UTC)
@@ -51,8 +51,8 @@ def test_the_gain_is_negative_where_the_new_model_is_worse_on_unseen_days() -> N
 
 
 def test_an_unknown_effect_to_leave_out_is_refused_with_the_known_ones() -> None:
+    from igrow.trainer.diagnosis import diagnose
     from tests.diagnosis.conftest import deployed_model, greenhouse_log
-    from trainer.diagnosis import diagnose
 
     with pytest.raises(IgrowError, match="no effect is called 'wind'"):
         diagnose(greenhouse_log(1, days=8), SITE, deployed_model(), without=["wind"])

@@ -2,15 +2,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from igrow_core.effects import EFFECTS
-from igrow_core.telemetry import Telemetry
+from igrow.core.effects import EFFECTS
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.diagnosis import problem, refine, runner, search, structure
+from igrow.trainer.diagnosis.activation import ActiveTerm
+from igrow.trainer.diagnosis.gram import Term
+from igrow.trainer.diagnosis.refine import Refined
+from igrow.trainer.diagnosis.split import split_days
 from tests.diagnosis.conftest import DAYS, STEP, deployed_model, greenhouse_log
 from tests.virtual_log import SITE
-from trainer.diagnosis import problem, refine, runner, search, structure
-from trainer.diagnosis.activation import ActiveTerm
-from trainer.diagnosis.gram import Term
-from trainer.diagnosis.refine import Refined
-from trainer.diagnosis.split import split_days
 
 
 def test_a_term_at_its_bound_comes_back_from_there(quiet_log: Telemetry) -> None:

@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from trainer.diagnosis.diagnose import same_in_all_regimes
-from trainer.diagnosis.result import Interval
+from igrow.trainer.diagnosis.diagnose import same_in_all_regimes
+from igrow.trainer.diagnosis.result import Interval
 
 
 @pytest.mark.parametrize(

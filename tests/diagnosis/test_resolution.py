@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from igrow_core.telemetry import Telemetry
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.diagnosis import problem, resolution, runner, selection
+from igrow.trainer.diagnosis.problem import Problem
+from igrow.trainer.diagnosis.split import split_days
 from tests.diagnosis.conftest import deployed_model
 from tests.virtual_log import SITE
-from trainer.diagnosis import problem, resolution, runner, selection
-from trainer.diagnosis.problem import Problem
-from trainer.diagnosis.split import split_days
 
 
 def prepared(log: Telemetry, interval: float) -> Problem:

@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from igrow_core.telemetry import Telemetry
-from trainer.diagnosis.screening import screen
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.diagnosis.screening import screen
 
 TIME = np.datetime64("2020-01-01T00:00:00", "s") + np.arange(576) * np.timedelta64(300, "s")
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from igrow_core.effects import EFFECTS, PROCESS_CHANNELS, Effect
-from igrow_core.quantities import QUANTITIES
-from igrow_core.simulator.hybrid.parameters import PARAMETERS
+from igrow.core.effects import EFFECTS, PROCESS_CHANNELS, Effect
+from igrow.core.quantities import QUANTITIES
+from igrow.core.simulator.hybrid.parameters import PARAMETERS
 
 # name: (drivers of an hour that shows it, channel, sign of the first contribution at the typical amplitude)
 SIGNS = {

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from igrow_core.effects import EFFECTS
-from igrow_core.simulator.hybrid import climate
-from igrow_core.simulator.hybrid.measurement import PREDICTED, measured
-from igrow_core.simulator.hybrid.parameters import PARAMETERS
-from trainer.export.blocks import open_model
-from trainer.export.climate import ClimateBlocks, climate_blocks, effect_parameter
-from trainer.export.hindcast import hindcast_model
+from igrow.core.effects import EFFECTS
+from igrow.core.simulator.hybrid import climate
+from igrow.core.simulator.hybrid.measurement import PREDICTED, measured
+from igrow.core.simulator.hybrid.parameters import PARAMETERS
+from igrow.trainer.export.blocks import open_model
+from igrow.trainer.export.climate import ClimateBlocks, climate_blocks, effect_parameter
+from igrow.trainer.export.hindcast import hindcast_model
 
 SECONDS, ROWS, BATCH = 300.0, 288, 3
 HEIGHT, EFFICACY = 5.0, 1.3

@@ -11,16 +11,16 @@ import onnxruntime
 import pytest
 from numpy.typing import NDArray
 
-from igrow_core.bundle import Bundle, BundleError, open_session, self_test
-from igrow_core.errors import IgrowError
-from igrow_core.simulator.hindcast import SimulatorSettings
-from igrow_core.simulator.leaf_picking import LeafPicking
-from igrow_core.simulator.network import HOURS, LightFormula, NetworkSimulator, Stage
-from igrow_core.simulator.network_run import Carried, begin, free_run, known_inputs, run_day
-from trainer.export.network import CARRIED, NEXT, hourly_outputs, write_network_bundle
-from trainer.training.checkpoint import load_simulator
-from trainer.training.simulator import CLIMATE, GROWTH, HARVEST, daily_data, derived, hourly_data
-from trainer.training.stage import run_stage, untrained
+from igrow.core.bundle import Bundle, BundleError, open_session, self_test
+from igrow.core.errors import IgrowError
+from igrow.core.simulator.hindcast import SimulatorSettings
+from igrow.core.simulator.leaf_picking import LeafPicking
+from igrow.core.simulator.network import HOURS, LightFormula, NetworkSimulator, Stage
+from igrow.core.simulator.network_run import Carried, begin, free_run, known_inputs, run_day
+from igrow.trainer.export.network import CARRIED, NEXT, hourly_outputs, write_network_bundle
+from igrow.trainer.training.checkpoint import load_simulator
+from igrow.trainer.training.simulator import CLIMATE, GROWTH, HARVEST, daily_data, derived, hourly_data
+from igrow.trainer.training.stage import run_stage, untrained
 
 DAYS, RUNS = 165, 3
 LENGTH = DAYS * HOURS + 1

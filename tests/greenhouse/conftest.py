@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from greenhouse_seasons import SPRING, WINTER, hours
 
-from igrow_core.greenhouse import generate_weather
-from igrow_core.telemetry import Telemetry
+from igrow.core.greenhouse import generate_weather
+from igrow.core.telemetry import Telemetry
 
 
 @pytest.fixture(scope="session")

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from greenhouse_seasons import SPRING, hours
 
-from igrow_core.errors import IgrowError
-from igrow_core.greenhouse import Disturbances, GreenhouseParameters, HiddenEffect, recipe, simulate, simulate_many
-from igrow_core.greenhouse.disturbances import QUIET
-from igrow_core.greenhouse.parameters import KNOWN
-from igrow_core.greenhouse.sensors import EXACT
-from igrow_core.telemetry import Telemetry
+from igrow.core.errors import IgrowError
+from igrow.core.greenhouse import Disturbances, GreenhouseParameters, HiddenEffect, recipe, simulate, simulate_many
+from igrow.core.greenhouse.disturbances import QUIET
+from igrow.core.greenhouse.parameters import KNOWN
+from igrow.core.greenhouse.sensors import EXACT
+from igrow.core.telemetry import Telemetry
 
 
 def test_each_of_a_batch_runs_as_it_would_alone(spring: Telemetry) -> None:

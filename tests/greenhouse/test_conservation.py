@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from greenhouse_seasons import SPRING, WINTER
 
-from igrow_core.effects import EFFECTS
-from igrow_core.greenhouse import Disturbances, GreenhouseParameters, HiddenEffect, recipe
-from igrow_core.greenhouse.parameters import stack
-from igrow_core.greenhouse.plant import Plant
-from igrow_core.greenhouse.uncatalogued import UNCATALOGUED
-from igrow_core.greenhouse.weather_table import WeatherTable
-from igrow_core.sun import unix_seconds
-from igrow_core.telemetry import Telemetry
+from igrow.core.effects import EFFECTS
+from igrow.core.greenhouse import Disturbances, GreenhouseParameters, HiddenEffect, recipe
+from igrow.core.greenhouse.parameters import stack
+from igrow.core.greenhouse.plant import Plant
+from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
+from igrow.core.greenhouse.weather_table import WeatherTable
+from igrow.core.sun import unix_seconds
+from igrow.core.telemetry import Telemetry
 
 SCALE = {"energy": 3e7, "vapour": 0.07, "slab": 8.0, "co2": 0.008, "carbohydrate": 1.6}
 """What a greenhouse holds, J m-2 and kg m-2: the residuals are measured by it."""

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from greenhouse_seasons import SPRING, WINTER, hours
 
-from igrow_core.greenhouse import GreenhouseParameters, recipe, simulate
-from igrow_core.greenhouse.disturbances import QUIET
-from igrow_core.greenhouse.sensors import EXACT
-from igrow_core.telemetry import Telemetry
+from igrow.core.greenhouse import GreenhouseParameters, recipe, simulate
+from igrow.core.greenhouse.disturbances import QUIET
+from igrow.core.greenhouse.sensors import EXACT
+from igrow.core.telemetry import Telemetry
 
 
 def day(weather: Telemetry, start: np.datetime64, tick: float) -> Telemetry:
@@ -31,8 +31,8 @@ def test_half_the_step_gives_the_same_day(season: str, request: pytest.FixtureRe
 
 
 def test_the_error_of_the_climate_step_is_of_second_order(winter: Telemetry) -> None:
-    from igrow_core.greenhouse.climate import Conditions, advance, initial
-    from igrow_core.greenhouse.namespace import Floats
+    from igrow.core.greenhouse.climate import Conditions, advance, initial
+    from igrow.core.greenhouse.namespace import Floats
 
     conditions = Conditions(
         outdoor_temperature=2.0, outdoor_vapour=0.004, outdoor_co2=7.6e-4, wind_speed=4.0, sky_temperature=-8.0,
@@ -54,8 +54,8 @@ def test_the_error_of_the_climate_step_is_of_second_order(winter: Telemetry) -> 
 
 @pytest.mark.parametrize("wind", [0.0, 40.0])
 def test_no_weather_makes_the_step_unstable(wind: float) -> None:
-    from igrow_core.greenhouse.climate import Conditions, advance, initial
-    from igrow_core.greenhouse.namespace import Floats
+    from igrow.core.greenhouse.climate import Conditions, advance, initial
+    from igrow.core.greenhouse.namespace import Floats
 
     state = initial(Floats, 19.0, 75.0, 600.0, -20.0)
     conditions = Conditions(

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from greenhouse_seasons import SPRING, hours
 
-from igrow_core.effects import EFFECTS
-from igrow_core.errors import IgrowError
-from igrow_core.greenhouse import GreenhouseParameters, HiddenEffect, recipe, simulate_many
-from igrow_core.greenhouse.disturbances import QUIET
-from igrow_core.greenhouse.hidden import REFERENCE_DRIVERS, EffectBank
-from igrow_core.greenhouse.namespace import Floats
-from igrow_core.greenhouse.sensors import EXACT
-from igrow_core.greenhouse.uncatalogued import UNCATALOGUED
-from igrow_core.telemetry import Telemetry
+from igrow.core.effects import EFFECTS
+from igrow.core.errors import IgrowError
+from igrow.core.greenhouse import GreenhouseParameters, HiddenEffect, recipe, simulate_many
+from igrow.core.greenhouse.disturbances import QUIET
+from igrow.core.greenhouse.hidden import REFERENCE_DRIVERS, EffectBank
+from igrow.core.greenhouse.namespace import Floats
+from igrow.core.greenhouse.sensors import EXACT
+from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
+from igrow.core.telemetry import Telemetry
 
 EVERY = [*EFFECTS, *UNCATALOGUED]
 QUIET_FOR = {"rain_cooling", "photosynthesis_heat_limit"}
@@ -49,7 +49,7 @@ def test_every_effect_shows_in_the_log(name: str, with_each: dict[str | None, Te
 
 
 def test_a_sensor_fault_is_in_the_measurement_and_the_plc_follows_it(spring: Telemetry) -> None:
-    from igrow_core.greenhouse import simulate
+    from igrow.core.greenhouse import simulate
 
     season = simulate(
         GreenhouseParameters(), spring, recipe, SPRING, SPRING + hours(24), seed=1, disturbances=QUIET, sensors=EXACT,

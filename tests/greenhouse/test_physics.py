@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from igrow_core.greenhouse import tomato
-from igrow_core.greenhouse.canopy import photosynthesis, stomatal_resistance, vapour_conductance
-from igrow_core.greenhouse.light import canopy_absorption, distribute
-from igrow_core.greenhouse.linear import solve
-from igrow_core.greenhouse.namespace import Floats
-from igrow_core.greenhouse.parameters import GreenhouseParameters
-from igrow_core.greenhouse.sky import sky_temperature, sky_temperature_from_net
-from igrow_core.greenhouse.ventilation import leakage, past_screens, through_vents
+from igrow.core.greenhouse import tomato
+from igrow.core.greenhouse.canopy import photosynthesis, stomatal_resistance, vapour_conductance
+from igrow.core.greenhouse.light import canopy_absorption, distribute
+from igrow.core.greenhouse.linear import solve
+from igrow.core.greenhouse.namespace import Floats
+from igrow.core.greenhouse.parameters import GreenhouseParameters
+from igrow.core.greenhouse.sky import sky_temperature, sky_temperature_from_net
+from igrow.core.greenhouse.ventilation import leakage, past_screens, through_vents
 
 P = GreenhouseParameters()
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from greenhouse_seasons import SPRING, WINTER, hours
 
-from igrow_core.greenhouse import Disturbances, GreenhouseParameters, generate_weather, recipe, simulate, simulate_many
-from igrow_core.greenhouse.sensors import EXACT
-from igrow_core.greenhouse.weather import WeatherClimate
-from igrow_core.quantities import QUANTITIES
+from igrow.core.greenhouse import Disturbances, GreenhouseParameters, generate_weather, recipe, simulate, simulate_many
+from igrow.core.greenhouse.sensors import EXACT
+from igrow.core.greenhouse.weather import WeatherClimate
+from igrow.core.quantities import QUANTITIES
 
 COUNT = 40
 

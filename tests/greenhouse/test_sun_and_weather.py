@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from greenhouse_seasons import hours
 
-from igrow_core.errors import IgrowError
-from igrow_core.greenhouse import generate_weather
-from igrow_core.greenhouse.weather import WeatherClimate
-from igrow_core.quantities import QUANTITIES, WEATHER
-from igrow_core.sun import azimuth, elevation, extraterrestrial_radiation, solar_hour
+from igrow.core.errors import IgrowError
+from igrow.core.greenhouse import generate_weather
+from igrow.core.greenhouse.weather import WeatherClimate
+from igrow.core.quantities import QUANTITIES, WEATHER
+from igrow.core.sun import azimuth, elevation, extraterrestrial_radiation, solar_hour
 
 YEAR = np.datetime64("2019-07-01T00:00:00", "s")
 

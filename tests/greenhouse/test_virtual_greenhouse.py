@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from greenhouse_seasons import SPRING, WINTER, hours
 
-from igrow_core.errors import IgrowError
-from igrow_core.greenhouse import Disturbances, GreenhouseParameters, HiddenEffect, VirtualGreenhouse, recipe
-from igrow_core.quantities import QUANTITIES
-from igrow_core.telemetry import Telemetry
+from igrow.core.errors import IgrowError
+from igrow.core.greenhouse import Disturbances, GreenhouseParameters, HiddenEffect, VirtualGreenhouse, recipe
+from igrow.core.quantities import QUANTITIES
+from igrow.core.telemetry import Telemetry
 
 
 def greenhouse(weather: Telemetry, start: np.datetime64 = WINTER) -> VirtualGreenhouse:

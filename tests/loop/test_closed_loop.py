@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from igrow_core.telemetry import concatenate, read_csv
+from igrow.core.telemetry import concatenate, read_csv
 
 ROOT = Path(__file__).resolve().parents[2]
 BIN = Path(sys.executable).parent

@@ -10,7 +10,7 @@ import pytest
 from control.daemon_bench import running as running_daemon
 from control.daemon_bench import until
 
-from edge.store import read_records
+from igrow.edge.store import read_records
 from peers.test_peers import HERE, LIBMODBUS, free_port, libmodbus, node_package, running, serial_pair
 
 PEERS = ["libmodbus tcp", "libmodbus rtu", "modbus-serial tcp", "modbus-serial rtu", "jsmodbus tcp"]

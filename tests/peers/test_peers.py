@@ -14,14 +14,14 @@ from pathlib import Path
 import pytest
 from virtual_plc.toy_plant import ToyPlant
 
-from edge.bus.errors import AddressRefusedError, BadAnswerError, BusError, NoAnswerError, UnitBusyError
-from edge.bus.modbus_bus import ModbusBus
-from edge.bus.plc import RegisterPlc
-from edge.bus.protocol import Priority, ReadRequest, WriteRequest
-from edge.registers.loading import load_register_map, parse_register_map
-from edge.registers.model import BusSettings, Function, Parity, Transport
-from edge.virtual_plc.pace import Lockstep
-from edge.virtual_plc.virtual_plc import VirtualPlc
+from igrow.edge.bus.errors import AddressRefusedError, BadAnswerError, BusError, NoAnswerError, UnitBusyError
+from igrow.edge.bus.modbus_bus import ModbusBus
+from igrow.edge.bus.plc import RegisterPlc
+from igrow.edge.bus.protocol import Priority, ReadRequest, WriteRequest
+from igrow.edge.registers.loading import load_register_map, parse_register_map
+from igrow.edge.registers.model import BusSettings, Function, Parity, Transport
+from igrow.edge.virtual_plc.pace import Lockstep
+from igrow.edge.virtual_plc.virtual_plc import VirtualPlc
 
 HERE = Path(__file__).parent
 MAP = load_register_map(HERE.parents[1] / "config" / "register-maps" / "virtual-plc.yaml")

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from toy_greenhouse import HOURS, START
 
-from igrow_core.planner import PlanningState
-from igrow_core.site import Site
+from igrow.core.planner import PlanningState
+from igrow.core.site import Site
 
 
 @pytest.fixture

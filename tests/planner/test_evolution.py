@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from igrow_core.errors import IgrowError
-from igrow_core.planner.evolution import WORST, EvolutionSettings, NumpyGeneration, draw
-from igrow_core.planner.onnx_generation import OnnxGeneration
+from igrow.core.errors import IgrowError
+from igrow.core.planner.evolution import WORST, EvolutionSettings, NumpyGeneration, draw
+from igrow.core.planner.onnx_generation import OnnxGeneration
 
 SMALL = EvolutionSettings(parents=6, offspring=10, contestants=2)
 
@@ -90,7 +90,7 @@ def test_better_candidates_have_more_children() -> None:
 
 @pytest.fixture(scope="module")
 def graph(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from trainer.export.optimizer import export_optimizer
+    from igrow.trainer.export.optimizer import export_optimizer
 
     path = tmp_path_factory.mktemp("optimizer") / "optimizer.onnx"
     model = export_optimizer(EvolutionSettings())

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from toy_greenhouse import HOURS, START, ToySimulator
 
-from igrow_core.economics import product_price
-from igrow_core.planner import Objective
-from igrow_core.planner.objective import DELAY_PER_DEGREE_DAY, HARM_PER_DEGREE_HOUR, cautious
-from igrow_core.site import Prices, ProductPrice, Site
+from igrow.core.economics import product_price
+from igrow.core.planner import Objective
+from igrow.core.planner.objective import DELAY_PER_DEGREE_DAY, HARM_PER_DEGREE_HOUR, cautious
+from igrow.core.site import Prices, ProductPrice, Site
 
 TIME = START + np.arange(HOURS) * np.timedelta64(3600, "s")
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from toy_greenhouse import HOURS, START, ToySimulator, with_planning
 
-from igrow_core.errors import IgrowError
-from igrow_core.planner import Budget, NumpyGeneration, Objective, PlanningState, optimise
-from igrow_core.planner.objective import Simulator
-from igrow_core.planner.onnx_generation import OnnxGeneration
-from igrow_core.site import Site
+from igrow.core.errors import IgrowError
+from igrow.core.planner import Budget, NumpyGeneration, Objective, PlanningState, optimise
+from igrow.core.planner.objective import Simulator
+from igrow.core.planner.onnx_generation import OnnxGeneration
+from igrow.core.site import Site
 
 QUICK = Budget(generations=40, patience=15)
 
@@ -52,7 +52,7 @@ def test_the_search_comes_near_the_best_that_a_full_search_of_one_setpoint_finds
 
 
 def test_the_same_seed_gives_the_same_plan_in_numpy_and_from_the_graph(site, state, weather, recipe, tmp_path) -> None:
-    from trainer.export.optimizer import export_optimizer
+    from igrow.trainer.export.optimizer import export_optimizer
 
     path: Path = tmp_path / "optimizer.onnx"
     path.write_bytes(export_optimizer(NumpyGeneration().settings).SerializeToString())

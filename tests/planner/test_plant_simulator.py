@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from igrow_core.greenhouse import GreenhouseParameters, generate_weather, recipe
-from igrow_core.planner.plant_simulator import PlantSimulator
-from igrow_core.quantities import SETPOINTS
+from igrow.core.greenhouse import GreenhouseParameters, generate_weather, recipe
+from igrow.core.planner.plant_simulator import PlantSimulator
+from igrow.core.quantities import SETPOINTS
 
 START = np.datetime64("2020-01-11T06:00:00")
 HOURS = 4

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from toy_greenhouse import START, ToySimulator
 
-from igrow_core.planner.recent_use import SCALED, Scaled, factors, totals, used_in
-from igrow_core.site import Greenhouse
-from igrow_core.telemetry import Telemetry
+from igrow.core.planner.recent_use import SCALED, Scaled, factors, totals, used_in
+from igrow.core.site import Greenhouse
+from igrow.core.telemetry import Telemetry
 
 
 def days(*values: float) -> dict[str, np.ndarray]:

@@ -6,9 +6,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from igrow_core.planner.template import BLOCK_STARTS, for_site
-from igrow_core.quantities import SETPOINTS
-from igrow_core.site import Site
+from igrow.core.planner.template import BLOCK_STARTS, for_site
+from igrow.core.quantities import SETPOINTS
+from igrow.core.site import Site
 
 SITE = Site("toy", 52.0, 4.5, "Europe/Amsterdam")
 MIDNIGHT = np.datetime64("2020-02-01T23:00:00", "s")

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from igrow_core.planner import Outcome
-from igrow_core.site import Site
+from igrow.core.planner import Outcome
+from igrow.core.site import Site
 
 
 class ToySimulator:

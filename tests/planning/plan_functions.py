@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import time
 
-from edge.ports import Plan
-from igrow_core.errors import IgrowError
+from igrow.core.errors import IgrowError
+from igrow.edge.ports import Plan
 
 
 def good(site, request) -> Plan:

@@ -8,13 +8,13 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from edge.planning.make_plan import co2_since_planting, hourly_recipe, make_plan, present, recent_factors
-from edge.ports import PlanRequest
-from igrow_core.bundle import default_bundle_folder
-from igrow_core.planner import Outcome
-from igrow_core.quantities import SETPOINTS
-from igrow_core.site import Site
-from igrow_core.telemetry import Telemetry
+from igrow.core.bundle import default_bundle_folder
+from igrow.core.planner import Outcome
+from igrow.core.quantities import SETPOINTS
+from igrow.core.site import Site
+from igrow.core.telemetry import Telemetry
+from igrow.edge.planning.make_plan import co2_since_planting, hourly_recipe, make_plan, present, recent_factors
+from igrow.edge.ports import PlanRequest
 
 START = 1_780_012_800
 RECIPE = {"heating_setpoint": 18.0, "co2_setpoint": 600.0, "lamp_on": 0.0, "irrigation_on": 0.2}

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from edge.planning import PlanningProcess, ProcessLimits
-from edge.ports import PlanRequest
-from igrow_core.site import Site
-from igrow_core.telemetry import Telemetry
+from igrow.core.site import Site
+from igrow.core.telemetry import Telemetry
+from igrow.edge.planning import PlanningProcess, ProcessLimits
+from igrow.edge.ports import PlanRequest
 
 LOG = Telemetry(np.array(["2026-03-14"], dtype="datetime64[s]"), {"air_temperature": np.array([20.0])})
 
@@ -133,8 +133,8 @@ def test_the_process_ends_with_a_daemon_that_was_killed(tmp_path: Path) -> None:
         "import sys, time\n"
         f"sys.path[:0] = [{str(Path(__file__).parent)!r}, {str(Path.cwd())!r}]\n"
         "import test_planning_process as t\n"
-        "from edge.planning import PlanningProcess\n"
-        "from igrow_core.site import Site\n"
+        "from igrow.edge.planning import PlanningProcess\n"
+        "from igrow.core.site import Site\n"
         "site = Site(name='demo', latitude=52.0, longitude=4.3)\n"
         "p = PlanningProcess(site, planner=('plan_functions', 'hang_once'))\n"
         "p.request(t.request())\n"

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from edge.planning.forecast import NEEDED, from_forecast, persistence
-from igrow_core.errors import IgrowError
-from igrow_core.telemetry import Telemetry
+from igrow.core.errors import IgrowError
+from igrow.core.telemetry import Telemetry
+from igrow.edge.planning.forecast import NEEDED, from_forecast, persistence
 
 START = 1_780_012_800
 COLUMN = {name: column for column, name in enumerate(NEEDED)}

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from igrow_core import sun
-from igrow_core.errors import IgrowError
-from trainer.readers import screening
-from trainer.readers.log import Log
-from trainer.readers.open_log import open_log
+from igrow.core import sun
+from igrow.core.errors import IgrowError
+from igrow.trainer.readers import screening
+from igrow.trainer.readers.log import Log
+from igrow.trainer.readers.open_log import open_log
 
 HEADER = (
     "%time,AssimLight,BlackScr,CO2air,EnScr,PipeGrow,PipeLow,Rhair,Tair,VentLee,Ventwind,co2_dos,"

@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from igrow_core.errors import IgrowError
-from igrow_core.telemetry import Telemetry, write_csv
-from trainer.readers.open_log import open_log
+from igrow.core.errors import IgrowError
+from igrow.core.telemetry import Telemetry, write_csv
+from igrow.trainer.readers.open_log import open_log
 
 MAPPING = """
 time: {column: Tijd, format: "%d-%m-%Y %H:%M", time_zone: Europe/Amsterdam}

@@ -7,10 +7,10 @@ import asyncio
 from bus.coded_unit import CodedUnit
 from bus.simulated_loop import run
 
-from edge.probe import decoded, probe, scan
-from edge.registers.codec import encode_raw
-from edge.registers.model import BusSettings, ByteOrder, DataType, Function, Transport
-from edge.virtual_plc.modbus_server import ModbusServer
+from igrow.edge.probe import decoded, probe, scan
+from igrow.edge.registers.codec import encode_raw
+from igrow.edge.registers.model import BusSettings, ByteOrder, DataType, Function, Transport
+from igrow.edge.virtual_plc.modbus_server import ModbusServer
 
 SETTINGS = BusSettings("probe", Transport.TCP, host="127.0.0.1", port=5020, timeout=1.0)
 

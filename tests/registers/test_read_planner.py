@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from edge.registers.model import DataType, Device, Function, Point
-from edge.registers.read_planner import Block, plan_reads, split
+from igrow.edge.registers.model import DataType, Device, Function, Point
+from igrow.edge.registers.read_planner import Block, plan_reads, split
 
 NAMES = [f"point_{number}" for number in range(60)]
 

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from edge.registers.codec import REGISTER_TYPES, NotEncodableError, decode, decode_raw, encode, encode_raw
-from edge.registers.model import ByteOrder, DataType, Function, Point
+from igrow.edge.registers.codec import REGISTER_TYPES, NotEncodableError, decode, decode_raw, encode, encode_raw
+from igrow.edge.registers.model import ByteOrder, DataType, Function, Point
 
 ORDERS = st.sampled_from(list(ByteOrder))
 WHOLE = {

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from edge.registers.bus_load import BusLoad, estimate
-from edge.registers.loading import load_register_map, parse_register_map
-from edge.registers.model import ByteOrder, DataType, Function, Parity, Transport
-from igrow_core.errors import IgrowError
-from igrow_core.quantities import QUANTITIES, SETPOINTS
+from igrow.core.errors import IgrowError
+from igrow.core.quantities import QUANTITIES, SETPOINTS
+from igrow.edge.registers.bus_load import BusLoad, estimate
+from igrow.edge.registers.loading import load_register_map, parse_register_map
+from igrow.edge.registers.model import ByteOrder, DataType, Function, Parity, Transport
 
 GOLDEN = Path(__file__).parent / "golden"
 MAPS = Path(__file__).parents[2] / "config" / "register-maps"

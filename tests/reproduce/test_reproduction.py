@@ -9,15 +9,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from igrow_core.errors import IgrowError
-from igrow_core.site import Prices
-from trainer.readers import automatoes2020, liaoyang2020
-from trainer.readers.wur2020 import FAULTY_DAYS, TrajectoryFileError, read_seasons
-from trainer.reproduce import evaluate, figure3, harvests, incremental, table1
-from trainer.reproduce.compartments import Compartment, read_2019
-from trainer.reproduce.scores import SCORED, r2, score
-from trainer.training.leaf_picking import smooth
-from trainer.training.stage import StageData, TrainingPlan
+from igrow.core.errors import IgrowError
+from igrow.core.site import Prices
+from igrow.trainer.readers import automatoes2020, liaoyang2020
+from igrow.trainer.readers.wur2020 import FAULTY_DAYS, TrajectoryFileError, read_seasons
+from igrow.trainer.reproduce import evaluate, figure3, harvests, incremental, table1
+from igrow.trainer.reproduce.compartments import Compartment, read_2019
+from igrow.trainer.reproduce.scores import SCORED, r2, score
+from igrow.trainer.training.leaf_picking import smooth
+from igrow.trainer.training.stage import StageData, TrainingPlan
 
 
 def test_the_split_uses_every_season_once() -> None:

@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-COMMAND = [sys.executable, "-m", "edge.cli"]
+COMMAND = [sys.executable, "-m", "igrow.edge.cli"]
 INTERVAL = 300
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from running_daemon import RunningDaemon, open_files, resident_bytes
 
-from edge.store import read_telemetry
+from igrow.edge.store import read_telemetry
 
 DAY = 86_400.0
 

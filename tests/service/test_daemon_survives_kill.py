@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from running_daemon import INTERVAL, RunningDaemon
 
-from edge.store import read_records, read_telemetry
+from igrow.edge.store import read_records, read_telemetry
 
 LOST_ROWS = 13
 """Rows of one batch: on a simulated plant it spans an hour of the plant's time, a row every 300 s."""

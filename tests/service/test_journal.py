@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from running_daemon import RunningDaemon
 
-from edge.sentences import SENTENCES, sentence
+from igrow.edge.sentences import SENTENCES, sentence
 
 
 def test_every_line_of_the_journal_has_a_priority_and_no_line_is_a_programmers(tmp_path: Path) -> None:

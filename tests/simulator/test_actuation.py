@@ -6,9 +6,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from igrow_core.quantities import QUANTITIES
-from igrow_core.simulator import actuation
-from igrow_core.simulator.actuation import RULES, default_rules
+from igrow.core.quantities import QUANTITIES
+from igrow.core.simulator import actuation
+from igrow.core.simulator.actuation import RULES, default_rules
 
 SETPOINTS = {"heating_setpoint": 20.0, "co2_setpoint": 700.0, "lamp_on": 1.0, "irrigation_on": 0.5}
 WEATHER = {"outdoor_temperature": 5.0, "global_radiation": 0.0, "wind_speed": 3.0}

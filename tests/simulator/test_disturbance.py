@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from virtual_log import SITE, virtual_log
 
-from igrow_core.simulator.hybrid.disturbance import DisturbanceModel, expected_fluxes, missing_fluxes
-from igrow_core.simulator.hybrid.nominal import nominal, site_record
+from igrow.core.simulator.hybrid.disturbance import DisturbanceModel, expected_fluxes, missing_fluxes
+from igrow.core.simulator.hybrid.nominal import nominal, site_record
 
 DAY = 288
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from virtual_log import SITE, virtual_log
 
-from igrow_core.effects import EFFECTS
-from igrow_core.simulator.hybrid import climate
-from igrow_core.simulator.hybrid import record as records
-from igrow_core.simulator.hybrid.nominal import leaf_area_curve, nominal, site_record
-from igrow_core.simulator.hybrid.parameters import PARAMETERS
-from igrow_core.site import Crop, Greenhouse, Site
+from igrow.core.effects import EFFECTS
+from igrow.core.simulator.hybrid import climate
+from igrow.core.simulator.hybrid import record as records
+from igrow.core.simulator.hybrid.nominal import leaf_area_curve, nominal, site_record
+from igrow.core.simulator.hybrid.parameters import PARAMETERS
+from igrow.core.site import Crop, Greenhouse, Site
 
 
 def steady_inputs(**changes: float) -> dict[str, float]:

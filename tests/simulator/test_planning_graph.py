@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from igrow_core.bundle import Bundle, default_bundle_folder, read_bundle
-from igrow_core.simulator.plan import BundleSimulator
-from igrow_core.site import Greenhouse
+from igrow.core.bundle import Bundle, default_bundle_folder, read_bundle
+from igrow.core.simulator.plan import BundleSimulator
+from igrow.core.site import Greenhouse
 
 START = np.datetime64("2020-02-01T00:00:00")
 NIGHT = np.tile([2.0, 85.0, 415.0, 0.0, 3.0, -8.0], (24, 1))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from igrow_core.simulator.hybrid import climate
-from igrow_core.simulator.hybrid.parameters import PARAMETERS
+from igrow.core.simulator.hybrid import climate
+from igrow.core.simulator.hybrid.parameters import PARAMETERS
 
 MINUTES = 1440
 # A crop that answers strongly to the air couples heat and vapour most tightly.

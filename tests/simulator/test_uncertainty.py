@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from igrow_core.simulator.uncertainty import error_growth, training_range
+from igrow.core.simulator.uncertainty import error_growth, training_range
 
 
 def test_intervals_cover_new_errors_of_the_same_kind() -> None:

@@ -9,10 +9,10 @@ from zoneinfo import ZoneInfo
 
 import numpy as np
 
-from edge.image import Quality, Value
-from edge.ports import AlarmRecord, Plan, SetpointStatus, Snapshot, WriteRecord
-from edge.status.history import History
-from edge.status.page import render_page
+from igrow.edge.image import Quality, Value
+from igrow.edge.ports import AlarmRecord, Plan, SetpointStatus, Snapshot, WriteRecord
+from igrow.edge.status.history import History
+from igrow.edge.status.page import render_page
 
 NOW = 1_773_500_400.0
 ZONE = ZoneInfo("Europe/Amsterdam")

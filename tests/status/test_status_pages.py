@@ -9,9 +9,9 @@ from xml.etree import ElementTree
 import pytest
 from status_helpers import NOW, ZONE, history, snapshot
 
-from edge.ports import AlarmRecord
-from edge.status import StatusServer
-from edge.status.page import render_page
+from igrow.edge.ports import AlarmRecord
+from igrow.edge.status import StatusServer
+from igrow.edge.status.page import render_page
 
 
 @pytest.fixture

@@ -5,9 +5,9 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from edge.image import Quality, Value
-from edge.ports import WriteRecord
-from edge.store import SqliteStore, StoreLimits
+from igrow.edge.image import Quality, Value
+from igrow.edge.ports import WriteRecord
+from igrow.edge.store import SqliteStore, StoreLimits
 
 START = 1_780_000_000.0
 

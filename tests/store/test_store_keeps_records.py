@@ -10,11 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from store_helpers import START, values, write_record
 
-from edge.image import Quality, Value
-from edge.ports import AlarmRecord
-from edge.store import SqliteStore, StoreError, StoreLimits, backup, export, read_records, read_telemetry, restore
-from edge.store.packing import pack, unpack_good
-from igrow_core.telemetry import read_csv
+from igrow.core.telemetry import read_csv
+from igrow.edge.image import Quality, Value
+from igrow.edge.ports import AlarmRecord
+from igrow.edge.store import SqliteStore, StoreError, StoreLimits, backup, export, read_records, read_telemetry, restore
+from igrow.edge.store.packing import pack, unpack_good
 
 
 @given(

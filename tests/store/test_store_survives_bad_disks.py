@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from store_helpers import START, values
 
-from edge.store import SqliteStore, StoreLimits, read_telemetry
+from igrow.edge.store import SqliteStore, StoreLimits, read_telemetry
 
 
 def fill(folder: Path, rows: int = 5000, events: int = 200) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from store_helpers import START
 
-from edge.store import SqliteStore
+from igrow.edge.store import SqliteStore
 
 BATCH_ROWS = 11
 """50 s of rows every 5 s, and the row that closes the batch."""

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from igrow_core.simulator.leaf_picking import LeafPicking, pick
-from trainer.training.leaf_picking import CERTAIN, FADED, fit_picking, followed, picked_area, smooth
+from igrow.core.simulator.leaf_picking import LeafPicking, pick
+from igrow.trainer.training.leaf_picking import CERTAIN, FADED, fit_picking, followed, picked_area, smooth
 
 HOURS = 60 * 24
 HOUR = np.arange(HOURS) % 24.0

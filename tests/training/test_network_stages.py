@@ -9,14 +9,22 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from igrow_core.errors import IgrowError
-from igrow_core.simulator.network import advance, initial_memory
-from igrow_core.simulator.network_run import day_ends, free_run
-from trainer.training.checkpoint import FILE_NAME, load_simulator, simulator_to_bytes
-from trainer.training.ensemble import merge
-from trainer.training.simulator import CLIMATE, GROWTH, HARVEST, Layouts, train_simulator
-from trainer.training.stage import StageData, StageLayout, TrainingPlan, run_stage, run_windows, train_stage, untrained
-from trainer.training.stage_file import stages_to_bytes
+from igrow.core.errors import IgrowError
+from igrow.core.simulator.network import advance, initial_memory
+from igrow.core.simulator.network_run import day_ends, free_run
+from igrow.trainer.training.checkpoint import FILE_NAME, load_simulator, simulator_to_bytes
+from igrow.trainer.training.ensemble import merge
+from igrow.trainer.training.simulator import CLIMATE, GROWTH, HARVEST, Layouts, train_simulator
+from igrow.trainer.training.stage import (
+    StageData,
+    StageLayout,
+    TrainingPlan,
+    run_stage,
+    run_windows,
+    train_stage,
+    untrained,
+)
+from igrow.trainer.training.stage_file import stages_to_bytes
 
 HOURS = 600
 

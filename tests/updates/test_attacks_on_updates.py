@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 from tiny_bundle import write_tiny_bundle
 
-from edge.updates import Shelf, SignedSource, UpdateError
-from igrow_core.bundle import BundleError
-from trainer.publishing import Lifetimes, PublishingError, create_keys, initialise, publish, refresh
+from igrow.core.bundle import BundleError
+from igrow.edge.updates import Shelf, SignedSource, UpdateError
+from igrow.trainer.publishing import Lifetimes, PublishingError, create_keys, initialise, publish, refresh
 
 
 class World:

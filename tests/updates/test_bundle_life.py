@@ -9,8 +9,8 @@ import pytest
 from tiny_bundle import write_tiny_bundle
 from update_helpers import START, Gateway
 
-from edge.updates import UpdateRules
-from trainer.publishing import publish, read_exchange
+from igrow.edge.updates import UpdateRules
+from igrow.trainer.publishing import publish, read_exchange
 
 RULES = UpdateRules(check_hours=1.0, shadow_hours=30.0, watch_hours=48.0, live_error_hours=6.0)
 

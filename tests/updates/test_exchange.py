@@ -7,10 +7,10 @@ import json
 import tracemalloc
 from pathlib import Path
 
-from edge.exchange import DAY, GRACE_SECONDS, FolderExchange
-from edge.image import Quality, Value
-from edge.store import SqliteStore, StoreLimits
-from igrow_core.telemetry import read_csv
+from igrow.core.telemetry import read_csv
+from igrow.edge.exchange import DAY, GRACE_SECONDS, FolderExchange
+from igrow.edge.image import Quality, Value
+from igrow.edge.store import SqliteStore, StoreLimits
 
 FIRST_DAY = 20_000
 """A day, counted from 1970."""

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from edge.exchange import FolderExchange
-from edge.image import Quality, Value
-from edge.store import SqliteStore, StoreLimits
-from edge.updates import BundleUpdates, SignedSource, UpdateRules
-from igrow_core.bundle import Bundle, open_session, run_graph
-from trainer.publishing import create_keys, initialise
+from igrow.core.bundle import Bundle, open_session, run_graph
+from igrow.edge.exchange import FolderExchange
+from igrow.edge.image import Quality, Value
+from igrow.edge.store import SqliteStore, StoreLimits
+from igrow.edge.updates import BundleUpdates, SignedSource, UpdateRules
+from igrow.trainer.publishing import create_keys, initialise
 
 START = 1_780_012_800.0
 HOUR = 3600.0

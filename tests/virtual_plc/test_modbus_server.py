@@ -7,8 +7,8 @@ import asyncio
 import pytest
 from bus.coded_unit import CodedUnit, code
 
-from edge.registers.model import Function
-from edge.virtual_plc.modbus_server import ModbusServer, answer, crc
+from igrow.edge.registers.model import Function
+from igrow.edge.virtual_plc.modbus_server import ModbusServer, answer, crc
 
 
 @pytest.mark.parametrize(

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from bus.simulated_loop import run
 
-from edge.bus.errors import AddressRefusedError, BusError, NoValueError
-from edge.bus.plc import RegisterPlc
-from edge.bus.protocol import Priority, ReadRequest, WriteRequest
-from edge.registers.loading import load_register_map
-from edge.registers.model import Function
-from edge.virtual_plc.pace import Lockstep, Pace, Realtime, parse_pace
-from edge.virtual_plc.virtual_plc import SAFE_SETPOINTS, VirtualPlc
-from igrow_core.errors import IgrowError
-from igrow_core.quantities import SETPOINTS
+from igrow.core.errors import IgrowError
+from igrow.core.quantities import SETPOINTS
+from igrow.edge.bus.errors import AddressRefusedError, BusError, NoValueError
+from igrow.edge.bus.plc import RegisterPlc
+from igrow.edge.bus.protocol import Priority, ReadRequest, WriteRequest
+from igrow.edge.registers.loading import load_register_map
+from igrow.edge.registers.model import Function
+from igrow.edge.virtual_plc.pace import Lockstep, Pace, Realtime, parse_pace
+from igrow.edge.virtual_plc.virtual_plc import SAFE_SETPOINTS, VirtualPlc
 from virtual_plc.toy_plant import ToyPlant
 
 MAP = load_register_map(Path(__file__).parents[2] / "config" / "register-maps" / "virtual-plc.yaml")

@@ -1,9 +1,9 @@
 """Calibration: the hybrid simulator's parameters from a log, their doubt, and how well it then predicts."""
 
-from trainer.calibration.evaluation import ErrorSummary, Evaluation, evaluate
-from trainer.calibration.fit import calibrate
-from trainer.calibration.posterior import Posterior, prior
-from trainer.calibration.split import Split, split_weeks
+from igrow.trainer.calibration.evaluation import ErrorSummary, Evaluation, evaluate
+from igrow.trainer.calibration.fit import calibrate
+from igrow.trainer.calibration.posterior import Posterior, prior
+from igrow.trainer.calibration.split import Split, split_weeks
 
 __all__ = [
     "ErrorSummary",

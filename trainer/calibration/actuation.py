@@ -13,18 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from igrow_core.quantities import SETPOINTS
-from igrow_core.simulator import actuation
-from igrow_core.simulator.actuation import RULES
-from igrow_core.simulator.closed_loop import closed_run, pipe_heat
-from igrow_core.simulator.hybrid import climate
-from igrow_core.simulator.hybrid import record as records
-from igrow_core.simulator.hybrid.disturbance import DisturbanceModel
-from igrow_core.simulator.hybrid.record import Record
-from igrow_core.telemetry import Telemetry, to_grid
-from trainer.calibration.evaluation import run_fluxes, starts_within
-from trainer.calibration.fit import coarser_rows
-from trainer.calibration.least_squares import Problem, Scale, minimise
+from igrow.core.quantities import SETPOINTS
+from igrow.core.simulator import actuation
+from igrow.core.simulator.actuation import RULES
+from igrow.core.simulator.closed_loop import closed_run, pipe_heat
+from igrow.core.simulator.hybrid import climate
+from igrow.core.simulator.hybrid import record as records
+from igrow.core.simulator.hybrid.disturbance import DisturbanceModel
+from igrow.core.simulator.hybrid.record import Record
+from igrow.core.telemetry import Telemetry, to_grid
+from igrow.trainer.calibration.evaluation import run_fluxes, starts_within
+from igrow.trainer.calibration.fit import coarser_rows
+from igrow.trainer.calibration.least_squares import Problem, Scale, minimise
 
 Floats = NDArray[np.float64]
 

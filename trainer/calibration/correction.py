@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.simulator.hybrid.record import Record
-from trainer.calibration.forecast import Combination, Predictor, cells, usual_error
+from igrow.core.simulator.hybrid.record import Record
+from igrow.trainer.calibration.forecast import Combination, Predictor, cells, usual_error
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]

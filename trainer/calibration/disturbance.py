@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.simulator.hybrid.disturbance import DisturbanceModel, courses
-from igrow_core.simulator.hybrid.record import Record
-from trainer.calibration.evaluation import starts_within
+from igrow.core.simulator.hybrid.disturbance import DisturbanceModel, courses
+from igrow.core.simulator.hybrid.record import Record
+from igrow.trainer.calibration.evaluation import starts_within
 
 Floats = NDArray[np.float64]
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.errors import IgrowError
-from igrow_core.simulator.hybrid import record as records
-from igrow_core.simulator.hybrid.climate import ActiveEffects
-from igrow_core.simulator.hybrid.disturbance import DisturbanceModel, expected_fluxes, missing_fluxes
-from igrow_core.simulator.hybrid.record import Record
-from trainer.calibration.posterior import Posterior
+from igrow.core.errors import IgrowError
+from igrow.core.simulator.hybrid import record as records
+from igrow.core.simulator.hybrid.climate import ActiveEffects
+from igrow.core.simulator.hybrid.disturbance import DisturbanceModel, expected_fluxes, missing_fluxes
+from igrow.core.simulator.hybrid.record import Record
+from igrow.trainer.calibration.posterior import Posterior
 
 Floats = NDArray[np.float64]
 

@@ -7,15 +7,15 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.errors import IgrowError
-from igrow_core.simulator.hybrid import record as records
-from igrow_core.simulator.hybrid.climate import ActiveEffects
-from igrow_core.simulator.hybrid.measurement import PREDICTED
-from igrow_core.simulator.hybrid.parameters import PARAMETERS
-from igrow_core.simulator.hybrid.record import Record
-from trainer.calibration.evaluation import starts_within
-from trainer.calibration.least_squares import Problem, Scale, covariance, minimise, observed_scale
-from trainer.calibration.posterior import Posterior
+from igrow.core.errors import IgrowError
+from igrow.core.simulator.hybrid import record as records
+from igrow.core.simulator.hybrid.climate import ActiveEffects
+from igrow.core.simulator.hybrid.measurement import PREDICTED
+from igrow.core.simulator.hybrid.parameters import PARAMETERS
+from igrow.core.simulator.hybrid.record import Record
+from igrow.trainer.calibration.evaluation import starts_within
+from igrow.trainer.calibration.least_squares import Problem, Scale, covariance, minimise, observed_scale
+from igrow.trainer.calibration.posterior import Posterior
 
 Floats = NDArray[np.float64]
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.simulator.hybrid.record import Record
-from igrow_core.simulator.uncertainty import DAYLIGHT
+from igrow.core.simulator.hybrid.record import Record
+from igrow.core.simulator.uncertainty import DAYLIGHT
 
 Floats = NDArray[np.float64]
 Predictor = Callable[[NDArray[np.int64], int], Mapping[str, Floats]]

@@ -1,4 +1,4 @@
-"""Fits how a PLC holds its setpoints (`igrow_core.simulator.holding`) to a log: plain robust statistics."""
+"""Fits how a PLC holds its setpoints (`igrow.core.simulator.holding`) to a log: plain robust statistics."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.simulator.holding import PARAMETERS
-from igrow_core.simulator.hybrid.record import Record
+from igrow.core.simulator.holding import PARAMETERS
+from igrow.core.simulator.hybrid.record import Record
 
 Floats = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.simulator.hybrid.parameters import PARAMETERS
+from igrow.core.simulator.hybrid.parameters import PARAMETERS
 
 Floats = NDArray[np.float64]
 
@@ -54,7 +54,7 @@ def prior(values: Mapping[str, float], spread: Mapping[str, float] | None = None
     """Return what is known of a site before its log: `values` with the relative spreads of `PARAMETERS`.
 
     Args:
-        values: parameters by name (`igrow_core.simulator.hybrid.nominal`).
+        values: parameters by name (`igrow.core.simulator.hybrid.nominal`).
         spread: standard deviations that replace those of `PARAMETERS`, by name, in the parameter's unit.
     """
     names = tuple(values)

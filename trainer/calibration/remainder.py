@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.simulator.hybrid.record import Record
+from igrow.core.simulator.hybrid.record import Record
 
 Floats = NDArray[np.float64]
 

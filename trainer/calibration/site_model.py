@@ -8,20 +8,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.simulator.closed_loop import closed_run
-from igrow_core.simulator.hybrid import record as records
-from igrow_core.simulator.hybrid.climate import ActiveEffects
-from igrow_core.simulator.hybrid.disturbance import DisturbanceModel, missing_fluxes
-from igrow_core.simulator.hybrid.record import Record
-from igrow_core.simulator.uncertainty import ErrorGrowth, TrainingRange, error_growth, training_range
-from trainer.calibration.actuation import fit_actuation, refine_actuation
-from trainer.calibration.correction import Correction, all_runs, apply_correction, fit_correction
-from trainer.calibration.disturbance import fit_disturbance
-from trainer.calibration.evaluation import evaluate, run_fluxes, starts_within
-from trainer.calibration.fit import calibrate
-from trainer.calibration.forecast import Combination, Predictor, fit_combination, remembering
-from trainer.calibration.posterior import Posterior
-from trainer.calibration.remainder import Remainder, fit_remainder
+from igrow.core.simulator.closed_loop import closed_run
+from igrow.core.simulator.hybrid import record as records
+from igrow.core.simulator.hybrid.climate import ActiveEffects
+from igrow.core.simulator.hybrid.disturbance import DisturbanceModel, missing_fluxes
+from igrow.core.simulator.hybrid.record import Record
+from igrow.core.simulator.uncertainty import ErrorGrowth, TrainingRange, error_growth, training_range
+from igrow.trainer.calibration.actuation import fit_actuation, refine_actuation
+from igrow.trainer.calibration.correction import Correction, all_runs, apply_correction, fit_correction
+from igrow.trainer.calibration.disturbance import fit_disturbance
+from igrow.trainer.calibration.evaluation import evaluate, run_fluxes, starts_within
+from igrow.trainer.calibration.fit import calibrate
+from igrow.trainer.calibration.forecast import Combination, Predictor, fit_combination, remembering
+from igrow.trainer.calibration.posterior import Posterior
+from igrow.trainer.calibration.remainder import Remainder, fit_remainder
 
 Floats = NDArray[np.float64]
 

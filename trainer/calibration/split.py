@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.errors import IgrowError
+from igrow.core.errors import IgrowError
 
 Mask = NDArray[np.bool_]
 

@@ -7,14 +7,14 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.simulator.closed_loop import pipe_heat
-from igrow_core.simulator.hybrid import climate
-from igrow_core.simulator.hybrid import record as records
-from igrow_core.simulator.hybrid.record import Record
-from igrow_core.simulator.uncertainty import ErrorGrowth
-from trainer.calibration.evaluation import starts_within
-from trainer.calibration.forecast import Predictor
-from trainer.calibration.site_model import SiteModel
+from igrow.core.simulator.closed_loop import pipe_heat
+from igrow.core.simulator.hybrid import climate
+from igrow.core.simulator.hybrid import record as records
+from igrow.core.simulator.hybrid.record import Record
+from igrow.core.simulator.uncertainty import ErrorGrowth
+from igrow.trainer.calibration.evaluation import starts_within
+from igrow.trainer.calibration.forecast import Predictor
+from igrow.trainer.calibration.site_model import SiteModel
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]

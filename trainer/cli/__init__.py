@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from igrow_core.command_line import run_command
+from igrow.core.command_line import run_command
 
 COMMANDS = {
-    "generate": ("trainer.cli.generate", "simulate a greenhouse and write its log"),
-    "train": ("trainer.cli.train", "train the growth and yield stages on logs"),
-    "calibrate": ("trainer.cli.calibrate", "fit the simulator to a log; print the errors before and after"),
-    "diagnose": ("trainer.cli.diagnose", "find what the simulator lacks, and why; write the corrected bundle"),
-    "recalibrate": ("trainer.cli.recalibrate", "diagnose every site of an exchange and publish what passed"),
-    "export": ("trainer.cli.export", "write a bundle from a fitted simulator"),
-    "policy": ("trainer.policies.train", "train a policy by soft actor-critic"),
-    "publish": ("trainer.cli.publish", "sign a bundle and put it into the exchange"),
-    "reproduce": ("trainer.reproduce.command", "reproduce the tables and figures of the iGrow paper"),
-    "evaluate": ("trainer.reproduce.evaluate", "run a bundle on logged or virtual seasons and print its errors"),
-    "bundle": ("trainer.cli.bundle", "build the default bundle from the mechanistic greenhouse"),
+    "generate": ("igrow.trainer.cli.generate", "simulate a greenhouse and write its log"),
+    "train": ("igrow.trainer.cli.train", "train the growth and yield stages on logs"),
+    "calibrate": ("igrow.trainer.cli.calibrate", "fit the simulator to a log; print the errors before and after"),
+    "diagnose": ("igrow.trainer.cli.diagnose", "find what the simulator lacks, and why; write the corrected bundle"),
+    "recalibrate": ("igrow.trainer.cli.recalibrate", "diagnose every site of an exchange and publish what passed"),
+    "export": ("igrow.trainer.cli.export", "write a bundle from a fitted simulator"),
+    "policy": ("igrow.trainer.policies.train", "train a policy by soft actor-critic"),
+    "publish": ("igrow.trainer.cli.publish", "sign a bundle and put it into the exchange"),
+    "reproduce": ("igrow.trainer.reproduce.command", "reproduce the tables and figures of the iGrow paper"),
+    "evaluate": ("igrow.trainer.reproduce.evaluate", "run a bundle on logged or virtual seasons and print its errors"),
+    "bundle": ("igrow.trainer.cli.bundle", "build the default bundle from the mechanistic greenhouse"),
 }
 
 

@@ -6,10 +6,10 @@ import argparse
 import shutil
 from pathlib import Path
 
-from igrow_core.bundle import BUILT_IN
-from igrow_core.site import Site, load_site
-from trainer.default_bundle import CREATED, default_model
-from trainer.export.bundle import write_hybrid_bundle
+from igrow.core.bundle import BUILT_IN
+from igrow.core.site import Site, load_site
+from igrow.trainer.default_bundle import CREATED, default_model
+from igrow.trainer.export.bundle import write_hybrid_bundle
 
 EXAMPLE = "igrow-trainer bundle --out igrow_core/default_bundle"
 

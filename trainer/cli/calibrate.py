@@ -9,21 +9,21 @@ from pathlib import Path
 
 import numpy as np
 
-from igrow_core.bundle import HeldOutError, Span, default_bundle_folder, read_bundle
-from igrow_core.errors import IgrowError
-from igrow_core.quantities import QUANTITIES
-from igrow_core.simulator.hybrid.nominal import nominal, site_record
-from igrow_core.site import Site, load_site
-from trainer.calibration.actuation import setpoint_columns
-from trainer.calibration.evaluation import errors_of, evaluate, summarise
-from trainer.calibration.holding import fit_holding
-from trainer.calibration.posterior import prior
-from trainer.calibration.site_model import fit_site
-from trainer.calibration.split import alternate_weeks, split_weeks
-from trainer.diagnosis.deployed import learn_misfit
-from trainer.export.bundle import read_hybrid_model, write_hybrid_bundle
-from trainer.model import known_range
-from trainer.readers.open_log import open_log
+from igrow.core.bundle import HeldOutError, Span, default_bundle_folder, read_bundle
+from igrow.core.errors import IgrowError
+from igrow.core.quantities import QUANTITIES
+from igrow.core.simulator.hybrid.nominal import nominal, site_record
+from igrow.core.site import Site, load_site
+from igrow.trainer.calibration.actuation import setpoint_columns
+from igrow.trainer.calibration.evaluation import errors_of, evaluate, summarise
+from igrow.trainer.calibration.holding import fit_holding
+from igrow.trainer.calibration.posterior import prior
+from igrow.trainer.calibration.site_model import fit_site
+from igrow.trainer.calibration.split import alternate_weeks, split_weeks
+from igrow.trainer.diagnosis.deployed import learn_misfit
+from igrow.trainer.export.bundle import read_hybrid_model, write_hybrid_bundle
+from igrow.trainer.model import known_range
+from igrow.trainer.readers.open_log import open_log
 
 EXAMPLE = "igrow-trainer calibrate DATA/agc2019 --compartment Reference --out out/reference"
 

@@ -9,15 +9,15 @@ import sys
 from datetime import UTC, datetime
 from pathlib import Path
 
-from igrow_core.bundle import Bundle, default_bundle_folder, read_bundle
-from igrow_core.errors import IgrowError
-from igrow_core.site import Site, load_site
-from trainer.diagnosis.correction import corrected_model
-from trainer.diagnosis.deployed import Deployed, from_manifest
-from trainer.diagnosis.diagnose import Evidence, diagnose
-from trainer.diagnosis.result import Diagnosis
-from trainer.export.bundle import write_hybrid_bundle
-from trainer.readers.open_log import open_log
+from igrow.core.bundle import Bundle, default_bundle_folder, read_bundle
+from igrow.core.errors import IgrowError
+from igrow.core.site import Site, load_site
+from igrow.trainer.diagnosis.correction import corrected_model
+from igrow.trainer.diagnosis.deployed import Deployed, from_manifest
+from igrow.trainer.diagnosis.diagnose import Evidence, diagnose
+from igrow.trainer.diagnosis.result import Diagnosis
+from igrow.trainer.export.bundle import write_hybrid_bundle
+from igrow.trainer.readers.open_log import open_log
 
 EXAMPLE = "igrow-trainer diagnose logs/ --bundle bundle/ --site site.yaml --out diagnosis/"
 
@@ -57,7 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def write(folder: Path, diagnosis: Diagnosis, evidence: Evidence | None, deployed: Deployed) -> None:
     """Write diagnosis.json and report.html into a folder."""
-    from trainer.report.page import write_report  # noqa: PLC0415  (matplotlib is slow to import)
+    from igrow.trainer.report.page import write_report  # noqa: PLC0415  (matplotlib is slow to import)
 
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -7,11 +7,11 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
-from igrow_core.bundle import default_bundle_folder, read_bundle, self_test
-from igrow_core.errors import IgrowError
-from igrow_core.site import load_site
-from trainer.default_bundle import equipped
-from trainer.export.bundle import read_hybrid_model, write_hybrid_bundle
+from igrow.core.bundle import default_bundle_folder, read_bundle, self_test
+from igrow.core.errors import IgrowError
+from igrow.core.site import load_site
+from igrow.trainer.default_bundle import equipped
+from igrow.trainer.export.bundle import read_hybrid_model, write_hybrid_bundle
 
 EXAMPLE = "igrow-trainer export --site config/site.yaml --out out/first-bundle"
 

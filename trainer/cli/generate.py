@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from igrow_core.errors import IgrowError
-from igrow_core.greenhouse import generate_weather, recipe, simulate_many
-from igrow_core.greenhouse.described import parameters_of, parse_effect
-from igrow_core.greenhouse.weather import WeatherClimate
-from igrow_core.site import load_site
-from igrow_core.telemetry import Telemetry, read_csv, write_csv
-from trainer.default_bundle import varied_recipe
+from igrow.core.errors import IgrowError
+from igrow.core.greenhouse import generate_weather, recipe, simulate_many
+from igrow.core.greenhouse.described import parameters_of, parse_effect
+from igrow.core.greenhouse.weather import WeatherClimate
+from igrow.core.site import load_site
+from igrow.core.telemetry import Telemetry, read_csv, write_csv
+from igrow.trainer.default_bundle import varied_recipe
 
 EXAMPLE = "igrow-trainer generate --site config/site.yaml --days 28 --effect wind_infiltration=0.1 --out out/virtual"
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from igrow_core.errors import IgrowError
-from trainer.publishing import create_keys, initialise, publish, refresh
+from igrow.core.errors import IgrowError
+from igrow.trainer.publishing import create_keys, initialise, publish, refresh
 
 EXAMPLE = (
     "igrow-trainer publish --init --keys keys --exchange /srv/igrow\n"

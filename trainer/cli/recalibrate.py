@@ -19,15 +19,15 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from igrow_core.bundle import Bundle, default_bundle_folder, read_bundle
-from igrow_core.errors import IgrowError
-from igrow_core.site import Site, load_site
-from trainer.cli.diagnose import write, write_corrected
-from trainer.diagnosis.deployed import from_manifest
-from trainer.diagnosis.diagnose import diagnose
-from trainer.diagnosis.result import Diagnosis
-from trainer.publishing import publish
-from trainer.publishing.exchange import read_exchange
+from igrow.core.bundle import Bundle, default_bundle_folder, read_bundle
+from igrow.core.errors import IgrowError
+from igrow.core.site import Site, load_site
+from igrow.trainer.cli.diagnose import write, write_corrected
+from igrow.trainer.diagnosis.deployed import from_manifest
+from igrow.trainer.diagnosis.diagnose import diagnose
+from igrow.trainer.diagnosis.result import Diagnosis
+from igrow.trainer.publishing import publish
+from igrow.trainer.publishing.exchange import read_exchange
 
 EXAMPLE = "igrow-trainer recalibrate --exchange /srv/igrow --keys keys --state state --site site.yaml"
 REPOSITORY = "bundles"

@@ -7,14 +7,14 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
-from igrow_core.bundle import default_bundle_folder, read_bundle
-from igrow_core.errors import IgrowError
-from igrow_core.simulator.crop import CropStages
-from igrow_core.simulator.hybrid.nominal import site_record
-from igrow_core.site import load_site
-from trainer.export.bundle import read_hybrid_model, write_hybrid_bundle
-from trainer.readers.open_log import open_log
-from trainer.training.crop import fit_net_growth, train_networks
+from igrow.core.bundle import default_bundle_folder, read_bundle
+from igrow.core.errors import IgrowError
+from igrow.core.simulator.crop import CropStages
+from igrow.core.simulator.hybrid.nominal import site_record
+from igrow.core.site import load_site
+from igrow.trainer.export.bundle import read_hybrid_model, write_hybrid_bundle
+from igrow.trainer.readers.open_log import open_log
+from igrow.trainer.training.crop import fit_net_growth, train_networks
 
 EXAMPLE = "igrow-trainer train out/virtual/*.csv.gz --site config/site.yaml --out out/trained"
 

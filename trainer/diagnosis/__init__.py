@@ -6,9 +6,9 @@
 `diagnose` runs it all; docs/diagnosis.md tells why each step is there and how well it does.
 """
 
-from trainer.diagnosis.deployed import Deployed, from_manifest, from_posterior, from_site, learn_misfit
-from trainer.diagnosis.diagnose import CorrectedModel, Evidence, diagnose
-from trainer.diagnosis.result import EXIT_CODES, Diagnosis, Finding
+from igrow.trainer.diagnosis.deployed import Deployed, from_manifest, from_posterior, from_site, learn_misfit
+from igrow.trainer.diagnosis.diagnose import CorrectedModel, Evidence, diagnose
+from igrow.trainer.diagnosis.result import EXIT_CODES, Diagnosis, Finding
 
 __all__ = [
     "EXIT_CODES",

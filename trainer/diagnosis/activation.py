@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from igrow_core.effects import EFFECTS
-from igrow_core.effects.definition import Array
-from igrow_core.simulator.hybrid.record import Record
+from igrow.core.effects import EFFECTS
+from igrow.core.effects.definition import Array
+from igrow.core.simulator.hybrid.record import Record
 
 
 @dataclass(frozen=True)

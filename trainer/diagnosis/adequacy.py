@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trainer.diagnosis import search, selection
-from trainer.diagnosis.drivers import Pattern
-from trainer.diagnosis.likelihood import Profile
-from trainer.diagnosis.problem import HOUR, Problem
-from trainer.diagnosis.selection import Contender, Hypothesis, Selected
+from igrow.trainer.diagnosis import search, selection
+from igrow.trainer.diagnosis.drivers import Pattern
+from igrow.trainer.diagnosis.likelihood import Profile
+from igrow.trainer.diagnosis.problem import HOUR, Problem
+from igrow.trainer.diagnosis.selection import Contender, Hypothesis, Selected
 
 SMALLEST_GAIN = 40.0
 """Log-likelihood below which a pattern is no cause in a log of 28 days: a wrong structure makes as much in four of

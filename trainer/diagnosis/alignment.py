@@ -12,12 +12,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from igrow_core.quantities import ACTUATORS
-from igrow_core.simulator.hybrid import measurement
-from igrow_core.simulator.hybrid.nominal import site_record
-from igrow_core.simulator.hybrid.record import free_run, observe
-from igrow_core.site import Site
-from igrow_core.telemetry import Telemetry
+from igrow.core.quantities import ACTUATORS
+from igrow.core.simulator.hybrid import measurement
+from igrow.core.simulator.hybrid.nominal import site_record
+from igrow.core.simulator.hybrid.record import free_run, observe
+from igrow.core.site import Site
+from igrow.core.telemetry import Telemetry
 
 SHIFTS = (0.0, 0.5, 1.0)
 """Rows by which actuators are read ahead."""

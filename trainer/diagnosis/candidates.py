@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from igrow_core.effects import EFFECTS, Effect
-from igrow_core.effects.definition import Parameter
-from igrow_core.quantities import WEATHER
-from trainer.diagnosis.linearisation import (
+from igrow.core.effects import EFFECTS, Effect
+from igrow.core.effects.definition import Parameter
+from igrow.core.quantities import WEATHER
+from igrow.trainer.diagnosis.linearisation import (
     Floats,
     Linearisation,
     flux_columns,

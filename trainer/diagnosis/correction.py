@@ -7,14 +7,14 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from igrow_core.bundle import Bundle, EffectRecord, Estimate, HeldOutError, Onset, Span
-from igrow_core.quantities import QUANTITIES
-from igrow_core.site import Site
-from trainer.calibration.posterior import Posterior
-from trainer.diagnosis.diagnose import Evidence
-from trainer.diagnosis.result import Diagnosis, Finding
-from trainer.export.bundle import read_hybrid_model
-from trainer.model import HybridModel
+from igrow.core.bundle import Bundle, EffectRecord, Estimate, HeldOutError, Onset, Span
+from igrow.core.quantities import QUANTITIES
+from igrow.core.site import Site
+from igrow.trainer.calibration.posterior import Posterior
+from igrow.trainer.diagnosis.diagnose import Evidence
+from igrow.trainer.diagnosis.result import Diagnosis, Finding
+from igrow.trainer.export.bundle import read_hybrid_model
+from igrow.trainer.model import HybridModel
 
 
 def corrected_model(bundle: Bundle, site: Site, diagnosis: Diagnosis, evidence: Evidence) -> HybridModel:

@@ -7,19 +7,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from igrow_core.bundle import BUILT_IN, Manifest
-from igrow_core.effects import EFFECTS
-from igrow_core.errors import IgrowError
-from igrow_core.simulator.hybrid.nominal import as_described, nominal
-from igrow_core.simulator.hybrid.record import Record
-from igrow_core.site import Site
-from trainer.calibration import Posterior
-from trainer.diagnosis import prior as priors
-from trainer.diagnosis import problem, structure
-from trainer.diagnosis.activation import ActiveTerm
-from trainer.diagnosis.prior import Prior
-from trainer.diagnosis.split import split_days
-from trainer.model import CALIBRATED_ON_KEY, MISFIT_KEY
+from igrow.core.bundle import BUILT_IN, Manifest
+from igrow.core.effects import EFFECTS
+from igrow.core.errors import IgrowError
+from igrow.core.simulator.hybrid.nominal import as_described, nominal
+from igrow.core.simulator.hybrid.record import Record
+from igrow.core.site import Site
+from igrow.trainer.calibration import Posterior
+from igrow.trainer.diagnosis import prior as priors
+from igrow.trainer.diagnosis import problem, structure
+from igrow.trainer.diagnosis.activation import ActiveTerm
+from igrow.trainer.diagnosis.prior import Prior
+from igrow.trainer.diagnosis.split import split_days
+from igrow.trainer.model import CALIBRATED_ON_KEY, MISFIT_KEY
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from igrow_core.effects import EFFECTS
-from igrow_core.errors import IgrowError
-from igrow_core.simulator.hybrid.record import Record
-from igrow_core.site import Site
-from igrow_core.telemetry import Telemetry
-from trainer.diagnosis import (
+from igrow.core.effects import EFFECTS
+from igrow.core.errors import IgrowError
+from igrow.core.simulator.hybrid.record import Record
+from igrow.core.site import Site
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.diagnosis import (
     freefit,
     freerun,
     likelihood,
@@ -26,18 +26,18 @@ from trainer.diagnosis import (
     usual,
     wording,
 )
-from trainer.diagnosis.activation import ActiveTerm, activate
-from trainer.diagnosis.adequacy import Adequacy, judge
-from trainer.diagnosis.deployed import Deployed
-from trainer.diagnosis.drivers import Pattern, pattern_fluxes
-from trainer.diagnosis.estimate import Estimated, estimate, with_refined, within_bounds
-from trainer.diagnosis.freerun import Runs
-from trainer.diagnosis.linearisation import DivergenceError, Floats
-from trainer.diagnosis.prior import Prior
-from trainer.diagnosis.problem import Problem
-from trainer.diagnosis.result import HORIZONS, Diagnosis, Finding, Interval, Verdict
-from trainer.diagnosis.selection import Selected
-from trainer.diagnosis.split import Split, split_days
+from igrow.trainer.diagnosis.activation import ActiveTerm, activate
+from igrow.trainer.diagnosis.adequacy import Adequacy, judge
+from igrow.trainer.diagnosis.deployed import Deployed
+from igrow.trainer.diagnosis.drivers import Pattern, pattern_fluxes
+from igrow.trainer.diagnosis.estimate import Estimated, estimate, with_refined, within_bounds
+from igrow.trainer.diagnosis.freerun import Runs
+from igrow.trainer.diagnosis.linearisation import DivergenceError, Floats
+from igrow.trainer.diagnosis.prior import Prior
+from igrow.trainer.diagnosis.problem import Problem
+from igrow.trainer.diagnosis.result import HORIZONS, Diagnosis, Finding, Interval, Verdict
+from igrow.trainer.diagnosis.selection import Selected
+from igrow.trainer.diagnosis.split import Split, split_days
 
 LEAST_DAYS = 7
 MOST_CAUSES = 3

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from igrow_core.simulator.hybrid.record import SWITCHES, Record
-from trainer.diagnosis.linearisation import Floats, Linearisation, flux_columns
+from igrow.core.simulator.hybrid.record import SWITCHES, Record
+from igrow.trainer.diagnosis.linearisation import Floats, Linearisation, flux_columns
 
 UNIT_FLUX: Mapping[str, float] = {
     "heat": 10.0,

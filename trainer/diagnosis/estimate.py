@@ -6,16 +6,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from igrow_core.effects import EFFECTS
-from trainer.diagnosis import search, selection
-from trainer.diagnosis.activation import ActiveTerm
-from trainer.diagnosis.candidates import Candidate
-from trainer.diagnosis.gram import Term
-from trainer.diagnosis.problem import Problem
-from trainer.diagnosis.refine import Refined
-from trainer.diagnosis.result import Interval, OnsetInterval
-from trainer.diagnosis.search import Fit
-from trainer.diagnosis.selection import Hypothesis, Selected
+from igrow.core.effects import EFFECTS
+from igrow.trainer.diagnosis import search, selection
+from igrow.trainer.diagnosis.activation import ActiveTerm
+from igrow.trainer.diagnosis.candidates import Candidate
+from igrow.trainer.diagnosis.gram import Term
+from igrow.trainer.diagnosis.problem import Problem
+from igrow.trainer.diagnosis.refine import Refined
+from igrow.trainer.diagnosis.result import Interval, OnsetInterval
+from igrow.trainer.diagnosis.search import Fit
+from igrow.trainer.diagnosis.selection import Hypothesis, Selected
 
 NORMAL_90 = 1.645
 INFLATION = 1.3

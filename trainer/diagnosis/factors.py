@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize
 
-from trainer.diagnosis.gram import Floats
+from igrow.trainer.diagnosis.gram import Floats
 
 SEEN = 1e-6
 """Share of the largest eigenvalue of the pooled information below which a direction is not looked at."""

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.simulator.hybrid import measurement
-from igrow_core.simulator.hybrid.climate import ActiveEffects
-from igrow_core.simulator.hybrid.record import Record, complete_starts, free_run, observe
-from trainer.diagnosis.linearisation import Floats
-from trainer.diagnosis.split import Split
+from igrow.core.simulator.hybrid import measurement
+from igrow.core.simulator.hybrid.climate import ActiveEffects
+from igrow.core.simulator.hybrid.record import Record, complete_starts, free_run, observe
+from igrow.trainer.diagnosis.linearisation import Floats
+from igrow.trainer.diagnosis.split import Split
 
 HORIZONS: Mapping[str, float] = {"1_step": 0.0, "24_h": 86_400.0, "7_d": 604_800.0}
 """Seconds of each free run; 0 is one row."""

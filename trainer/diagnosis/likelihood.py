@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trainer.diagnosis import gram, innovations, search
-from trainer.diagnosis.gram import RESIDUAL, DailyGrams, Floats, Term
-from trainer.diagnosis.innovations import Whitening
-from trainer.diagnosis.problem import Problem, fit_noise
-from trainer.diagnosis.search import Model
+from igrow.trainer.diagnosis import gram, innovations, search
+from igrow.trainer.diagnosis.gram import RESIDUAL, DailyGrams, Floats, Term
+from igrow.trainer.diagnosis.innovations import Whitening
+from igrow.trainer.diagnosis.problem import Problem, fit_noise
+from igrow.trainer.diagnosis.search import Model
 
 TURNS = 3
 """Alternations between coefficients and noise."""

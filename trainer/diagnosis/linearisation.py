@@ -17,16 +17,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.effects import EFFECTS, Effect
-from igrow_core.effects.definition import Array
-from igrow_core.errors import IgrowError
-from igrow_core.simulator.hybrid import climate, measurement
-from igrow_core.simulator.hybrid.climate import ActiveEffects
-from igrow_core.simulator.hybrid.nominal import site_record
-from igrow_core.simulator.hybrid.parameters import PARAMETERS
-from igrow_core.simulator.hybrid.record import SUBSTEP, Record, free_run, observe
-from igrow_core.site import Site
-from igrow_core.telemetry import Telemetry, to_grid
+from igrow.core.effects import EFFECTS, Effect
+from igrow.core.effects.definition import Array
+from igrow.core.errors import IgrowError
+from igrow.core.simulator.hybrid import climate, measurement
+from igrow.core.simulator.hybrid.climate import ActiveEffects
+from igrow.core.simulator.hybrid.nominal import site_record
+from igrow.core.simulator.hybrid.parameters import PARAMETERS
+from igrow.core.simulator.hybrid.record import SUBSTEP, Record, free_run, observe
+from igrow.core.site import Site
+from igrow.core.telemetry import Telemetry, to_grid
 
 Floats = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ def diagnosis_record(telemetry: Telemetry, site: Site) -> Record:
     """Return the record that is diagnosed: inputs as means over each step, measurements as at its first instant.
 
     Where a house doses CO2 and the log does not tell how much, its CO2 tells nothing: it is left out, as in the
-    calibration (`trainer.calibration.fit`).
+    calibration (`igrow.trainer.calibration.fit`).
     """
     fine = telemetry.step
     step = max(STEP, fine)

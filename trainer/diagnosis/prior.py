@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.simulator.hybrid.parameters import PARAMETERS
+from igrow.core.simulator.hybrid.parameters import PARAMETERS
 
 Floats = NDArray[np.float64]
 

@@ -8,16 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.simulator.hybrid.climate import ActiveEffects
-from igrow_core.simulator.hybrid.record import Record
-from trainer.diagnosis import candidates, drivers, gram, innovations, linearisation
-from trainer.diagnosis.candidates import Candidate
-from trainer.diagnosis.drivers import Pattern
-from trainer.diagnosis.gram import DailyGrams
-from trainer.diagnosis.innovations import Whitening
-from trainer.diagnosis.linearisation import Floats, Linearisation
-from trainer.diagnosis.prior import Prior, drift
-from trainer.diagnosis.split import Split
+from igrow.core.simulator.hybrid.climate import ActiveEffects
+from igrow.core.simulator.hybrid.record import Record
+from igrow.trainer.diagnosis import candidates, drivers, gram, innovations, linearisation
+from igrow.trainer.diagnosis.candidates import Candidate
+from igrow.trainer.diagnosis.drivers import Pattern
+from igrow.trainer.diagnosis.gram import DailyGrams
+from igrow.trainer.diagnosis.innovations import Whitening
+from igrow.trainer.diagnosis.linearisation import Floats, Linearisation
+from igrow.trainer.diagnosis.prior import Prior, drift
+from igrow.trainer.diagnosis.split import Split
 
 HOUR = 3600.0
 LONG_DAYS = 42

@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from igrow_core.effects import EFFECTS
-from trainer.diagnosis import linearisation
-from trainer.diagnosis.activation import ActiveTerm, activate
-from trainer.diagnosis.linearisation import Floats, Linearisation
-from trainer.diagnosis.problem import Problem, averaged, counted_intervals, recalibrate
-from trainer.diagnosis.search import Fit
-from trainer.diagnosis.structure import SPREAD
+from igrow.core.effects import EFFECTS
+from igrow.trainer.diagnosis import linearisation
+from igrow.trainer.diagnosis.activation import ActiveTerm, activate
+from igrow.trainer.diagnosis.linearisation import Floats, Linearisation
+from igrow.trainer.diagnosis.problem import Problem, averaged, counted_intervals, recalibrate
+from igrow.trainer.diagnosis.search import Fit
+from igrow.trainer.diagnosis.structure import SPREAD
 
 STEPS = 6
 SHAPE_SPREAD = 0.12

@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from trainer.diagnosis import search, structure
-from trainer.diagnosis.linearisation import Floats
-from trainer.diagnosis.problem import Problem
+from igrow.trainer.diagnosis import search, structure
+from igrow.trainer.diagnosis.linearisation import Floats
+from igrow.trainer.diagnosis.problem import Problem
 
 LARGEST_DISAGREEMENT = 7.0
 """Mean squared difference of both estimates, over what chance makes, up to which the structure counts as right. Tuning

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from igrow_core.quantities import QUANTITIES
+from igrow.core.quantities import QUANTITIES
 
 Verdict = Literal["nothing", "named", "ambiguous", "unexplained", "data_fault"]
 EXIT_CODES: Mapping[str, int] = {"nothing": 0, "named": 10, "ambiguous": 11, "unexplained": 12, "data_fault": 13}

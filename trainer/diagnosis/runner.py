@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from igrow_core.quantities import ACTUATORS
-from igrow_core.simulator.hybrid.record import Record
-from igrow_core.site import Site
-from igrow_core.telemetry import Telemetry
-from trainer.diagnosis import alignment, linearisation
-from trainer.diagnosis.deployed import Deployed
+from igrow.core.quantities import ACTUATORS
+from igrow.core.simulator.hybrid.record import Record
+from igrow.core.site import Site
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.diagnosis import alignment, linearisation
+from igrow.trainer.diagnosis.deployed import Deployed
 
 
 def shift_actuators(telemetry: Telemetry, shift: float) -> Telemetry:

@@ -9,9 +9,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.quantities import QUANTITIES
-from igrow_core.telemetry import Telemetry
-from trainer.diagnosis.result import Screened
+from igrow.core.quantities import QUANTITIES
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.diagnosis.result import Screened
 
 Floats = NDArray[np.float64]
 

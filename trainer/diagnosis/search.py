@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from trainer.diagnosis.gram import RESIDUAL, DailyGrams, Floats, Solution, Term, solve
+from igrow.trainer.diagnosis.gram import RESIDUAL, DailyGrams, Floats, Solution, Term, solve
 
 FLIPS = 999
 

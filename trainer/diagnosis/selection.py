@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from igrow_core.effects import EFFECTS
-from trainer.diagnosis import likelihood, search
-from trainer.diagnosis.candidates import Candidate
-from trainer.diagnosis.drivers import Pattern
-from trainer.diagnosis.gram import Floats, Term
-from trainer.diagnosis.likelihood import Profile
-from trainer.diagnosis.problem import HOUR, Problem
-from trainer.diagnosis.search import Fit
+from igrow.core.effects import EFFECTS
+from igrow.trainer.diagnosis import likelihood, search
+from igrow.trainer.diagnosis.candidates import Candidate
+from igrow.trainer.diagnosis.drivers import Pattern
+from igrow.trainer.diagnosis.gram import Floats, Term
+from igrow.trainer.diagnosis.likelihood import Profile
+from igrow.trainer.diagnosis.problem import HOUR, Problem
+from igrow.trainer.diagnosis.search import Fit
 
 CONTENDERS = 8
 """Best causes of a scan that are compared, each beside its own noise."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.simulator.hybrid.record import Record
+from igrow.core.simulator.hybrid.record import Record
 
 PERIOD, HELD_OUT = 8, 2
 _FIRST = 3

@@ -12,11 +12,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from igrow_core.effects import EFFECTS
-from trainer.diagnosis.gram import solve
-from trainer.diagnosis.prior import Prior
-from trainer.diagnosis.problem import Problem, candidate_key, parameter_shift, pattern_key
-from trainer.diagnosis.search import Model
+from igrow.core.effects import EFFECTS
+from igrow.trainer.diagnosis.gram import solve
+from igrow.trainer.diagnosis.prior import Prior
+from igrow.trainer.diagnosis.problem import Problem, candidate_key, parameter_shift, pattern_key
+from igrow.trainer.diagnosis.search import Model
 
 RIDGE = 0.7
 """Prior deviation of each effect's amplitude, in typical amplitudes."""

@@ -20,9 +20,9 @@ from pathlib import Path
 
 import numpy as np
 
-from trainer.diagnosis import factors, likelihood, search, selection, structure
-from trainer.diagnosis.factors import LogLikelihood
-from trainer.diagnosis.problem import LONG_DAYS, Problem
+from igrow.trainer.diagnosis import factors, likelihood, search, selection, structure
+from igrow.trainer.diagnosis.factors import LogLikelihood
+from igrow.trainer.diagnosis.problem import LONG_DAYS, Problem
 
 FILE = "usual_misfit.json"
 DIRECTIONS, DIRECTIONS_ELSEWHERE = 8, 16
@@ -131,7 +131,7 @@ def root_mean_squares(logs: Sequence[Mapping[str, float]]) -> dict[str, float]:
 @cache
 def installed() -> Usual:
     """Return what is installed with the trainer."""
-    text = files("trainer.diagnosis").joinpath(FILE).read_text(encoding="utf-8")
+    text = files("igrow.trainer.diagnosis").joinpath(FILE).read_text(encoding="utf-8")
     known = json.loads(text)
     return Usual(tuple(known["directions"]), tuple(known["elsewhere"]), known["season"])
 

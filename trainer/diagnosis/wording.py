@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from igrow_core.effects import EFFECTS
-from trainer.diagnosis.adequacy import Adequacy
-from trainer.diagnosis.drivers import BALANCES_OF, UNIT_FLUX, Pattern
-from trainer.diagnosis.estimate import Estimated
-from trainer.diagnosis.result import Finding, Interval
+from igrow.core.effects import EFFECTS
+from igrow.trainer.diagnosis.adequacy import Adequacy
+from igrow.trainer.diagnosis.drivers import BALANCES_OF, UNIT_FLUX, Pattern
+from igrow.trainer.diagnosis.estimate import Estimated
+from igrow.trainer.diagnosis.result import Finding, Interval
 
 UNITS = {"heat": "W m-2", "vapour": "kg m-2 s-1", "co2": "kg m-2 s-1", "air_exchange": "m s-1", "light_loss": "1"}
 NAMES = {

@@ -13,8 +13,8 @@ from typing import Any
 import ndonnx as ndx
 from onnx import FunctionProto, ModelProto, NodeProto, helper
 
-from igrow_core.bundle import new_session
-from igrow_core.simulator.network import Stage
+from igrow.core.bundle import new_session
+from igrow.core.simulator.network import Stage
 
 DOMAIN = "igrow"
 OPSET = 21

@@ -8,24 +8,24 @@ from pathlib import Path
 
 import numpy as np
 
-from igrow_core.bundle import BUILT_IN, Bundle, BundleError, Golden, Manifest, Parameter, run_graph, write_bundle
-from igrow_core.effects import EFFECTS
-from igrow_core.planner.evolution import EvolutionSettings
-from igrow_core.simulator import actuation, holding
-from igrow_core.simulator.crop import CropStages
-from igrow_core.simulator.hybrid.nominal import as_described, nominal
-from igrow_core.simulator.hybrid.parameters import PARAMETERS
-from igrow_core.site import Site
-from trainer.calibration.posterior import Posterior, prior
-from trainer.export.blocks import OPSET, open_model
-from trainer.export.climate import climate_blocks, effect_parameter
-from trainer.export.golden import golden_inputs
-from trainer.export.hindcast import hindcast_model
-from trainer.export.optimizer import export_optimizer, optimizer_signature
-from trainer.export.plan import plan_blocks, plan_model
-from trainer.export.signatures import signatures
-from trainer.model import CALIBRATED_ON_KEY, MISFIT_KEY, HybridModel
-from trainer.training.stage_file import stages_from_bytes, stages_to_bytes
+from igrow.core.bundle import BUILT_IN, Bundle, BundleError, Golden, Manifest, Parameter, run_graph, write_bundle
+from igrow.core.effects import EFFECTS
+from igrow.core.planner.evolution import EvolutionSettings
+from igrow.core.simulator import actuation, holding
+from igrow.core.simulator.crop import CropStages
+from igrow.core.simulator.hybrid.nominal import as_described, nominal
+from igrow.core.simulator.hybrid.parameters import PARAMETERS
+from igrow.core.site import Site
+from igrow.trainer.calibration.posterior import Posterior, prior
+from igrow.trainer.export.blocks import OPSET, open_model
+from igrow.trainer.export.climate import climate_blocks, effect_parameter
+from igrow.trainer.export.golden import golden_inputs
+from igrow.trainer.export.hindcast import hindcast_model
+from igrow.trainer.export.optimizer import export_optimizer, optimizer_signature
+from igrow.trainer.export.plan import plan_blocks, plan_model
+from igrow.trainer.export.signatures import signatures
+from igrow.trainer.model import CALIBRATED_ON_KEY, MISFIT_KEY, HybridModel
+from igrow.trainer.training.stage_file import stages_from_bytes, stages_to_bytes
 
 CROP_FILE = "crop.npz"
 MEMBERS = 3

@@ -10,13 +10,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from igrow_core import air
-from igrow_core.effects import EFFECTS, Effect
-from igrow_core.simulator.hybrid import climate
-from igrow_core.simulator.hybrid.climate import memory_name
-from igrow_core.simulator.hybrid.measurement import PREDICTED
-from igrow_core.simulator.hybrid.parameters import PARAMETERS
-from trainer.export.blocks import Block, grouped, tags, trace
+from igrow.core import air
+from igrow.core.effects import EFFECTS, Effect
+from igrow.core.simulator.hybrid import climate
+from igrow.core.simulator.hybrid.climate import memory_name
+from igrow.core.simulator.hybrid.measurement import PREDICTED
+from igrow.core.simulator.hybrid.parameters import PARAMETERS
+from igrow.trainer.export.blocks import Block, grouped, tags, trace
 
 CONSTANTS = ("mean_height", "lamp_efficacy")
 """Site constants that travel with the parameters."""

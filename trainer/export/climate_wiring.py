@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from igrow_core.simulator.hybrid import climate
-from igrow_core.simulator.hybrid.climate import memory_name
-from igrow_core.simulator.hybrid.measurement import PREDICTED
-from trainer.export.blocks import tagged
-from trainer.export.climate import ClimateBlocks, EffectBlocks, effect_parameter
-from trainer.export.wiring import Wiring
+from igrow.core.simulator.hybrid import climate
+from igrow.core.simulator.hybrid.climate import memory_name
+from igrow.core.simulator.hybrid.measurement import PREDICTED
+from igrow.trainer.export.blocks import tagged
+from igrow.trainer.export.climate import ClimateBlocks, EffectBlocks, effect_parameter
+from igrow.trainer.export.wiring import Wiring
 
 Tensors = Mapping[str, str]
 """Names of tensors (batch,) or (1,) by what they stand for."""

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.planner.evolution import EvolutionSettings
-from igrow_core.simulator.plan import CLOCK, EQUIPMENT
-from trainer.export.optimizer import optimizer_inputs
-from trainer.export.plan import PlanBlocks
+from igrow.core.planner.evolution import EvolutionSettings
+from igrow.core.simulator.plan import CLOCK, EQUIPMENT
+from igrow.trainer.export.optimizer import optimizer_inputs
+from igrow.trainer.export.plan import PlanBlocks
 
 
 def golden_inputs(

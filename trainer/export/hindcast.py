@@ -11,11 +11,11 @@ from collections.abc import Mapping
 
 from onnx import GraphProto, ModelProto
 
-from igrow_core.simulator.hybrid.measurement import PREDICTED
-from trainer.export.blocks import Shape
-from trainer.export.climate import ClimateBlocks
-from trainer.export.climate_wiring import ClimateWiring
-from trainer.export.wiring import Wiring, finished_model
+from igrow.core.simulator.hybrid.measurement import PREDICTED
+from igrow.trainer.export.blocks import Shape
+from igrow.trainer.export.climate import ClimateBlocks
+from igrow.trainer.export.climate_wiring import ClimateWiring
+from igrow.trainer.export.wiring import Wiring, finished_model
 
 INPUTS: Mapping[str, Shape] = {
     "climate": (len(PREDICTED), "batch"),

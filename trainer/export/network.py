@@ -18,15 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 from onnx import ModelProto
 
-from igrow_core.bundle import Bundle, Golden, GraphSignature, Manifest, Tensor, run_graph, write_bundle
-from igrow_core.planner.evolution import EvolutionSettings
-from igrow_core.quantities import QUANTITIES
-from igrow_core.simulator.network import HOURS, NetworkSimulator
-from igrow_core.simulator.network_run import Carried, begin, known_inputs, run_harvest, run_hour
-from trainer.export.blocks import OPSET, Block, Shape, open_model, trace_shaped, traceable
-from trainer.export.optimizer import export_optimizer, optimizer_inputs, optimizer_signature
-from trainer.export.wiring import Wiring, finished_model
-from trainer.training.checkpoint import FILE_NAME, simulator_to_bytes
+from igrow.core.bundle import Bundle, Golden, GraphSignature, Manifest, Tensor, run_graph, write_bundle
+from igrow.core.planner.evolution import EvolutionSettings
+from igrow.core.quantities import QUANTITIES
+from igrow.core.simulator.network import HOURS, NetworkSimulator
+from igrow.core.simulator.network_run import Carried, begin, known_inputs, run_harvest, run_hour
+from igrow.trainer.export.blocks import OPSET, Block, Shape, open_model, trace_shaped, traceable
+from igrow.trainer.export.optimizer import export_optimizer, optimizer_inputs, optimizer_signature
+from igrow.trainer.export.wiring import Wiring, finished_model
+from igrow.trainer.training.checkpoint import FILE_NAME, simulator_to_bytes
 
 CARRIED = tuple(field.name for field in fields(Carried))
 UNITS = {

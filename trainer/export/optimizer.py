@@ -9,16 +9,16 @@ import numpy as np
 import onnx
 from numpy.typing import NDArray
 
-from igrow_core.bundle import GraphSignature, Tensor
-from igrow_core.planner.evolution import EvolutionSettings, draw, fixed_inputs, generation
-from igrow_core.planner.onnx_generation import OUTPUTS
+from igrow.core.bundle import GraphSignature, Tensor
+from igrow.core.planner.evolution import EvolutionSettings, draw, fixed_inputs, generation
+from igrow.core.planner.onnx_generation import OUTPUTS
 
 _GENES = 12
 """Of the self-test."""
 
 
 def export_optimizer(settings: EvolutionSettings) -> onnx.ModelProto:
-    """Return the graph of `igrow_core.planner.evolution.generation`.
+    """Return the graph of `igrow.core.planner.evolution.generation`.
 
     Inputs and outputs have the names of its arguments and results. The numbers of parents, offspring and
     contestants are fixed by `settings`; the number of genes is free, so that one graph serves any horizon.

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from igrow_core.bundle import GraphSignature, Tensor
-from igrow_core.effects import EFFECTS
-from igrow_core.quantities import GROWTH, QUANTITIES, SETPOINTS, YIELD
-from igrow_core.simulator import actuation, holding
-from igrow_core.simulator.hybrid.measurement import PREDICTED
-from igrow_core.simulator.hybrid.parameters import PARAMETERS
-from igrow_core.simulator.plan import CLIMATE_OUT, CLOCK, EQUIPMENT, RESOURCES
-from trainer.export import hindcast, plan
+from igrow.core.bundle import GraphSignature, Tensor
+from igrow.core.effects import EFFECTS
+from igrow.core.quantities import GROWTH, QUANTITIES, SETPOINTS, YIELD
+from igrow.core.simulator import actuation, holding
+from igrow.core.simulator.hybrid.measurement import PREDICTED
+from igrow.core.simulator.hybrid.parameters import PARAMETERS
+from igrow.core.simulator.plan import CLIMATE_OUT, CLOCK, EQUIPMENT, RESOURCES
+from igrow.trainer.export import hindcast, plan
 
 _UNITS = {"vent_lee": "%", "vent_wind": "%", "rail_pipe_excess": "K", "heat": "MJ m-2", "electricity": "kWh m-2"}
 _UNITS |= {"co2": "kg m-2", "sun_elevation": "deg", "sun_azimuth": "deg", "hour": "h"}

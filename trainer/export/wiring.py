@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from onnx import GraphProto, ModelProto, NodeProto, TensorProto, checker, helper, numpy_helper
 
-from trainer.export.blocks import DOMAIN, OPSET, Block, Shape
+from igrow.trainer.export.blocks import DOMAIN, OPSET, Block, Shape
 
 IR_VERSION = 10
 

@@ -14,21 +14,21 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.economics import Balance
-from igrow_core.greenhouse import GreenhouseParameters, generate_weather
-from igrow_core.greenhouse.disturbances import QUIET
-from igrow_core.greenhouse.parameters import stack
-from igrow_core.greenhouse.plant import Plant
-from igrow_core.greenhouse.sensors import EXACT
-from igrow_core.greenhouse.weather_table import WeatherTable
-from igrow_core.planner.objective import Objective, Outcome, Simulator, Valuation
-from igrow_core.planner.plant_simulator import run
-from igrow_core.planner.policy import HOURS, PRESENT, observe
-from igrow_core.planner.template import Setpoints, for_site
-from igrow_core.quantities import WEATHER
-from igrow_core.site import Site
-from igrow_core.sun import unix_seconds
-from igrow_core.telemetry import Telemetry, to_grid
+from igrow.core.economics import Balance
+from igrow.core.greenhouse import GreenhouseParameters, generate_weather
+from igrow.core.greenhouse.disturbances import QUIET
+from igrow.core.greenhouse.parameters import stack
+from igrow.core.greenhouse.plant import Plant
+from igrow.core.greenhouse.sensors import EXACT
+from igrow.core.greenhouse.weather_table import WeatherTable
+from igrow.core.planner.objective import Objective, Outcome, Simulator, Valuation
+from igrow.core.planner.plant_simulator import run
+from igrow.core.planner.policy import HOURS, PRESENT, observe
+from igrow.core.planner.template import Setpoints, for_site
+from igrow.core.quantities import WEATHER
+from igrow.core.site import Site
+from igrow.core.sun import unix_seconds
+from igrow.core.telemetry import Telemetry, to_grid
 
 Values = NDArray[np.float64]
 DAY = np.timedelta64(86_400, "s")

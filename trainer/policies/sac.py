@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from igrow_core.planner.policy import ACTIONS, OBSERVATIONS
+from igrow.core.planner.policy import ACTIONS, OBSERVATIONS
 
 _LOG_DEVIATION = (-4.0, 1.0)
 """Bounds of the logarithm of the standard deviation."""

@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from onnx import ModelProto, TensorProto, helper, numpy_helper
 from torch import nn
 
-from igrow_core.bundle import read_bundle
-from igrow_core.planner.objective import Simulator
-from igrow_core.planner.policy import ACTIONS, OBSERVATIONS, to_setpoints
-from igrow_core.simulator.plan import BundleSimulator
-from igrow_core.site import Site, load_site
-from trainer.export.wiring import finished_model
-from trainer.policies.environment import DailyGreenhouses, Scenario, SimulatedDays, World
-from trainer.policies.sac import Actor, SacSettings, SoftActorCritic
+from igrow.core.bundle import read_bundle
+from igrow.core.planner.objective import Simulator
+from igrow.core.planner.policy import ACTIONS, OBSERVATIONS, to_setpoints
+from igrow.core.simulator.plan import BundleSimulator
+from igrow.core.site import Site, load_site
+from igrow.trainer.export.wiring import finished_model
+from igrow.trainer.policies.environment import DailyGreenhouses, Scenario, SimulatedDays, World
+from igrow.trainer.policies.sac import Actor, SacSettings, SoftActorCritic
 
 EXAMPLE = "igrow-trainer policy --site config/site.yaml --bundle igrow_core/default_bundle --out policy.onnx"
 TRAINING_SEEDS = 1_000_000

@@ -8,9 +8,9 @@ refresh(repository, keys)                  at least every few weeks, so that gat
 read_exchange(root, site)                  the log of a gateway
 """
 
-from trainer.publishing.exchange import ExchangeLog, read_exchange
-from trainer.publishing.keys import ROLES, PublishingError, create_keys
-from trainer.publishing.repository import Lifetimes, initialise, publish, refresh
+from igrow.trainer.publishing.exchange import ExchangeLog, read_exchange
+from igrow.trainer.publishing.keys import ROLES, PublishingError, create_keys
+from igrow.trainer.publishing.repository import Lifetimes, initialise, publish, refresh
 
 __all__ = [
     "ROLES",

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
 
-from igrow_core.telemetry import Telemetry, TelemetryError, concatenate, read_csv
-from trainer.publishing.keys import PublishingError
+from igrow.core.telemetry import Telemetry, TelemetryError, concatenate, read_csv
+from igrow.trainer.publishing.keys import PublishingError
 
 
 @dataclass(frozen=True)

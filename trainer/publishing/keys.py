@@ -10,7 +10,7 @@ from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from cryptography.hazmat.primitives.serialization import load_pem_private_key
 from securesystemslib.signer import CryptoSigner  # type: ignore[attr-defined]  # the documented place; it lacks __all__
 
-from igrow_core.errors import IgrowError
+from igrow.core.errors import IgrowError
 
 ROLES = ("root", "targets", "snapshot", "timestamp")
 """Root says who may sign; targets which bundles there are; snapshot and timestamp that these are the newest."""

@@ -28,9 +28,9 @@ from tuf.api.metadata import (  # type: ignore[attr-defined]  # the documented p
 from tuf.api.serialization import DeserializationError
 from tuf.api.serialization.json import JSONSerializer
 
-from igrow_core.bundle import Bundle, read_bundle, self_test
-from igrow_core.whole_files import write_whole
-from trainer.publishing.keys import ROLES, PublishingError, load_signer
+from igrow.core.bundle import Bundle, read_bundle, self_test
+from igrow.core.whole_files import write_whole
+from igrow.trainer.publishing.keys import ROLES, PublishingError, load_signer
 
 _SERIALIZER = JSONSerializer(compact=False)
 

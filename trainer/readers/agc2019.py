@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.errors import IgrowError
-from trainer.readers import challenge, excel_tables, screening
-from trainer.readers.log import DailyTable, Log
+from igrow.core.errors import IgrowError
+from igrow.trainer.readers import challenge, excel_tables, screening
+from igrow.trainer.readers.log import DailyTable, Log
 
 Floats = NDArray[np.float64]
 

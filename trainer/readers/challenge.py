@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.air import STEFAN_BOLTZMANN
-from igrow_core.errors import IgrowError
-from igrow_core.local_time import from_local
-from igrow_core.site import Site, load_site
-from igrow_core.telemetry import Telemetry, from_rows
-from trainer.readers import excel_tables, screening
-from trainer.readers.log import DailyTable
+from igrow.core.air import STEFAN_BOLTZMANN
+from igrow.core.errors import IgrowError
+from igrow.core.local_time import from_local
+from igrow.core.site import Site, load_site
+from igrow.core.telemetry import Telemetry, from_rows
+from igrow.trainer.readers import excel_tables, screening
+from igrow.trainer.readers.log import DailyTable
 
 Floats = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ STEP = 300.0
 
 def site(name: str) -> Site:
     """Return the site description that comes with the reader of a challenge."""
-    with resources.as_file(resources.files("trainer.readers") / "sites" / f"{name}.yaml") as path:
+    with resources.as_file(resources.files("igrow.trainer.readers") / "sites" / f"{name}.yaml") as path:
         return load_site(path)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from igrow_core.errors import IgrowError
+from igrow.core.errors import IgrowError
 
 Values = NDArray[np.float64]
 

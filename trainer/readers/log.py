@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.site import Site
-from igrow_core.telemetry import Telemetry
+from igrow.core.site import Site
+from igrow.core.telemetry import Telemetry
 
 Floats = NDArray[np.float64]
 

@@ -20,12 +20,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from igrow_core import telemetry, yaml_schema
-from igrow_core.errors import IgrowError
-from igrow_core.local_time import from_local, zone
-from igrow_core.quantities import QUANTITIES
-from igrow_core.telemetry import Telemetry
-from igrow_core.yaml_schema import SettingError, setting
+from igrow.core import telemetry, yaml_schema
+from igrow.core.errors import IgrowError
+from igrow.core.local_time import from_local, zone
+from igrow.core.quantities import QUANTITIES
+from igrow.core.telemetry import Telemetry
+from igrow.core.yaml_schema import SettingError, setting
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from igrow_core.errors import IgrowError
-from trainer.readers import agc2018, agc2019, telemetry_files
-from trainer.readers.log import Log
+from igrow.core.errors import IgrowError
+from igrow.trainer.readers import agc2018, agc2019, telemetry_files
+from igrow.trainer.readers.log import Log
 
 
 def open_log(path: str | Path | Sequence[str | Path], compartment: str | None = None) -> Log:
@@ -16,7 +16,7 @@ def open_log(path: str | Path | Sequence[str | Path], compartment: str | None = 
     Args:
         path: a folder of the first or second Autonomous Greenhouse Challenge (or a compartment's folder in it), or
             telemetry: a file (CSV, gzip or not, Parquet), several, or a folder of them such as an exchange's. A
-            folder with a `mapping.yaml` holds a grower's own export (`trainer.readers.mapping`).
+            folder with a `mapping.yaml` holds a grower's own export (`igrow.trainer.readers.mapping`).
         compartment: its name, where the folder has several.
 
     Raises:

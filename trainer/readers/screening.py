@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.quantities import QUANTITIES
+from igrow.core.quantities import QUANTITIES
 
 Floats = NDArray[np.float64]
 

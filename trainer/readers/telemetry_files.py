@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from igrow_core import telemetry as core
-from igrow_core.errors import IgrowError
-from igrow_core.quantities import QUANTITIES
-from igrow_core.telemetry import Telemetry
-from trainer.readers import mapping
-from trainer.readers.log import Log
+from igrow.core import telemetry as core
+from igrow.core.errors import IgrowError
+from igrow.core.quantities import QUANTITIES
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.readers import mapping
+from igrow.trainer.readers.log import Log
 
 _ENDINGS = (".csv", ".csv.gz", ".parquet")
 MAPPING_FILE = "mapping.yaml"

@@ -16,8 +16,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from igrow_core.errors import IgrowError
-from trainer.training.leaf_picking import smooth
+from igrow.core.errors import IgrowError
+from igrow.trainer.training.leaf_picking import smooth
 
 FAULTY_DAYS = (15, 75)
 """Days of 24 rows, counted from 0, on which the settings that worked differ from the requested ones."""

@@ -10,10 +10,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from igrow_core.quantities import QUANTITIES
-from trainer.diagnosis.diagnose import Evidence
-from trainer.diagnosis.gram import day_losses
-from trainer.diagnosis.result import Finding
+from igrow.core.quantities import QUANTITIES
+from igrow.trainer.diagnosis.diagnose import Evidence
+from igrow.trainer.diagnosis.gram import day_losses
+from igrow.trainer.diagnosis.result import Finding
 
 mpl.rcParams.update({"svg.fonttype": "none", "svg.hashsalt": "igrow", "font.size": 9, "axes.grid": True})
 _COLOURS = {"deployed": "#888888", "recalibrated": "#3b7dd8", "corrected": "#1f9d55"}

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 from jinja2 import Environment, PackageLoader, select_autoescape
 
-from igrow_core.effects import EFFECTS
-from igrow_core.quantities import QUANTITIES
-from trainer.diagnosis.deployed import Deployed
-from trainer.diagnosis.diagnose import Evidence
-from trainer.diagnosis.result import HORIZONS, STAGES, Diagnosis
-from trainer.diagnosis.wording import plain
+from igrow.core.effects import EFFECTS
+from igrow.core.quantities import QUANTITIES
+from igrow.trainer.diagnosis.deployed import Deployed
+from igrow.trainer.diagnosis.diagnose import Evidence
+from igrow.trainer.diagnosis.result import HORIZONS, STAGES, Diagnosis
+from igrow.trainer.diagnosis.wording import plain
 
 _VERDICTS = {
     "nothing": "Nothing is missing that is large enough to matter: the model fits this greenhouse.",
@@ -31,7 +31,7 @@ def write_report(path: Path, diagnosis: Diagnosis, evidence: Evidence | None, de
 
 def render_report(diagnosis: Diagnosis, evidence: Evidence | None, deployed: Deployed) -> str:
     """Return the page's HTML."""
-    from trainer.report import figures  # noqa: PLC0415  (matplotlib is slow to import)
+    from igrow.trainer.report import figures  # noqa: PLC0415  (matplotlib is slow to import)
 
     pictures: list[tuple[str, str]] = []
     if evidence is not None and "deployed" in evidence.runs:
@@ -47,7 +47,7 @@ def render_report(diagnosis: Diagnosis, evidence: Evidence | None, deployed: Dep
             regimes = figures.coefficient_by_regime(finding)
             if regimes is not None:
                 pictures.append((f"The coefficient of {finding.effect} by regime", regimes))
-    environment = Environment(loader=PackageLoader("trainer.report"), autoescape=select_autoescape())
+    environment = Environment(loader=PackageLoader("igrow.trainer.report"), autoescape=select_autoescape())
     moved = (
         [
             (name, deployed.parameters[name], value)

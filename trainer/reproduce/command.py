@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from trainer.reproduce import figure3, harvests, incremental, table1
+from igrow.trainer.reproduce import figure3, harvests, incremental, table1
 
 EXAMPLE = "igrow-trainer reproduce table1 --data data/wur2020 --out reproduced"
 

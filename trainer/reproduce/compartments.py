@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.errors import IgrowError
-from trainer.readers import agc2018, excel_tables
-from trainer.readers.challenge import daily
+from igrow.core.errors import IgrowError
+from igrow.trainer.readers import agc2018, excel_tables
+from igrow.trainer.readers.challenge import daily
 
 Values = NDArray[np.float64]
 

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from trainer.readers.wur2020 import read_seasons
-from trainer.reproduce.scores import PUBLISHED_BASELINE, PUBLISHED_INCREMENTAL, SCORED, Score, score
-from trainer.reproduce.table1 import run_freely
-from trainer.training.checkpoint import load_simulator
+from igrow.trainer.readers.wur2020 import read_seasons
+from igrow.trainer.reproduce.scores import PUBLISHED_BASELINE, PUBLISHED_INCREMENTAL, SCORED, Score, score
+from igrow.trainer.reproduce.table1 import run_freely
+from igrow.trainer.training.checkpoint import load_simulator
 
 EXAMPLE = "igrow-trainer evaluate --bundle reproduced --data trajectories.parquet"
 

@@ -16,13 +16,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.economics import co2_cost, product_price
-from igrow_core.errors import IgrowError
-from igrow_core.site import Prices
-from trainer.readers.automatoes2020 import Champion
-from trainer.readers.automatoes2020 import read as read_champion
-from trainer.reproduce.compartments import Compartment, read_2019
-from trainer.reproduce.harvests import PREDICTORS
+from igrow.core.economics import co2_cost, product_price
+from igrow.core.errors import IgrowError
+from igrow.core.site import Prices
+from igrow.trainer.readers.automatoes2020 import Champion
+from igrow.trainer.readers.automatoes2020 import read as read_champion
+from igrow.trainer.reproduce.compartments import Compartment, read_2019
+from igrow.trainer.reproduce.harvests import PREDICTORS
 
 Values = NDArray[np.float64]
 

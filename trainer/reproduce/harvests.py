@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.greenhouse.canopy import photosynthesis
-from igrow_core.greenhouse.parameters import GreenhouseParameters
-from igrow_core.greenhouse.tomato import (
+from igrow.core.greenhouse.canopy import photosynthesis
+from igrow.core.greenhouse.parameters import GreenhouseParameters
+from igrow.core.greenhouse.tomato import (
     CARBOHYDRATE_PER_MOL,
     assimilation_share,
     deleaf,
@@ -27,9 +27,9 @@ from igrow_core.greenhouse.tomato import (
     rates,
     young_crop,
 )
-from trainer.reproduce.compartments import Compartment, read_2018, read_2019
-from trainer.training.simulator import layout
-from trainer.training.stage import StageData, TrainingPlan, run_stage, train_stage, untrained
+from igrow.trainer.reproduce.compartments import Compartment, read_2018, read_2019
+from igrow.trainer.training.simulator import layout
+from igrow.trainer.training.stage import StageData, TrainingPlan, run_stage, train_stage, untrained
 
 Values = NDArray[np.float64]
 Predictor = Callable[[Sequence[Compartment], Compartment], Values]

@@ -20,17 +20,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.errors import IgrowError
-from igrow_core.local_time import to_local
-from igrow_core.simulator.network import NetworkSimulator, Stage
-from igrow_core.simulator.network_run import free_growth
-from igrow_core.telemetry import Telemetry, to_grid
-from trainer.readers import agc2019
-from trainer.readers.wur2020 import Seasons, read_seasons
-from trainer.reproduce.scores import SCORED, score
-from trainer.reproduce.table1 import run_freely, split_seasons
-from trainer.training.simulator import Layouts, derived, hourly_data, train_simulator
-from trainer.training.stage import StageData, TrainingPlan, run_windows, train_stage, untrained
+from igrow.core.errors import IgrowError
+from igrow.core.local_time import to_local
+from igrow.core.simulator.network import NetworkSimulator, Stage
+from igrow.core.simulator.network_run import free_growth
+from igrow.core.telemetry import Telemetry, to_grid
+from igrow.trainer.readers import agc2019
+from igrow.trainer.readers.wur2020 import Seasons, read_seasons
+from igrow.trainer.reproduce.scores import SCORED, score
+from igrow.trainer.reproduce.table1 import run_freely, split_seasons
+from igrow.trainer.training.simulator import Layouts, derived, hourly_data, train_simulator
+from igrow.trainer.training.stage import StageData, TrainingPlan, run_windows, train_stage, untrained
 
 Values = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.simulator.network_run import day_ends
-from trainer.training.leaf_picking import smooth
+from igrow.core.simulator.network_run import day_ends
+from igrow.trainer.training.leaf_picking import smooth
 
 Values = NDArray[np.float64]
 

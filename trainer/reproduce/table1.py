@@ -20,14 +20,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.errors import IgrowError
-from igrow_core.simulator.network import NetworkSimulator
-from igrow_core.simulator.network_run import free_run
-from trainer.export.network import write_network_bundle
-from trainer.readers.wur2020 import Seasons, TrajectoryFileError, read_seasons
-from trainer.reproduce.scores import PUBLISHED_BASELINE, PUBLISHED_INCREMENTAL, SCORED, Score, score
-from trainer.training.checkpoint import BUNDLE_FOLDER
-from trainer.training.simulator import Layouts, train_simulator, with_setting_drivers
+from igrow.core.errors import IgrowError
+from igrow.core.simulator.network import NetworkSimulator
+from igrow.core.simulator.network_run import free_run
+from igrow.trainer.export.network import write_network_bundle
+from igrow.trainer.readers.wur2020 import Seasons, TrajectoryFileError, read_seasons
+from igrow.trainer.reproduce.scores import PUBLISHED_BASELINE, PUBLISHED_INCREMENTAL, SCORED, Score, score
+from igrow.trainer.training.checkpoint import BUNDLE_FOLDER
+from igrow.trainer.training.simulator import Layouts, train_simulator, with_setting_drivers
 
 SITE = "wur2020"
 SETTINGS = ("ventilation_offset", "lamp_radiation_limit")

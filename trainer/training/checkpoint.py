@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from igrow_core.errors import IgrowError
-from igrow_core.simulator.leaf_picking import LeafPicking
-from igrow_core.simulator.network import LightFormula, NetworkSimulator
-from trainer.training.stage_file import stages_from_bytes, stages_to_bytes
+from igrow.core.errors import IgrowError
+from igrow.core.simulator.leaf_picking import LeafPicking
+from igrow.core.simulator.network import LightFormula, NetworkSimulator
+from igrow.trainer.training.stage_file import stages_from_bytes, stages_to_bytes
 
 FILE_NAME = "network.npz"
 BUNDLE_FOLDER = "bundle"

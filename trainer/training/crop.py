@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from igrow_core.errors import IgrowError
-from igrow_core.quantities import GROWTH, QUANTITIES, YIELD
-from igrow_core.simulator.crop import GROWTH_DRIVERS, HARVEST_DRIVERS
-from igrow_core.simulator.hybrid import climate
-from igrow_core.simulator.hybrid.record import Record, observe
-from igrow_core.simulator.network import Stage
-from igrow_core.telemetry import Telemetry, to_grid
-from trainer.training.stage import StageData, StageLayout, TrainingPlan, train_stage, untrained
+from igrow.core.errors import IgrowError
+from igrow.core.quantities import GROWTH, QUANTITIES, YIELD
+from igrow.core.simulator.crop import GROWTH_DRIVERS, HARVEST_DRIVERS
+from igrow.core.simulator.hybrid import climate
+from igrow.core.simulator.hybrid.record import Record, observe
+from igrow.core.simulator.network import Stage
+from igrow.core.telemetry import Telemetry, to_grid
+from igrow.trainer.training.stage import StageData, StageLayout, TrainingPlan, train_stage, untrained
 
 Values = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import block_diag
 
-from igrow_core.simulator.network import Stage
+from igrow.core.simulator.network import Stage
 
 
 def merge(members: Sequence[Stage]) -> Stage:

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
-from igrow_core.simulator.leaf_picking import LeafPicking, certainty
-from igrow_core.simulator.network import HOURS
+from igrow.core.simulator.leaf_picking import LeafPicking, certainty
+from igrow.core.simulator.network import HOURS
 
 Values = NDArray[np.float64]
 

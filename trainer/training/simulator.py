@@ -11,12 +11,12 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from igrow_core.quantities import QUANTITIES
-from igrow_core.simulator.network import HOURS, LightFormula, NetworkSimulator, Stage
-from igrow_core.simulator.network_run import daily_drivers, day_ends
-from trainer.training.ensemble import merge
-from trainer.training.leaf_picking import fit_picking, followed, picked_area
-from trainer.training.stage import Report, StageData, StageLayout, TrainingPlan, train_stage, untrained
+from igrow.core.quantities import QUANTITIES
+from igrow.core.simulator.network import HOURS, LightFormula, NetworkSimulator, Stage
+from igrow.core.simulator.network_run import daily_drivers, day_ends
+from igrow.trainer.training.ensemble import merge
+from igrow.trainer.training.leaf_picking import fit_picking, followed, picked_area
+from igrow.trainer.training.stage import Report, StageData, StageLayout, TrainingPlan, train_stage, untrained
 
 Values = NDArray[np.float64]
 
@@ -79,7 +79,7 @@ class Layouts:
     growth_plan: TrainingPlan = GROWTH_PLAN
     harvest_plan: TrainingPlan = HARVEST_PLAN
     members: int = 1
-    """Networks per stage, merged into one; see `trainer.training.ensemble`."""
+    """Networks per stage, merged into one; see `igrow.trainer.training.ensemble`."""
 
 
 def with_setting_drivers(layouts: Layouts, *names: str) -> Layouts:

@@ -15,7 +15,7 @@ import torch
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from igrow_core.simulator.network import HOURS, Stage, Weights, hour_features
+from igrow.core.simulator.network import HOURS, Stage, Weights, hour_features
 
 Values = NDArray[np.float64]
 Report = Callable[[str], None]
@@ -124,7 +124,7 @@ def untrained(layout: StageLayout, data: StageData, seed: int) -> Stage:
 
 
 class StageModule(torch.nn.Module):
-    """The network of a `Stage` in torch; gives what `igrow_core.simulator.network.advance` gives."""
+    """The network of a `Stage` in torch; gives what `igrow.core.simulator.network.advance` gives."""
 
     def __init__(self, stage: Stage) -> None:
         super().__init__()

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from igrow_core.errors import IgrowError
-from igrow_core.simulator.network import Stage
+from igrow.core.errors import IgrowError
+from igrow.core.simulator.network import Stage
 
 _LAYERS = ("matrices", "biases")
 

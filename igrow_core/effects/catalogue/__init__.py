@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from igrow_core.effects.catalogue import (
+from igrow.core.effects.catalogue import (
     air_temperature_lag,
     air_temperature_offset,
     air_temperature_radiation_error,
@@ -39,7 +39,7 @@ from igrow_core.effects.catalogue import (
     vent_wind_asymmetry,
     wind_infiltration,
 )
-from igrow_core.effects.definition import Effect
+from igrow.core.effects.definition import Effect
 
 EFFECTS: Mapping[str, Effect] = MappingProxyType(
     {

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from igrow_core.air import LATENT_HEAT
-from igrow_core.effects.definition import Array, Drivers, Effect, Parameter, Values
+from igrow.core.air import LATENT_HEAT
+from igrow.core.effects.definition import Array, Drivers, Effect, Parameter, Values
 
 
 def _contribution(xp: Any, drivers: Drivers, parameters: Values, _memory: Array) -> Mapping[str, Array]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from igrow_core.effects.definition import Array, Drivers, Effect, Memory, Parameter, Values
+from igrow.core.effects.definition import Array, Drivers, Effect, Memory, Parameter, Values
 
 
 def _opening(drivers: Drivers) -> Array:

@@ -17,9 +17,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from igrow_core import air
-from igrow_core.effects import EFFECTS
-from igrow_core.effects.definition import Array, Drivers, Values
+from igrow.core import air
+from igrow.core.effects import EFFECTS
+from igrow.core.effects.definition import Array, Drivers, Values
 
 STATES = ("air_temperature", "vapour_concentration", "co2_concentration", "mass_temperature")
 """The states without the memories of effects."""
@@ -41,7 +41,7 @@ INPUTS = (
     "co2_dosing",
     "leaf_area_index",
 )
-"""What drives the balances themselves; effects may read more (`igrow_core.effects`)."""
+"""What drives the balances themselves; effects may read more (`igrow.core.effects`)."""
 
 ActiveEffects = Mapping[str, Values]
 """Name of an effect -> values of its parameters. A sensor effect may stand here too: the plant ignores it."""
@@ -77,7 +77,7 @@ def derive(xp: Any, state: Values, inputs: Drivers, parameters: Values, lamp_eff
         xp: the array namespace.
         state: `STATES` by name.
         inputs: `INPUTS` and whatever the active effects read, by name; must hold ``mean_height``.
-        parameters: `igrow_core.simulator.hybrid.parameters.PARAMETERS` by name.
+        parameters: `igrow.core.simulator.hybrid.parameters.PARAMETERS` by name.
         lamp_efficacy: photons of PAR per electric energy of the lamps, umol J-1.
     """
     temperature, vapour, co2 = (state[name] for name in STATES[:3])

@@ -15,11 +15,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.effects.definition import Values
-from igrow_core.simulator.hybrid import climate
-from igrow_core.simulator.hybrid import record as records
-from igrow_core.simulator.hybrid.climate import ActiveEffects
-from igrow_core.simulator.hybrid.record import Record
+from igrow.core.effects.definition import Values
+from igrow.core.simulator.hybrid import climate
+from igrow.core.simulator.hybrid import record as records
+from igrow.core.simulator.hybrid.climate import ActiveEffects
+from igrow.core.simulator.hybrid.record import Record
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ CHANNELS: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class DisturbanceModel:
-    """How disturbances go on; fitted to a site by `trainer.calibration.disturbance`."""
+    """How disturbances go on; fitted to a site by `igrow.trainer.calibration.disturbance`."""
 
     memory_days: float = 3.0
     """Days after which a past day has lost 63 % of its weight in the daily course."""

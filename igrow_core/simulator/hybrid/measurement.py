@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from igrow_core.effects import EFFECTS
-from igrow_core.effects.definition import Array, Drivers, Values
-from igrow_core.simulator.hybrid.climate import ActiveEffects, memory_name
+from igrow.core.effects import EFFECTS
+from igrow.core.effects.definition import Array, Drivers, Values
+from igrow.core.simulator.hybrid.climate import ActiveEffects, memory_name
 
 PREDICTED = ("air_temperature", "air_humidity", "air_co2")
 """What the climate stage predicts and a log measures."""

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core.simulator.hybrid.parameters import PARAMETERS
-from igrow_core.simulator.hybrid.record import Record, make_record
-from igrow_core.site import Site
-from igrow_core.telemetry import Telemetry
+from igrow.core.simulator.hybrid.parameters import PARAMETERS
+from igrow.core.simulator.hybrid.record import Record, make_record
+from igrow.core.site import Site
+from igrow.core.telemetry import Telemetry
 
 Floats = NDArray[np.float64]
 

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow_core import sun
-from igrow_core.effects import EFFECTS
-from igrow_core.effects.definition import Array, Values
-from igrow_core.simulator.hybrid import climate, measurement
-from igrow_core.simulator.hybrid.climate import ActiveEffects, memory_name
-from igrow_core.telemetry import Telemetry, to_grid
+from igrow.core import sun
+from igrow.core.effects import EFFECTS
+from igrow.core.effects.definition import Array, Values
+from igrow.core.simulator.hybrid import climate, measurement
+from igrow.core.simulator.hybrid.climate import ActiveEffects, memory_name
+from igrow.core.telemetry import Telemetry, to_grid
 
 Floats = NDArray[np.float64]
 

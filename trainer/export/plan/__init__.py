@@ -5,8 +5,8 @@ with one step of yield. Hours and days are scanned, so that one graph serves eve
 number of candidates. Everything is float32 and the batch comes last; `input_shapes` and `OUTPUTS` tell the shapes.
 """
 
-from trainer.export.plan.blocks import PlanBlocks, plan_blocks
-from trainer.export.plan.graph import OUTPUTS, input_shapes, plan_model
-from trainer.export.plan.training_range import RANGED
+from igrow.trainer.export.plan.blocks import PlanBlocks, plan_blocks
+from igrow.trainer.export.plan.graph import OUTPUTS, input_shapes, plan_model
+from igrow.trainer.export.plan.training_range import RANGED
 
 __all__ = ["OUTPUTS", "RANGED", "PlanBlocks", "input_shapes", "plan_blocks", "plan_model"]

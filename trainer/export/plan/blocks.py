@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from igrow_core.quantities import WEATHER
-from igrow_core.simulator.crop import GROWTH_DRIVERS, HARVEST_DRIVERS, CropStages
-from trainer.export.blocks import Block
-from trainer.export.climate import ClimateBlocks
-from trainer.export.plan.control import SETTINGS, control_block, equipment_block
-from trainer.export.plan.crop import crop_block, net_growth_block
-from trainer.export.plan.training_range import range_block
+from igrow.core.quantities import WEATHER
+from igrow.core.simulator.crop import GROWTH_DRIVERS, HARVEST_DRIVERS, CropStages
+from igrow.trainer.export.blocks import Block
+from igrow.trainer.export.climate import ClimateBlocks
+from igrow.trainer.export.plan.control import SETTINGS, control_block, equipment_block
+from igrow.trainer.export.plan.crop import crop_block, net_growth_block
+from igrow.trainer.export.plan.training_range import range_block
 
 
 @dataclass(frozen=True)

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from igrow_core import air
-from igrow_core.quantities import SETPOINTS
-from igrow_core.simulator import actuation, holding
-from igrow_core.simulator.hybrid import climate
-from igrow_core.simulator.hybrid.measurement import PREDICTED
-from igrow_core.simulator.hybrid.parameters import PARAMETERS
-from igrow_core.simulator.plan import STEPS_PER_HOUR
-from trainer.export.blocks import Block, grouped, tags, trace
-from trainer.export.climate import ClimateBlocks
+from igrow.core import air
+from igrow.core.quantities import SETPOINTS
+from igrow.core.simulator import actuation, holding
+from igrow.core.simulator.hybrid import climate
+from igrow.core.simulator.hybrid.measurement import PREDICTED
+from igrow.core.simulator.hybrid.parameters import PARAMETERS
+from igrow.core.simulator.plan import STEPS_PER_HOUR
+from igrow.trainer.export.blocks import Block, grouped, tags, trace
+from igrow.trainer.export.climate import ClimateBlocks
 
 CARRIED = ("vent_lee", "vent_wind", "energy_screen", "blackout_screen")
 """Positions of the equipment that an hour hands to the next."""

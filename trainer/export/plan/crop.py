@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from igrow_core.simulator import network
-from igrow_core.simulator.crop import CropStages, net_growth_rate
-from trainer.export.blocks import Block, grouped, tags, trace, traceable
+from igrow.core.simulator import network
+from igrow.core.simulator.crop import CropStages, net_growth_rate
+from igrow.trainer.export.blocks import Block, grouped, tags, trace, traceable
 
 _EDGE = 3.0
 """Standard deviations of the training data within which a crop stage is believed."""

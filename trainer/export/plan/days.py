@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from onnx import GraphProto
 
-from igrow_core.quantities import GROWTH, YIELD
-from igrow_core.simulator.plan import CLIMATE_OUT
-from trainer.export.blocks import Block, tagged
-from trainer.export.wiring import Wiring
+from igrow.core.quantities import GROWTH, YIELD
+from igrow.core.simulator.plan import CLIMATE_OUT
+from igrow.trainer.export.blocks import Block, tagged
+from igrow.trainer.export.wiring import Wiring
 
 _HOURLY = (*CLIMATE_OUT, *GROWTH)
 _CARRIED = (*YIELD, "net_growth")

@@ -6,15 +6,15 @@ from collections.abc import Mapping
 
 from onnx import ModelProto
 
-from igrow_core.quantities import GROWTH, SETPOINTS, YIELD
-from igrow_core.simulator.hybrid.measurement import PREDICTED
-from igrow_core.simulator.plan import CLIMATE_OUT, CLOCK, EQUIPMENT, RESOURCES
-from trainer.export.blocks import Shape
-from trainer.export.climate_wiring import ClimateWiring
-from trainer.export.plan.blocks import PlanBlocks
-from trainer.export.plan.days import wire_days
-from trainer.export.plan.hour import carried_names, climate_inputs, hour_graph
-from trainer.export.wiring import Wiring, finished_model
+from igrow.core.quantities import GROWTH, SETPOINTS, YIELD
+from igrow.core.simulator.hybrid.measurement import PREDICTED
+from igrow.core.simulator.plan import CLIMATE_OUT, CLOCK, EQUIPMENT, RESOURCES
+from igrow.trainer.export.blocks import Shape
+from igrow.trainer.export.climate_wiring import ClimateWiring
+from igrow.trainer.export.plan.blocks import PlanBlocks
+from igrow.trainer.export.plan.days import wire_days
+from igrow.trainer.export.plan.hour import carried_names, climate_inputs, hour_graph
+from igrow.trainer.export.wiring import Wiring, finished_model
 
 OUTPUTS: Mapping[str, Shape] = {
     "climate_out": ("hours", len(CLIMATE_OUT), "batch"),

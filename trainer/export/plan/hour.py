@@ -6,17 +6,17 @@ from collections.abc import Mapping
 
 from onnx import GraphProto
 
-from igrow_core.quantities import GROWTH, SETPOINTS
-from igrow_core.simulator.crop import GROWTH_DRIVERS
-from igrow_core.simulator.hybrid import climate
-from igrow_core.simulator.hybrid.measurement import PREDICTED
-from igrow_core.simulator.plan import CLOCK, EQUIPMENT, RESOURCES, STEPS_PER_HOUR
-from trainer.export.blocks import tagged
-from trainer.export.climate_wiring import ClimateWiring
-from trainer.export.plan.blocks import PlanBlocks
-from trainer.export.plan.control import CARRIED, SECONDS
-from trainer.export.plan.training_range import RANGED
-from trainer.export.wiring import Wiring
+from igrow.core.quantities import GROWTH, SETPOINTS
+from igrow.core.simulator.crop import GROWTH_DRIVERS
+from igrow.core.simulator.hybrid import climate
+from igrow.core.simulator.hybrid.measurement import PREDICTED
+from igrow.core.simulator.plan import CLOCK, EQUIPMENT, RESOURCES, STEPS_PER_HOUR
+from igrow.trainer.export.blocks import tagged
+from igrow.trainer.export.climate_wiring import ClimateWiring
+from igrow.trainer.export.plan.blocks import PlanBlocks
+from igrow.trainer.export.plan.control import CARRIED, SECONDS
+from igrow.trainer.export.plan.training_range import RANGED
+from igrow.trainer.export.wiring import Wiring
 
 _PER_HOUR = {"heat": 3.6e-3, "electricity": 1e-3, "co2": 1.0}
 """From W m-2, W m-2 and kg m-2 h-1 over an hour to MJ m-2, kWh m-2 and kg m-2."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from trainer.export.blocks import Block, trace
+from igrow.trainer.export.blocks import Block, trace
 
 RANGED = ("air_temperature", "air_humidity", "air_co2", "outdoor_temperature", "global_radiation")
 """Quantities whose distance from the range of the training data is reported."""
