@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from igrow import __version__
 from igrow.core.simulator.hindcast import HindcastPredictor
 from igrow.core.sun import position
 from igrow.edge.bus.plc import RegisterPlc
@@ -97,7 +97,7 @@ def open_services(configuration: Configuration) -> Services:
     updates = BundleUpdates(
         state / "updates",
         site=site.name,
-        igrow_version=importlib.metadata.version("igrow"),
+        igrow_version=__version__,
         store=store,
         predictor=HindcastPredictor(),
         source=source,

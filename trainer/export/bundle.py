@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 
+from igrow import __version__
 from igrow.core.bundle import BUILT_IN, Bundle, BundleError, Golden, Manifest, Parameter, run_graph, write_bundle
 from igrow.core.effects import EFFECTS
 from igrow.core.planner.evolution import EvolutionSettings
@@ -64,7 +64,7 @@ def write_hybrid_bundle(folder: Path, model: HybridModel, *, created: datetime, 
     manifest = Manifest(
         site=model.site.name,
         created=created.astimezone(UTC),
-        igrow_version=version("igrow"),
+        igrow_version=__version__,
         variant="hybrid",
         opset=OPSET,
         graphs=signatures(planning) | {"optimizer": optimizer_signature(graphs["optimizer"])},

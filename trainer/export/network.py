@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from datetime import UTC, datetime
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from onnx import ModelProto
 
+from igrow import __version__
 from igrow.core.bundle import Bundle, Golden, GraphSignature, Manifest, Tensor, run_graph, write_bundle
 from igrow.core.planner.evolution import EvolutionSettings
 from igrow.core.quantities import QUANTITIES
@@ -147,7 +147,7 @@ def write_network_bundle(
     manifest = Manifest(
         site=site,
         created=created.astimezone(UTC),
-        igrow_version=version("igrow"),
+        igrow_version=__version__,
         variant="network",
         opset=OPSET,
         graphs={"simulator": _signature(simulator), "optimizer": optimizer_signature(graphs["optimizer"])},
