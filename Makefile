@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint format soak bench bench-diagnosis bundle clean
+.PHONY: help demo test lint format soak bench bench-diagnosis bundle api clean
 
 help: ## List the targets.
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-16s %s\n", $$1, $$2}'
@@ -44,6 +44,9 @@ bench-diagnosis: $(STAMP) ## Print the diagnosis benchmark (long).
 
 bundle: $(STAMP) ## Rebuild the default bundle in igrow_core/default_bundle.
 	$(BIN)/igrow-trainer bundle --out igrow_core/default_bundle
+
+api: $(STAMP) ## Write the pages of the Python interface to out/api.
+	$(BIN)/pdoc --docformat google --output-directory out/api igrow
 
 clean: ## Remove the virtual environment and all output.
 	rm -rf $(VENV) out build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis
