@@ -22,6 +22,10 @@ READ_AGAIN = 2.0
 """Seconds after a write until it is read again."""
 LINE_SECONDS = 10.0
 """Seconds that the line may take to come up."""
+MOVING = ("plc_clock", "heartbeat")
+"""Points that differ at every look."""
+SCREENFUL = 8
+"""Values that a person compares at once."""
 PATIENCE = 10.0
 """Seconds beyond the PLC's heartbeat timeout until a fallback that did not come is a failure."""
 
@@ -110,16 +114,30 @@ class Commissioning:
             await asyncio.sleep(0.5)
 
     async def _confirm_readings(self, plc: RegisterPlc) -> None:
-        readings = await plc.read(list(self._configuration.register_map.points))
-        for name, reading in readings.items():
+        """Compare the values with the PLC's own display, a screenful at a time, each read when it is shown."""
+        names = [name for name in self._configuration.register_map.points if name not in MOVING]
+        await self._check_ranges(plc, list(self._configuration.register_map.points))
+        for first in range(0, len(names), SCREENFUL):
+            readings = await plc.read(names[first : first + SCREENFUL])
+            seen = {name: reading for name, reading in readings.items() if reading.value is not None}
+            for name, reading in seen.items():
+                self._dialogue.tell(f"  {_shown(name, reading)}")
+            if not seen or self._dialogue.ask("Does the PLC show the same, all of them?"):
+                continue
+            for name in seen:
+                text = _shown(name, (await plc.read([name]))[name])
+                if not self._dialogue.ask(f"{text}. Does the PLC show the same?"):
+                    self._wrong.append(f"{text}, but the PLC shows something else")
+
+    async def _check_ranges(self, plc: RegisterPlc, names: list[str]) -> None:
+        """Find what cannot be read, or cannot be true; nobody has to be asked for that."""
+        for name, reading in (await plc.read(names)).items():
             rule = self._configuration.sensor_rules[name]
-            text = _shown(name, reading)
             if reading.value is None:
                 self._wrong.append(f"{name} cannot be read: {reading.error}")
             elif not rule.low <= reading.value <= rule.high:
+                text = _shown(name, reading)
                 self._wrong.append(f"{text} is outside {rule.low:g} to {rule.high:g}: look at scale and byte order")
-            elif not self._dialogue.ask(f"{text}. Does the PLC show the same?"):
-                self._wrong.append(f"{text}, but the PLC shows something else")
 
     async def _try_setpoints(self, plc: RegisterPlc, writer: GuardedWriter) -> None:
         for name in self._configuration.setpoints:

@@ -16,6 +16,7 @@ from enum import Enum
 from pathlib import Path
 from zoneinfo import ZoneInfo
 
+from igrow.core.bundle import default_bundle_folder
 from igrow.core.errors import IgrowError
 from igrow.core.local_time import zone
 from igrow.core.quantities import ACTUATORS, QUANTITIES, SETPOINTS
@@ -35,6 +36,8 @@ _SECOND = datetime.timedelta(seconds=1)
 _MINUTE = datetime.timedelta(minutes=1)
 _HOUR = datetime.timedelta(hours=1)
 _DAY = datetime.timedelta(days=1)
+BUILT_IN_BUNDLE = "built_in"
+"""What `bundle` says for the one that is installed with igrow."""
 STATUS_PORT = 8420
 """The one port that the systemd unit lets the daemon listen on (SocketBindAllow)."""
 
@@ -203,7 +206,7 @@ class DaemonFile:
     register_map: str = setting(help="the register map's file")
     state: str = setting(default="/var/lib/igrow-edge", help="folder for the log, leases and bundles")
     exchange: str | None = setting(default=None, help="folder shared with the trainer, or null")
-    bundle: str | None = setting(default=None, help="folder of the bundle to begin with, or null")
+    bundle: str | None = setting(default=BUILT_IN_BUNDLE, help="folder of the bundle to begin with, built_in, or null")
     cycle: CycleSettings = setting(default_factory=CycleSettings, help="pace of control")
     guard: GuardSettings = setting(default_factory=GuardSettings, help="limits and interlocks")
     sensors: Mapping[str, SensorSettings] = setting(
@@ -239,6 +242,11 @@ class Configuration:
         return self._folder(self.file.state)
 
     @property
+    def store_folder(self) -> Path:
+        """Where its log and ledger are."""
+        return self.state_folder / "store"
+
+    @property
     def exchange_folder(self) -> Path | None:
         """Where the trainer is met, or None."""
         return None if self.file.exchange is None else self._folder(self.file.exchange)
@@ -246,6 +254,8 @@ class Configuration:
     @property
     def bundle_folder(self) -> Path | None:
         """The bundle to begin with, or None."""
+        if self.file.bundle == BUILT_IN_BUNDLE:
+            return default_bundle_folder()
         return None if self.file.bundle is None else self._folder(self.file.bundle)
 
     @property

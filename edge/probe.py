@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 from igrow.edge.bus.errors import BusError, RefusedError
 from igrow.edge.bus.modbus_bus import ModbusBus
@@ -19,14 +20,24 @@ _BY_WIDTH = {
 _TURNED = (ByteOrder.ABCD, ByteOrder.BADC)
 
 
+@dataclass(frozen=True)
+class Answers:
+    """What a line gave."""
+
+    lines: list[str]
+    """For people."""
+    any: bool
+    """Whether a unit answered at all, be it with a refusal."""
+
+
 async def probe(
     settings: BusSettings,
     device_ids: Sequence[int] = (1,),
     function: Function = Function.HOLDING,
     first: int = 0,
     count: int = 16,
-) -> list[str]:
-    """Return lines that tell which units answer, what their registers hold, and what that may mean.
+) -> Answers:
+    """Return which units answer, what their registers hold, and what that may mean.
 
     Each unit is asked for `count` addresses from `first` on, in one request, then one by one where it refuses.
     Reads only. Never raises BusError: what goes wrong stands in the lines.
@@ -34,16 +45,14 @@ async def probe(
     bus = ModbusBus(settings, rest_step=0.0)
     bus.start()
     try:
-        lines: list[str] = []
-        for device_id in device_ids:
-            lines += await probe_unit(bus, device_id, function, first, count)
-        return lines
+        units = [await probe_unit(bus, device_id, function, first, count) for device_id in device_ids]
+        return Answers([line for unit in units for line in unit.lines], any(unit.any for unit in units))
     finally:
         await bus.close()
 
 
-async def probe_unit(bus: Bus, device_id: int, function: Function, first: int, count: int) -> list[str]:
-    """Return the lines for one unit on a bus that was started."""
+async def probe_unit(bus: Bus, device_id: int, function: Function, first: int, count: int) -> Answers:
+    """Return what one unit answers on a bus that was started."""
     what = f"unit {device_id}, {function.value} {first} to {first + count - 1}"
     try:
         content: dict[int, int] = dict(
@@ -59,12 +68,12 @@ async def probe_unit(bus: Bus, device_id: int, function: Function, first: int, c
             except RefusedError:
                 continue
             except BusError as failure:
-                return [*lines, *decoded(content, function), str(failure)]
+                return Answers([*lines, *decoded(content, function), str(failure)], any=True)
         if not content:
-            return [*lines, "  the unit is there, but holds nothing at these addresses"]
+            return Answers([*lines, "  the unit is there, but holds nothing at these addresses"], any=True)
     except BusError as error:
-        return [str(error)]
-    return [*lines, *decoded(content, function)]
+        return Answers([str(error)], any=False)
+    return Answers([*lines, *decoded(content, function)], any=True)
 
 
 def decoded(content: dict[int, int], function: Function) -> Iterator[str]:
@@ -94,7 +103,7 @@ def _number(value: int | float) -> str:
     return str(value) if isinstance(value, int) else f"{value:.7g}"
 
 
-async def scan(settings: BusSettings, device_ids: Sequence[int] = range(1, 248)) -> list[str]:
+async def scan(settings: BusSettings, device_ids: Sequence[int] = range(1, 248)) -> Answers:
     """Return one line for every unit that answers at all, be it with a refusal. One timeout for each that does not."""
     bus = ModbusBus(settings, rest_step=0.0)
     bus.start()
@@ -110,6 +119,6 @@ async def scan(settings: BusSettings, device_ids: Sequence[int] = range(1, 248))
             except BusError as error:
                 problem = f", at last: {error}"
                 await asyncio.sleep(0)
-        return lines or [f"no unit answers{problem}"]
+        return Answers(lines or [f"no unit answers{problem}"], any=bool(lines))
     finally:
         await bus.close()

@@ -88,7 +88,7 @@ def open_services(configuration: Configuration) -> Services:
     state, file, site = configuration.state_folder, configuration.file, configuration.site
     simulated = file.cycle.clock is not ClockSource.SYSTEM
     limits = StoreLimits(survive_power_cut=not simulated, batch_seconds=3600.0 if simulated else 60.0)
-    store = SqliteStore(state / "store", limits)
+    store = SqliteStore(configuration.store_folder, limits)
     folder = configuration.exchange_folder
     exchange = None if folder is None else FolderExchange(folder, site.name, store)
     source = None

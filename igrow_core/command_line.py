@@ -12,6 +12,7 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 
+from igrow import __version__
 from igrow.core.errors import IgrowError
 
 
@@ -53,6 +54,7 @@ def _parse(
         description=description,
         epilog=f"{program} COMMAND --help explains a command, with an example.",
     )
+    parser.add_argument("--version", action="version", version=f"{program} {__version__}")
     parsers = parser.add_subparsers(title="commands", dest="command", metavar="COMMAND", required=True)
     wanted = next((word for word in given if not word.startswith("-")), None)
     for name, (module_name, summary) in commands.items():

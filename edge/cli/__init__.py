@@ -15,8 +15,11 @@ COMMANDS = {
     "plan": ("igrow.edge.cli.plan", "compute one plan now, from the bundle in force and the log, and print it"),
     "override": ("igrow.edge.cli.override", "set a setpoint by hand for some time, or give it back"),
     "commission": ("igrow.edge.cli.commission", "walk through the checks with a new PLC"),
-    "backup": ("igrow.edge.cli.backup", "copy the daemon's log and ledger into one file, also while it runs"),
-    "restore": ("igrow.edge.cli.restore", "put a backup in the place of the log and ledger"),
+    "backup": (
+        "igrow.edge.cli.backup",
+        "copy log, configuration and bundles into one file, also while it runs",
+    ),
+    "restore": ("igrow.edge.cli.restore", "put a backup in place, on this gateway or on a new one"),
     "export": ("igrow.edge.cli.export", "write log and ledger as CSV files"),
 }
 

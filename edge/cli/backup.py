@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from igrow.edge.cli.common import configuration_of, store_folder
-from igrow.edge.store import backup
+from igrow.edge.backup import back_up
+from igrow.edge.cli.common import configuration_of
 
 EXAMPLE = "igrow-edge backup /etc/igrow/daemon.yaml /media/usb/igrow-backup.tar.gz"
 
@@ -19,6 +19,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write the backup."""
-    target = backup(store_folder(configuration_of(options)), options.target)
-    print(f"{target}: {target.stat().st_size / 1e6:.1f} MB")
+    elsewhere = back_up(configuration_of(options), options.target)
+    print(f"{options.target}: {options.target.stat().st_size / 1e6:.1f} MB")
+    for path in elsewhere:
+        print(f"not in it, as it lies outside the configuration's folder: {path}")
     return 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 
+from igrow.core.bundle import Bundle, read_bundle
 from igrow.edge.cli.common import add_configuration, configuration_of
 from igrow.edge.configuration import STATUS_PORT, ClockSource, Configuration
 from igrow.edge.registers.bus_load import estimate
@@ -23,6 +24,17 @@ def run(options: argparse.Namespace) -> int:
     for line in describe(configuration_of(options)):
         print(line)
     return 0
+
+
+def _planning(configuration: Configuration) -> str:
+    """Say whether plans can be made; raises BundleError where the first bundle is none."""
+    if not configuration.file.planning.enabled:
+        return "off: the recipe rules"
+    folder = configuration.bundle_folder
+    if folder is None:
+        return "waits for a bundle from the trainer; until then the recipe rules (bundle: null)"
+    bundle: Bundle = read_bundle(folder)
+    return f"on; first bundle: {bundle.label}, made for {bundle.manifest.site} ({folder})"
 
 
 def describe(configuration: Configuration) -> Iterator[str]:
@@ -67,7 +79,6 @@ def describe(configuration: Configuration) -> Iterator[str]:
         )
     exchange = configuration.exchange_folder
     yield f"state       {configuration.state_folder}; exchange: {exchange if exchange else 'none'}"
-    bundle = configuration.bundle_folder
-    yield f"planning    {'on' if file.planning.enabled else 'off'}; first bundle: {bundle if bundle else 'none'}"
+    yield f"planning    {_planning(configuration)}"
     if file.updates.enabled and configuration.trusted_root is None:
         yield "updates     off: no updates.trusted_root, so nothing could be verified"

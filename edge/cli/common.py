@@ -30,11 +30,6 @@ def configuration_of(options: argparse.Namespace) -> Configuration:
     return load_configuration(options.configuration)
 
 
-def store_folder(configuration: Configuration) -> Path:
-    """Return the folder of the log and the ledger."""
-    return configuration.state_folder / "store"
-
-
 def parse_duration(text: str) -> float:
     """Return the seconds of a text such as `30 min`, `2h` or `90 s`; raises IgrowError."""
     stripped = text.strip()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from igrow.edge.cli.common import configuration_of, parse_time, store_folder
+from igrow.edge.cli.common import configuration_of, parse_time
 from igrow.edge.store import export
 
 EXAMPLE = "igrow-edge export /etc/igrow/daemon.yaml export/ --from 2026-03-01 --until 2026-04-01"
@@ -23,6 +23,6 @@ def run(options: argparse.Namespace) -> int:
     """Write the files and name them."""
     start = parse_time(options.start) if options.start else 0.0
     end = parse_time(options.until) if options.until else 8e9
-    for path in export(store_folder(configuration_of(options)), options.folder, start=start, end=end):
+    for path in export(configuration_of(options).store_folder, options.folder, start=start, end=end):
         print(path)
     return 0

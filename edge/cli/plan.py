@@ -11,7 +11,7 @@ from zoneinfo import ZoneInfo
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import QUANTITIES
 from igrow.core.telemetry import read_csv
-from igrow.edge.cli.common import add_configuration, configuration_of, parse_time, store_folder
+from igrow.edge.cli.common import add_configuration, configuration_of, parse_time
 from igrow.edge.configuration import Configuration
 from igrow.edge.planning.make_plan import make_plan
 from igrow.edge.ports import Plan, PlanRequest
@@ -43,9 +43,9 @@ def compute(configuration: Configuration, bundle: Path | None, at: str | None) -
     folder = bundle or _bundle_in_force(configuration) or configuration.bundle_folder
     if folder is None:
         raise IgrowError("no bundle is in force; name one with --bundle")
-    log = read_telemetry(store_folder(configuration), 0.0, 8e9)
+    log = read_telemetry(configuration.store_folder, 0.0, 8e9)
     if not len(log):
-        raise IgrowError(f"{store_folder(configuration)}: the log is empty, so there is nothing to plan from")
+        raise IgrowError(f"{configuration.store_folder}: the log is empty, so there is nothing to plan from")
     now = parse_time(at) if at else float(log.time[-1].astype("datetime64[s]").astype(float))
     step = settings.step.total_seconds()
     start = now - now % step
@@ -54,7 +54,7 @@ def compute(configuration: Configuration, bundle: Path | None, at: str | None) -
     request = PlanRequest(
         time=start,
         step_seconds=step,
-        telemetry=read_telemetry(store_folder(configuration), now - settings.history.total_seconds(), now + 1.0),
+        telemetry=read_telemetry(configuration.store_folder, now - settings.history.total_seconds(), now + 1.0),
         recipe=recipe_course(configuration.file.recipe, configuration.zone, start, step, steps),
         bundle=folder,
         forecast=read_csv(forecast) if forecast and forecast.exists() else None,

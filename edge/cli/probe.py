@@ -40,17 +40,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Ask and print."""
+    """Ask and print; the exit code is 0 where a unit answered, else 1."""
     settings = replace(_settings(options), timeout=options.timeout)
     if options.scan:
-        lines = asyncio.run(scan(settings, parse_units(options.units or "1-247")))
+        answers = asyncio.run(scan(settings, parse_units(options.units or "1-247")))
     else:
         if not (options.first >= 0 and 1 <= options.count <= 125 and options.first + options.count <= 65536):
             raise IgrowError("--first and --count: 1 to 125 addresses between 0 and 65535 are right")
         units = parse_units(options.units or "1")
-        lines = asyncio.run(probe(settings, units, Function(options.function), options.first, options.count))
-    print("\n".join(lines))
-    return 0
+        answers = asyncio.run(probe(settings, units, Function(options.function), options.first, options.count))
+    print("\n".join(answers.lines))
+    return 0 if answers.any else 1
 
 
 def _settings(options: argparse.Namespace) -> BusSettings:

@@ -25,6 +25,9 @@ CONNECTIONS = 16
 REQUEST_BYTES = 8192
 REQUEST_SECONDS = 5.0
 STATE_FILE_SECONDS = 10.0
+OWN_NAMES = ("localhost", "127.0.0.1", "[::1]")
+"""What a visitor of this very machine calls it. A page of another site that had its own name point here (DNS rebinding)
+would say that name."""
 
 
 class StatusServer:
@@ -133,6 +136,8 @@ class StatusServer:
             return "503 Service Unavailable", "text/plain", b"too many visitors\n"
         if len(parts) != 3 or parts[0] not in {"GET", "HEAD"}:
             return "405 Method Not Allowed", "text/plain", b"read-only: GET it is\n"
+        if not _own_name(request):
+            return "421 Misdirected Request", "text/plain", b"this page is for localhost: http://localhost:PORT/\n"
         status, kind, text = self._page(parts[1].split("?", 1)[0])
         return status, kind, b"" if parts[0] == "HEAD" else text.encode()
 
@@ -167,6 +172,16 @@ class StatusServer:
             "alarms": [alarm.text for alarm in snapshot.alarms],
             "problems": list(snapshot.problems),
         }
+
+
+def _own_name(request: str) -> bool:
+    """Tell whether a request names this machine as its host, exactly once."""
+    lines = [line.partition(":") for line in request.split("\r\n")[1:]]
+    hosts = [value.strip().lower() for name, _, value in lines if name.strip().lower() == "host"]
+    return len(hosts) == 1 and any(
+        hosts[0] == name or (hosts[0].startswith(f"{name}:") and hosts[0][len(name) + 1 :].isdigit())
+        for name in OWN_NAMES
+    )
 
 
 def plain(value: object) -> object:

@@ -119,7 +119,7 @@ BUILT_IN = "default"
 
 def default_bundle_folder() -> Path:
     """Return the folder of the default bundle that is installed with igrow: a greenhouse that nobody has measured."""
-    return Path(str(resources.files("igrow_core"))) / "default_bundle"
+    return Path(str(resources.files("igrow.core"))) / "default_bundle"
 
 
 def read_golden(bundle: Bundle) -> dict[str, Golden]:

@@ -64,6 +64,35 @@ async def test_a_plc_that_does_everything_right_passes(tmp_path):
     assert any("its own heating_setpoint = 17 degC" in line for line in person.lines)
 
 
+async def test_a_person_compares_a_screenful_at_a_time_and_never_what_moves(tmp_path):
+    person = Script()
+    await walk(tmp_path, person, only_read=True)
+    shown = [line for line in person.lines if " = " in line]
+    assert len(person.questions) == -(-len(shown) // 8)
+    assert not any(name in line for line in shown for name in ("heartbeat", "plc_clock"))
+
+
+async def test_each_value_is_read_when_it_is_shown(tmp_path, monkeypatch):
+    monkeypatch.setattr("igrow.edge.commission.SCREENFUL", 1)
+
+    class Slow(Script):
+        def ask(self, question):
+            # Somebody changes a value at the PLC while the person still compares the values before it.
+            plant.plc.set_by_hand("heating_setpoint", 21.0)
+            return super().ask(question)
+
+    person = Slow()
+
+    def prepare(made):
+        nonlocal plant
+        plant = made
+        made.plc.set_by_hand("heating_setpoint", 18.0)
+
+    plant = None
+    await walk(tmp_path, person, only_read=True, prepare=prepare)
+    assert "  heating_setpoint = 21 degC" in person.lines
+
+
 async def test_nothing_is_written_by_a_walk_that_only_reads(tmp_path):
     passed, plant = await walk(tmp_path, Script(), only_read=True)
     assert passed
@@ -80,7 +109,7 @@ async def test_nothing_is_written_to_what_the_person_keeps_back(tmp_path):
 
 
 async def test_a_value_that_the_plc_shows_otherwise_is_a_failure(tmp_path):
-    person = Script("air_temperature =")
+    person = Script("all of them", "air_temperature =")
     passed, _ = await walk(tmp_path, person, only_read=True)
     assert not passed
     assert any("but the PLC shows something else" in line for line in person.lines)

@@ -80,7 +80,7 @@ def test_every_module_of_the_tables_is_there(side):
 @pytest.mark.parametrize(("side", "heavy"), [("edge", "pymodbus"), ("edge", "onnxruntime"), ("trainer", "torch")])
 def test_help_waits_for_no_command(side, heavy):
     code = (
-        f"import sys; from {side}.cli import main\n"
+        f"import sys; from igrow.{side}.cli import main\n"
         "try: main(['--help'])\n"
         f"except SystemExit: sys.exit({heavy!r} in sys.modules)"
     )

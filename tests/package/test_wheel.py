@@ -56,3 +56,18 @@ def test_a_wheel_installs_into_an_empty_environment(wheel: Path, tmp_path: Path)
         helped = subprocess.run([str(tmp_path / "bin" / command), "--help"], capture_output=True, check=False)
         assert helped.returncode == 0, helped.stderr.decode()
         assert b"COMMAND" in helped.stdout
+
+
+def test_the_built_in_bundle_is_found_in_an_installation(wheel: Path, tmp_path: Path) -> None:
+    zipfile.ZipFile(wheel).extractall(tmp_path)
+    # The dependencies are this environment's; igrow itself is the wheel's.
+    code = (
+        "import sys; sys.path.insert(0, sys.argv[1])\n"
+        "from igrow.core.bundle import default_bundle_folder, read_bundle\n"
+        "print(read_bundle(default_bundle_folder()).folder)"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path)], cwd=tmp_path, capture_output=True, check=False, text=True
+    )
+    assert told.returncode == 0, told.stderr
+    assert Path(told.stdout.strip()).is_relative_to(tmp_path)

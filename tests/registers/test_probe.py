@@ -7,7 +7,7 @@ import asyncio
 from bus.coded_unit import CodedUnit
 from bus.simulated_loop import run
 
-from igrow.edge.probe import decoded, probe, scan
+from igrow.edge.probe import Answers, decoded, probe, scan
 from igrow.edge.registers.codec import encode_raw
 from igrow.edge.registers.model import BusSettings, ByteOrder, DataType, Function, Transport
 from igrow.edge.virtual_plc.modbus_server import ModbusServer
@@ -19,7 +19,7 @@ def against(*units: CodedUnit, first: int = 0, count: int = 4) -> list[str]:
     async def main() -> list[str]:
         server = ModbusServer({unit.device_id: unit for unit in units})
         await server.listen("127.0.0.1", 5020)
-        return await probe(SETTINGS, [1, 2], Function.HOLDING, first, count)
+        return (await probe(SETTINGS, [1, 2], Function.HOLDING, first, count)).lines
 
     return run(main())
 
@@ -61,22 +61,30 @@ def test_a_unit_that_has_nothing_there_is_told_from_one_that_is_not_there() -> N
 
 
 def test_a_server_that_is_not_there_is_told() -> None:
-    lines = run(probe(SETTINGS, [1]))
-    assert len(lines) == 1
-    assert "nobody listens" in lines[0] or "not connected" in lines[0]
+    answers = run(probe(SETTINGS, [1]))
+    assert not answers.any
+    assert len(answers.lines) == 1
+    assert "nobody listens" in answers.lines[0] or "not connected" in answers.lines[0]
 
 
 def test_a_scan_finds_the_units_that_answer_at_all() -> None:
-    async def main() -> list[str]:
+    async def main() -> Answers:
         refusing = CodedUnit(5, refused=[0])
         server = ModbusServer({3: CodedUnit(3), 5: refusing})
         await server.listen("127.0.0.1", 5020)
         return await scan(SETTINGS, range(1, 10))
 
-    lines = run(main())
-    assert lines[0] == "unit 3: answers"
-    assert lines[1].startswith("unit 5: is there")
-    assert len(lines) == 2
+    answers = run(main())
+    assert answers.any
+    assert answers.lines[0] == "unit 3: answers"
+    assert answers.lines[1].startswith("unit 5: is there")
+    assert len(answers.lines) == 2
+
+
+def test_a_scan_that_nobody_answers_says_so() -> None:
+    answers = run(scan(SETTINGS, range(1, 3)))
+    assert not answers.any
+    assert answers.lines[0].startswith("no unit answers")
 
 
 def test_a_probe_closes_its_connection() -> None:

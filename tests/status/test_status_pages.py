@@ -142,7 +142,7 @@ async def test_the_server_only_reads(server: StatusServer) -> None:
     status, _, _ = await fetch(server, b"POST / HTTP/1.1\r\nHost: localhost\r\n\r\n")
     assert status == 405
     assert (await get(server, "/etc/passwd"))[0] == 404
-    status, _, body = await fetch(server, b"HEAD / HTTP/1.1\r\n\r\n")
+    status, _, body = await fetch(server, b"HEAD / HTTP/1.1\r\nHost: localhost\r\n\r\n")
     assert (status, body) == (200, "")
 
 
@@ -209,3 +209,24 @@ def test_a_clock_set_back_begins_a_new_history() -> None:
     kept = history()
     kept.add(snapshot(time=NOW - 1e6))
     assert len(kept.series("air_temperature")) == 1
+
+
+@pytest.mark.parametrize(
+    ("host", "status"),
+    [
+        ("Host: localhost:8420", 200),
+        ("Host: 127.0.0.1", 200),
+        ("Host: [::1]:8420", 200),
+        ("host: LOCALHOST", 200),
+        ("Host: evil.example", 421),
+        ("Host: localhost.evil.example", 421),
+        ("Host: localhost:8420.evil.example", 421),
+        ("Host: localhost\r\nHost: evil.example", 421),
+        ("X-Forwarded-Host: localhost", 421),
+    ],
+)
+async def test_a_name_that_points_here_from_elsewhere_is_not_served(
+    server: StatusServer, host: str, status: int
+) -> None:
+    server.publish(snapshot())
+    assert (await fetch(server, f"GET /state.json HTTP/1.1\r\n{host}\r\n\r\n".encode()))[0] == status
