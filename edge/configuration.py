@@ -22,9 +22,12 @@ from igrow.core.local_time import zone
 from igrow.core.quantities import ACTUATORS, QUANTITIES, SETPOINTS
 from igrow.core.site import SetpointLimits, Site, load_site
 from igrow.core.yaml_schema import SettingError, duration, load, place, setting
+from igrow.edge.climate_alarms import ClimateAlarm
 from igrow.edge.guard import DEFAULT_INTERLOCKS, Bound, GuardRules, Interlock
 from igrow.edge.guard.interlocks import SAFE, InterlockError
 from igrow.edge.guard.rules import GuardRuleError
+from igrow.edge.mqtt.settings import MqttSettings
+from igrow.edge.notifications.settings import NotificationSettings
 from igrow.edge.point_rules import point_rule
 from igrow.edge.registers.bus_load import estimate
 from igrow.edge.registers.loading import load_register_map
@@ -212,10 +215,15 @@ class DaemonFile:
     sensors: Mapping[str, SensorSettings] = setting(
         keys=QUANTITIES, default_factory=dict, help="sensors that differ from the table"
     )
+    climate_alarms: tuple[ClimateAlarm, ...] | None = setting(
+        default=None, help="thresholds that people are told of; null takes the crop's"
+    )
     recipe: Recipe = setting(default_factory=Recipe, help="what rules when no plan does")
     planning: PlanningSettings = setting(default_factory=PlanningSettings, help="planning")
     updates: UpdateSettings = setting(default_factory=UpdateSettings, help="new bundles")
     status: StatusSettings = setting(default_factory=StatusSettings, help="status page")
+    notifications: NotificationSettings = setting(default_factory=NotificationSettings, help="who is told of alarms")
+    mqtt: MqttSettings = setting(default_factory=MqttSettings, help="state for a broker")
 
 
 @dataclass(frozen=True)

@@ -102,6 +102,8 @@ class Daemon:
         self.cycles += 1
         image = result.image
         control.holds.keep(control.cycle.readback.held(image.monotonic), image.true_time)
+        with self._contained("climate alarms"):
+            control.climate_alarms.tick(image, self._journal.alarm)
         with self._contained("updates"):
             self.services.updates.tick(image.true_time)
             if control.lockstep and self.services.updates.busy:

@@ -12,6 +12,7 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 
 from igrow.core.quantities import QUANTITIES
+from igrow.edge.alarm_levels import Level
 from igrow.edge.alarms import AlarmBoard
 from igrow.edge.guard import Clamp, Finding, WriteOutcome
 from igrow.edge.guard.readback import Outcome
@@ -114,9 +115,9 @@ class Journal:
             self._write(write.point, write.requested, write.value, write.source, reason, sent)
             self.alarm(f"bus {write.point}", "" if outcome.error is None else f"{write.point}: {outcome.error}")
 
-    def alarm(self, name: str, text: str) -> None:
+    def alarm(self, name: str, text: str, level: Level | None = None) -> None:
         """Raise the alarm, or clear it with an empty text."""
-        self.alarms.set(name, text, self._monotonic, self._time)
+        self.alarms.set(name, text, self._monotonic, self._time, level)
 
     def _alarm(self, record: AlarmRecord) -> None:
         self._store.record_alarm(record)

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Protocol
 
 from igrow.core.telemetry import Telemetry
+from igrow.edge.alarm_levels import Level
 from igrow.edge.image import Value
 
 # --- records --------------------------------------------------------------------------------------------------
@@ -50,6 +51,7 @@ class AlarmRecord:
     active: bool
     text: str
     """One line for people: what is wrong, where, what to do."""
+    level: Level = Level.WARNING
 
 
 # --- store ----------------------------------------------------------------------------------------------------

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 from igrow import __version__
 from igrow.core.simulator.hindcast import HindcastPredictor
 from igrow.core.sun import position
 from igrow.edge.bus.plc import RegisterPlc
+from igrow.edge.climate_alarms import ClimateAlarms, usual_climate_alarms
 from igrow.edge.clock import Clock, PlcClock, SystemClock
 from igrow.edge.configuration import ClockSource, Configuration
 from igrow.edge.cycle import ControlCycle
@@ -19,6 +19,7 @@ from igrow.edge.guard import GuardedWriter, GuardState, Readback
 from igrow.edge.guard.core import with_earlier_writes
 from igrow.edge.holds import HoldFile
 from igrow.edge.journal import Journal
+from igrow.edge.overriding import override_file
 from igrow.edge.pace import FollowedPlant, Pace, TickPace
 from igrow.edge.planning import PlanningProcess, ProcessLimits
 from igrow.edge.planning_schedule import PlanningRules, PlanningSchedule
@@ -30,7 +31,6 @@ from igrow.edge.status import StatusServer
 from igrow.edge.store import SqliteStore, StoreLimits
 from igrow.edge.updates import BundleUpdates, SignedSource, UpdateRules
 
-OVERRIDE_FILE = "override.json"
 HOLD_FILE = "holds.json"
 STATUS_FILE = "status.json"
 TWIN_TOLERANCE = {
@@ -76,6 +76,7 @@ class Control:
     keeper: PlanKeeper
     schedule: PlanningSchedule | None
     holds: HoldFile
+    climate_alarms: ClimateAlarms
 
     @property
     def lockstep(self) -> bool:
@@ -151,7 +152,7 @@ def build_control(
         clock,
         ImageBuilder(configuration.sensor_rules, _twins(configuration), sun_elevation(site.latitude, site.longitude)),
         [
-            GrowerOverride(configuration.state_folder / OVERRIDE_FILE),
+            GrowerOverride(override_file(configuration.state_folder)),
             FreshPlan(keeper, fresh_for=1.5 * every),
             LastValidPlan(keeper),
             RecipeSource(file.recipe, configuration.zone),
@@ -172,6 +173,7 @@ def build_control(
     return Control(
         configuration, plc, clock, pace, cycle, keeper, _schedule(configuration, services),
         HoldFile(configuration.state_folder / HOLD_FILE),
+        ClimateAlarms(usual_climate_alarms(site.crop) if file.climate_alarms is None else file.climate_alarms),
     )  # fmt: skip
 
 
@@ -226,8 +228,3 @@ def sun_elevation(latitude: float, longitude: float) -> Callable[[float], float]
 
 def _no_plan() -> Plan | None:
     return None
-
-
-def override_file(state_folder: Path) -> Path:
-    """Return where the grower's overrides are kept."""
-    return state_folder / OVERRIDE_FILE

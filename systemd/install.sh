@@ -1,5 +1,6 @@
 #!/bin/sh
 # Installs the gateway on Debian 12 or later, from a source folder: `sudo sh systemd/install.sh`.
+# EXTRAS=edge,notify,mqtt adds what the services beside the daemon use.
 # May be run again for an update: configuration and log are left alone. Explained in docs/installation.md.
 set -eu
 
@@ -15,7 +16,7 @@ PYTHON=${PYTHON:-python3}
 echo "1. program into $TARGET/venv"
 mkdir -p "$TARGET/docs"
 [ -x "$TARGET/venv/bin/python" ] || "$PYTHON" -m venv "$TARGET/venv"
-"$TARGET/venv/bin/pip" install --quiet --no-compile --upgrade "$SOURCE[edge]"
+"$TARGET/venv/bin/pip" install --quiet --no-compile --upgrade "$SOURCE[${EXTRAS:-edge}]"
 # Compiled once here: the daemon may not write there.
 "$TARGET/venv/bin/python" -m compileall -q "$TARGET/venv/lib" || true
 cp "$SOURCE"/docs/*.md "$TARGET/docs/"
@@ -24,7 +25,9 @@ ln -sf "$TARGET/venv/bin/igrow-edge" /usr/local/bin/igrow-edge
 echo "2. user, folders, service"
 install -m 644 "$SOURCE/systemd/igrow-edge.sysusers.conf" /usr/lib/sysusers.d/igrow-edge.conf
 install -m 644 "$SOURCE/systemd/igrow-edge.tmpfiles.conf" /usr/lib/tmpfiles.d/igrow-edge.conf
-install -m 644 "$SOURCE/systemd/igrow-edge.service" /etc/systemd/system/igrow-edge.service
+for unit in igrow-edge igrow-notify igrow-mqtt; do
+    install -m 644 "$SOURCE/systemd/$unit.service" "/etc/systemd/system/$unit.service"
+done
 systemd-sysusers igrow-edge.conf
 systemd-tmpfiles --create igrow-edge.conf
 

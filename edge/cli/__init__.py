@@ -14,6 +14,9 @@ COMMANDS = {
     "status": ("igrow.edge.cli.status", "show what the daemon does, and why"),
     "plan": ("igrow.edge.cli.plan", "compute one plan now, from the bundle in force and the log, and print it"),
     "override": ("igrow.edge.cli.override", "set a setpoint by hand for some time, or give it back"),
+    "alarms": ("igrow.edge.cli.alarms", "list the alarms, or say that you know of them"),
+    "notify": ("igrow.edge.cli.notify", "tell people of alarms, by e-mail, ntfy or a web hook"),
+    "mqtt": ("igrow.edge.cli.mqtt", "publish the daemon's state to an MQTT broker"),
     "commission": ("igrow.edge.cli.commission", "walk through the checks with a new PLC"),
     "backup": (
         "igrow.edge.cli.backup",

@@ -6,11 +6,9 @@ import argparse
 from datetime import timedelta
 from pathlib import Path
 
-from igrow.core.errors import IgrowError
 from igrow.core.yaml_schema import duration
 from igrow.edge.cli.common import configuration_of, parse_duration, parse_setpoint
-from igrow.edge.sources.override import Lease, read_leases, write_leases
-from igrow.edge.wiring import override_file
+from igrow.edge.overriding import override
 
 EXAMPLE = 'igrow-edge override /etc/igrow/daemon.yaml heating_setpoint=18 --for "2 h"'
 
@@ -26,26 +24,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Write the leases; a running daemon sees them in its next cycle. The guard's limits hold for them too."""
     configuration = configuration_of(options)
-    path = override_file(configuration.state_folder)
-    leases = read_leases(path)
-    if options.clear is not None:
-        for name in options.clear or list(leases):
-            leases.pop(name, None)
-    seconds = parse_duration(options.duration)
-    for text in options.setpoints:
-        name, value = parse_setpoint(text)
-        if name not in configuration.setpoints:
-            raise IgrowError(f"{name} is no setpoint of this site: {', '.join(configuration.setpoints)}")
-        rule = configuration.guard_rules.points[name]
-        if not rule.low <= value <= rule.high:
-            raise IgrowError(f"{name}={value:g}: the site's limits are {rule.low:g} to {rule.high:g}")
-        leases[name] = Lease(value, seconds)
-    if not path.parent.is_dir():
-        # Made by root, it would shut out the service's own user.
-        raise IgrowError(f"{path.parent}: is not there; the daemon makes it when it first starts, override after that")
-    problem = write_leases(path, leases)
-    if problem:
-        raise IgrowError(problem)
+    give_back = () if options.clear is None else options.clear or configuration.setpoints
+    values = dict(parse_setpoint(text) for text in options.setpoints)
+    leases = override(configuration, values, parse_duration(options.duration), give_back)
     for name, lease in leases.items():
         print(f"{name} = {lease.value:g} for {duration(timedelta(seconds=round(lease.seconds)))}")
     if not leases:

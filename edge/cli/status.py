@@ -5,17 +5,14 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-import urllib.error
-import urllib.request
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import Any
 
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import QUANTITIES
 from igrow.edge.cli.common import add_configuration, configuration_of
-from igrow.edge.state_file import read_state
+from igrow.edge.status.client import fetch, last_state
 from igrow.edge.wiring import STATUS_FILE
 
 EXAMPLE = "igrow-edge status /etc/igrow/daemon.yaml"
@@ -37,32 +34,16 @@ def run(options: argparse.Namespace) -> int:
         try:
             state = fetch(configuration.file.status.port)
         except IgrowError as error:
-            state = last_state(configuration.state_folder / STATUS_FILE, error)
+            left = last_state(configuration.state_folder / STATUS_FILE)
+            if left is None:
+                raise
+            print(f"{error}\nthe last state that it left:", file=sys.stderr)
+            state = left
     if options.json:
         print(json.dumps(state, indent=1))
     else:
         print("\n".join(lines(state)))
     return 0
-
-
-def fetch(port: int) -> dict[str, Any]:
-    """Return the daemon's state; raises IgrowError when nobody answers."""
-    try:
-        with urllib.request.urlopen(f"http://127.0.0.1:{port}/state.json", timeout=5.0) as answer:
-            return dict(json.load(answer))
-    except urllib.error.HTTPError as error:
-        raise IgrowError(f"the daemon on port {port} says: {error.read().decode().strip()}") from None
-    except (OSError, ValueError):
-        raise IgrowError(f"no daemon answers on port {port} of this machine; is igrow-edge running?") from None
-
-
-def last_state(path: Path, reason: IgrowError) -> dict[str, Any]:
-    """Return the state that a daemon has left in its file, and warn that it is old; raises `reason` without one."""
-    left = read_state(path).get("state")
-    if not isinstance(left, dict):
-        raise reason
-    print(f"{reason}\nthe last state that it left:", file=sys.stderr)
-    return left
 
 
 def lines(state: Mapping[str, Any]) -> Iterator[str]:
@@ -89,7 +70,7 @@ def lines(state: Mapping[str, Any]) -> Iterator[str]:
     bundle = state.get("bundle") or {}
     yield f"bundle   {bundle.get('name') or 'none'}"
     for alarm in state["alarms"]:
-        yield f"ALARM    {alarm['text']}"
+        yield f"ALARM    {alarm['level']}: {alarm['text']}"
     for problem in state["problems"]:
         yield f"problem  {problem}"
     for clamp in list(state["clamps"])[:5]:

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Installs the Modbus peers that the tests in this folder talk to: mbpoll, socat, libmodbus' own test server, and
+# Installs the peers that tests talk to: mbpoll, socat, libmodbus' own test server, mosquitto, and
 # two Node packages. Tests whose peer is absent are skipped. Needs root (or sudo) for the Debian packages.
 set -eu
 cd "$(dirname "$0")"
@@ -7,7 +7,7 @@ cd "$(dirname "$0")"
 as_root=""
 [ "$(id -u)" = 0 ] || as_root=sudo
 missing=""
-for package in mbpoll socat libmodbus-dev gcc pkg-config; do
+for package in mbpoll socat libmodbus-dev mosquitto gcc pkg-config; do
     dpkg -s "$package" >/dev/null 2>&1 || missing="$missing $package"
 done
 command -v node >/dev/null 2>&1 || missing="$missing nodejs"

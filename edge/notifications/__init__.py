@@ -1,0 +1,11 @@
+"""Tells people of alarms: by e-mail, ntfy, a web hook and whatever else Apprise knows.
+
+`igrow-edge notify` is a process of its own beside the daemon. It asks the daemon for its state as any visitor does, so
+that nothing here can hold control: not a mail server that hangs, not a library that crashes. That the daemon does not
+answer is an alarm by itself.
+
+- `settings.py`: the section `notifications` of the daemon's file.
+- `outbox.py`: which messages are due; no clock, no network.
+- `acknowledged.py`: what people have said that they know.
+- `notifier.py`: the loop around them, and the services.
+"""
