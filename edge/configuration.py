@@ -18,6 +18,7 @@ from zoneinfo import ZoneInfo
 
 from igrow.core.bundle import default_bundle_folder
 from igrow.core.errors import IgrowError
+from igrow.core.exchange.address import Address, parse_address
 from igrow.core.local_time import zone
 from igrow.core.quantities import ACTUATORS, QUANTITIES, SETPOINTS
 from igrow.core.site import SetpointLimits, Site, load_site
@@ -202,13 +203,31 @@ class UpdateSettings:
 
 
 @dataclass(frozen=True)
+class TransferSettings:
+    """How the log goes to the trainer."""
+
+    segment: datetime.timedelta = setting(
+        low=_HOUR, high=_DAY, default=_DAY, help="how much of the log is sealed together"
+    )
+    every: datetime.timedelta = setting(
+        low=_MINUTE, high=_DAY, default=15 * _MINUTE, help="time between two visits of the exchange"
+    )
+    budget: int = setting(low=8, high=100_000, default=256, help="MB that may wait for the trainer's receipt")
+    known_hosts: str | None = setting(default=None, help="file with the SFTP server's key; sftp needs one")
+    identity: str | None = setting(default=None, help="file with our private key for SFTP, or null")
+
+
+@dataclass(frozen=True)
 class DaemonFile:
     """The whole file."""
 
     site: str = setting(help="the site's file")
     register_map: str = setting(help="the register map's file")
     state: str = setting(default="/var/lib/igrow-edge", help="folder for the log, leases and bundles")
-    exchange: str | None = setting(default=None, help="folder shared with the trainer, or null")
+    exchange: str | None = setting(
+        default=None, help="where the trainer is met: a folder, sftp://... or s3://..., or null"
+    )
+    transfer: TransferSettings = setting(default_factory=TransferSettings, help="how the log goes there")
     bundle: str | None = setting(default=BUILT_IN_BUNDLE, help="folder of the bundle to begin with, built_in, or null")
     cycle: CycleSettings = setting(default_factory=CycleSettings, help="pace of control")
     guard: GuardSettings = setting(default_factory=GuardSettings, help="limits and interlocks")
@@ -255,9 +274,19 @@ class Configuration:
         return self.state_folder / "store"
 
     @property
-    def exchange_folder(self) -> Path | None:
+    def exchange(self) -> Address | None:
         """Where the trainer is met, or None."""
-        return None if self.file.exchange is None else self._folder(self.file.exchange)
+        return None if self.file.exchange is None else parse_address(self.file.exchange, self.path.parent)
+
+    @property
+    def known_hosts(self) -> Path | None:
+        """The file with the SFTP server's key, or None."""
+        return None if self.file.transfer.known_hosts is None else self._folder(self.file.transfer.known_hosts)
+
+    @property
+    def identity(self) -> Path | None:
+        """The file with our private key for SFTP, or None."""
+        return None if self.file.transfer.identity is None else self._folder(self.file.transfer.identity)
 
     @property
     def bundle_folder(self) -> Path | None:
@@ -310,6 +339,7 @@ def put_together(path: Path, file: DaemonFile, site: Site, register_map: Registe
             "writable point for: add the point there, or list in `setpoints` only what it can write"
         )
     _check_clock(path, file.cycle, register_map)
+    _check_exchange(path, file)
     setpoints = tuple(name for name in setpoints if name in site.setpoints)
     for name in file.guard.points:
         if name not in points or not points[name].writable:
@@ -336,6 +366,21 @@ def put_together(path: Path, file: DaemonFile, site: Site, register_map: Registe
         sensor_rules=sensor_rules(register_map, file),
         setpoints=setpoints,
     )
+
+
+def _check_exchange(path: Path, file: DaemonFile) -> None:
+    """Raise ConfigurationError for an address that is none, or a server whose key is not pinned."""
+    if file.exchange is None:
+        return
+    try:
+        address = parse_address(file.exchange, path.parent)
+    except IgrowError as error:
+        raise ConfigurationError(f"{place(path, 'exchange')}: {error}") from None
+    if address.scheme == "sftp" and file.transfer.known_hosts is None:
+        raise ConfigurationError(
+            f"{place(path, 'exchange')}: the server's key must be pinned: write what `ssh-keyscan {address.host}` "
+            "prints into a file, compare the fingerprint with its owner's, and name the file in `transfer: known_hosts`"
+        )
 
 
 def _check_clock(path: Path, cycle: CycleSettings, register_map: RegisterMap) -> None:

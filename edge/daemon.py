@@ -252,7 +252,8 @@ def _refuse_what_needs_a_restart(old: Configuration, new: Configuration) -> None
     for what, before, after in (
         ("the site's name", old.site.name, new.site.name),
         ("state", old.state_folder, new.state_folder),
-        ("exchange", old.exchange_folder, new.exchange_folder),
+        ("exchange", old.exchange, new.exchange),
+        ("transfer", old.file.transfer, new.file.transfer),
         ("status.port", old.file.status.port, new.file.status.port),
         ("cycle.clock", old.file.cycle.clock, new.file.cycle.clock),
     ):

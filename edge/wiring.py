@@ -14,7 +14,8 @@ from igrow.edge.climate_alarms import ClimateAlarms, usual_climate_alarms
 from igrow.edge.clock import Clock, PlcClock, SystemClock
 from igrow.edge.configuration import ClockSource, Configuration
 from igrow.edge.cycle import ControlCycle
-from igrow.edge.exchange import FolderExchange
+from igrow.edge.exchange import ExchangeService
+from igrow.edge.exchange.service import TransferRules
 from igrow.edge.guard import GuardedWriter, GuardState, Readback
 from igrow.edge.guard.core import with_earlier_writes
 from igrow.edge.holds import HoldFile
@@ -90,8 +91,7 @@ def open_services(configuration: Configuration) -> Services:
     simulated = file.cycle.clock is not ClockSource.SYSTEM
     limits = StoreLimits(survive_power_cut=not simulated, batch_seconds=3600.0 if simulated else 60.0)
     store = SqliteStore(configuration.store_folder, limits)
-    folder = configuration.exchange_folder
-    exchange = None if folder is None else FolderExchange(folder, site.name, store)
+    exchange = _exchange(configuration, store)
     source = None
     if exchange is not None and file.updates.enabled and configuration.trusted_root is not None:
         source = SignedSource(exchange.bundles, state / "updates" / "trust", configuration.trusted_root)
@@ -115,6 +115,27 @@ def open_services(configuration: Configuration) -> Services:
     late_after = max(60.0, 3.0 * file.cycle.interval.total_seconds())
     status = StatusServer(file.status.port, state / STATUS_FILE, zone=configuration.zone, late_after=late_after)
     return Services(store, planning, updates, exchange, status)
+
+
+def _exchange(configuration: Configuration, store: SqliteStore) -> ExchangeService | None:
+    if configuration.exchange is None:
+        return None
+    settings, hosts, identity = configuration.file.transfer, configuration.known_hosts, configuration.identity
+    rules = TransferRules(
+        every=settings.every.total_seconds(),
+        period=int(settings.segment.total_seconds()),
+        budget=settings.budget * 10**6,
+        known_hosts=None if hosts is None else str(hosts),
+        identity=None if identity is None else str(identity),
+    )
+    return ExchangeService(
+        str(configuration.exchange),
+        configuration.state_folder / "exchange",
+        configuration.site.name,
+        store,
+        igrow_version=importlib.metadata.version("igrow"),
+        rules=rules,
+    )
 
 
 def build_control(

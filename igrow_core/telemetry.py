@@ -18,6 +18,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -172,7 +173,7 @@ def read_csv(path: str | os.PathLike[str]) -> Telemetry:
     for name in header[1:]:
         if name not in QUANTITIES:
             raise TelemetryError(f"{path}:1: column {name} is no known quantity{_nearest(name, QUANTITIES)}")
-    time = _parse_times(path, cells[0], lines)
+    time = parse_times(path, cells[0], lines)
     return from_rows(
         time,
         {name: parse_numbers(path, name, column, lines) for name, column in zip(header[1:], cells[1:], strict=True)},
@@ -185,12 +186,17 @@ def write_csv(path: str | os.PathLike[str], telemetry: Telemetry) -> None:
     for name in telemetry.columns:
         if name not in QUANTITIES:
             raise TelemetryError(f"column {name} is no known quantity{_nearest(name, QUANTITIES)}")
-    texts = [np.char.add(np.datetime_as_string(telemetry.time, unit="s"), "Z").tolist()]
-    texts += [["" if math.isnan(value) else f"{value:.7g}" for value in c.tolist()] for c in telemetry.columns.values()]
-    body = "\n".join([",".join(["time", *telemetry.columns]), *map(",".join, zip(*texts, strict=True)), ""]).encode()
+    body = format_csv(telemetry).encode()
     # Without a time stamp inside, equal telemetry gives an equal file.
     data = gzip.compress(body, mtime=0) if path.suffix == ".gz" else body
     write_whole(path, data)
+
+
+def format_csv(telemetry: Telemetry) -> str:
+    """Return the table as CSV; values have 7 digits."""
+    texts = [np.char.add(np.datetime_as_string(telemetry.time, unit="s"), "Z").tolist()]
+    texts += [["" if math.isnan(value) else f"{value:.7g}" for value in c.tolist()] for c in telemetry.columns.values()]
+    return "\n".join([",".join(["time", *telemetry.columns]), *map(",".join, zip(*texts, strict=True)), ""])
 
 
 def read_cells(path: Path, delimiter: str = ",") -> tuple[list[str], list[Sequence[str]], list[int]]:
@@ -200,14 +206,30 @@ def read_cells(path: Path, delimiter: str = ",") -> tuple[list[str], list[Sequen
     """
     try:
         data = path.read_bytes()
-        text = (gzip.decompress(data) if path.suffix == ".gz" else data).decode("utf-8-sig")
+        data = gzip.decompress(data) if path.suffix == ".gz" else data
     except OSError as error:
         raise TelemetryError(f"{path}: cannot be read: {error.strerror or 'not a whole gzip file'}") from None
     except (EOFError, zlib.error):
         raise TelemetryError(f"{path}: the gzip file ends too early or is damaged") from None
+    return parse_cells(data, path, delimiter)
+
+
+def parse_cells(
+    data: bytes, path: str | Path, delimiter: str = ","
+) -> tuple[list[str], list[Sequence[str]], list[int]]:
+    """Return the header, the cells by column and the line number of each row of CSV; `path` stands in errors."""
+    try:
+        text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise TelemetryError(f"{path}: is not UTF-8 text: save it as CSV in UTF-8") from None
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
+    try:
+        return _cells(reader, path)
+    except csv.Error as error:
+        raise TelemetryError(f"{path}:{reader.line_num}: no CSV: {error}") from None
+
+
+def _cells(reader: Any, path: str | Path) -> tuple[list[str], list[Sequence[str]], list[int]]:
     header = [name.strip() for name in next(reader, [])]
     while header and not header[-1]:
         header.pop()  # some programs end each line with delimiters
@@ -231,7 +253,7 @@ def read_cells(path: Path, delimiter: str = ",") -> tuple[list[str], list[Sequen
 
 
 def parse_numbers(
-    path: Path, name: str, cells: Sequence[str], lines: Sequence[int], missing: frozenset[str] = frozenset()
+    path: str | Path, name: str, cells: Sequence[str], lines: Sequence[int], missing: frozenset[str] = frozenset()
 ) -> Values:
     """Return one column of cells as float64; empty cells, `nan` and the texts in `missing` become NaN."""
     try:
@@ -251,7 +273,8 @@ def parse_numbers(
     return values
 
 
-def _parse_times(path: Path, cells: Sequence[str], lines: Sequence[int]) -> Times:
+def parse_times(path: str | Path, cells: Sequence[str], lines: Sequence[int]) -> Times:
+    """Return a column of times; raises TelemetryError with the line of one that is none."""
     form = "a time needs the form 2020-01-31T12:05:00Z"
     for cell, line in zip(cells, lines, strict=True):
         if not cell.endswith("Z"):

@@ -77,7 +77,7 @@ def describe(configuration: Configuration) -> Iterator[str]:
             f"  note      status.port is {file.status.port}: the systemd unit allows {STATUS_PORT} only; "
             "see docs/installation.md for the drop-in"
         )
-    exchange = configuration.exchange_folder
+    exchange = configuration.exchange
     yield f"state       {configuration.state_folder}; exchange: {exchange if exchange else 'none'}"
     yield f"planning    {_planning(configuration)}"
     if file.updates.enabled and configuration.trusted_root is None:

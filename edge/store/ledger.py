@@ -266,6 +266,19 @@ def read_newest(path: Path, category: str, after: int = 0) -> list[Record]:
         return list(_newest(connection, category, after))
 
 
+def read_after(path: Path, after: int, most: int) -> list[Record]:
+    """Read the first `most` records with a sequence number above `after`, oldest first; raises sqlite3.Error."""
+    query = "SELECT sequence, category, time, body FROM records WHERE sequence > ? ORDER BY sequence LIMIT ?"
+    with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=5.0)) as connection:
+        return [_record(line) for line in connection.execute(query, (after, most))]
+
+
+def read_newest_sequence(path: Path) -> int:
+    """Return the newest record's sequence number, 0 where there is none; raises sqlite3.Error."""
+    with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=5.0)) as connection:
+        return int(connection.execute("SELECT max(sequence) FROM records").fetchone()[0] or 0)
+
+
 def _newest(connection: sqlite3.Connection, category: str, after: int = 0) -> Iterator[Record]:
     query = (
         "SELECT sequence, category, time, body FROM records WHERE category = ? AND sequence > ? ORDER BY sequence DESC"

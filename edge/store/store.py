@@ -5,9 +5,10 @@ from __future__ import annotations
 import shutil
 import sqlite3
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import TypeVar
 
 from igrow.core.errors import IgrowError
 from igrow.core.telemetry import Telemetry, concatenate
@@ -15,11 +16,12 @@ from igrow.edge.image import Value
 from igrow.edge.ports import AlarmRecord, WriteRecord
 from igrow.edge.sentences import log_event
 from igrow.edge.store.database import Synchronous, describe
-from igrow.edge.store.ledger import NAMES, RESERVE_BYTES, Ledger, Record, read_newest
+from igrow.edge.store.ledger import NAMES, RESERVE_BYTES, Ledger, Record, read_after, read_newest, read_newest_sequence
 from igrow.edge.store.packing import Row, pack
-from igrow.edge.store.telemetry_file import TelemetryFile, read_file, to_telemetry
+from igrow.edge.store.telemetry_file import TelemetryFile, read_file, read_first_time, to_telemetry
 
 TELEMETRY_FILE = "telemetry.db"
+T = TypeVar("T")
 
 
 class StoreError(IgrowError):
@@ -184,15 +186,45 @@ def read_telemetry(folder: Path, start: float, end: float) -> Telemetry:
         raise StoreError(f"{path}: the log cannot be read: {describe(error)}") from None
 
 
+def first_row_time(folder: Path, start: float) -> int | None:
+    """Return the whole second of the first committed row at or after `start`, None where there is none.
+
+    Raises StoreError where the file cannot be read.
+    """
+    path = folder / TELEMETRY_FILE
+    try:
+        return read_first_time(path, round(start * 1000))
+    except sqlite3.Error as error:
+        raise StoreError(f"{path}: the log cannot be read: {describe(error)}") from None
+
+
 def read_records(folder: Path, category: str, *, after: int = 0) -> list[Record]:
     """Read one category of the ledger of a store that a daemon may be writing, newest first.
 
     Only records with a sequence number above `after`. Raises StoreError where neither file can be read.
     """
+    return _from_either(folder, lambda path: read_newest(path, category, after))
+
+
+def read_records_after(folder: Path, after: int, most: int) -> list[Record]:
+    """Read the first `most` records of all categories with a sequence number above `after`, oldest first.
+
+    Raises StoreError where neither file can be read.
+    """
+    return _from_either(folder, lambda path: read_after(path, after, most))
+
+
+def newest_sequence(folder: Path) -> int:
+    """Return the newest record's sequence number, 0 where there is none; raises StoreError."""
+    return _from_either(folder, read_newest_sequence)
+
+
+def _from_either(folder: Path, read: Callable[[Path], T]) -> T:
+    """Return what is read from the first of the ledger's twins that can be read."""
     problem = ""
     for name in NAMES:
         try:
-            return read_newest(folder / name, category, after)
+            return read(folder / name)
         except sqlite3.Error as error:
             problem = f"{folder / name}: the ledger cannot be read: {describe(error)}"
     raise StoreError(problem)

@@ -154,6 +154,15 @@ def read_file(path: Path, start: int, end: int) -> Telemetry:
         return _read(connection, start, end) if made else concatenate([])
 
 
+def read_first_time(path: Path, start: int) -> int | None:
+    """Return the whole second of the first row at or after `start` milliseconds, or None; raises sqlite3.Error."""
+    with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=5.0)) as connection:
+        made = connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'rows'").fetchone()
+        query = "SELECT min(milliseconds) FROM rows WHERE milliseconds >= ?"
+        found = connection.execute(query, (start,)).fetchone()[0] if made else None
+    return None if found is None else int(found) // 1000
+
+
 def salvage(damaged: Path, connection: sqlite3.Connection, *, tries: int = 4096) -> int:
     """Copy every readable row of a damaged file into an open one; returns their number.
 

@@ -1,0 +1,194 @@
+"""The courier: one round between the gateway's own disk and the exchange, as a process that may be ended at any time.
+
+`python -m igrow.edge.exchange.courier` reads its order as JSON from standard input. Beside itself it needs nothing
+of the daemon: it reads the log as a second process, and answers in `status.json`.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from igrow.core.errors import IgrowError
+from igrow.core.exchange import Place, SegmentName, read_receipt
+from igrow.core.exchange.documents import LARGEST_DOCUMENT
+from igrow.core.whole_files import write_whole
+from igrow.edge.exchange.outbox import REPORTS, Outbox
+from igrow.edge.exchange.places import open_place
+from igrow.edge.exchange.sealing import seal_due
+
+STATUS_FILE = "status.json"
+LARGEST_BUNDLE = 512 * 2**20
+MOST_FILES = 1000
+"""Of one folder of signed files; a repository keeps some thirty."""
+
+
+@dataclass(frozen=True)
+class Order:
+    """What a round is to do."""
+
+    folder: str
+    """The exchange's part of the gateway's state: outbox, copies of the bundles, status."""
+    store: str
+    """The folder of log and ledger."""
+    site: str
+    url: str
+    igrow_version: str
+    time: float | None
+    """The plant's time, seconds since 1970 UTC; None seals nothing."""
+    period: int = 86_400
+    """Seconds that a segment covers."""
+    budget: int = 256 * 2**20
+    """Bytes that the outbox may take."""
+    partly: bool = False
+    """Seal also what there is of a period that is not over."""
+    known_hosts: str | None = None
+    identity: str | None = None
+    deadline: float = 600.0
+    """Seconds after which the round is ended, wherever it is."""
+
+
+@dataclass
+class RoundStatus:
+    """How the round ended, for the daemon and for people."""
+
+    ended: float = 0.0
+    """Wall clock, seconds since 1970 UTC."""
+    problem: str = ""
+    sealed: int = 0
+    sent: int = 0
+    sent_bytes: int = 0
+    receipted: int = 0
+    given_up: int = 0
+    waiting: int = 0
+    """Segments that no receipt names yet."""
+    waiting_bytes: int = 0
+
+
+def run_round(order: Order, place: Place | None = None) -> RoundStatus:
+    """Make one round and leave its status; never raises for a disk, a server or a file that fails."""
+    folder, status = Path(order.folder), RoundStatus()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with _alone(folder):
+            _round(order, folder, place, status)
+    except (IgrowError, OSError) as error:
+        text = error if isinstance(error, IgrowError) else error.strerror or str(error)
+        status.problem = f"exchange {order.url}: {text}"
+    status.ended = time.time()
+    try:
+        write_whole(folder / STATUS_FILE, json.dumps(asdict(status)).encode())
+    except OSError as error:
+        status.problem = status.problem or f"exchange: {folder}: {error.strerror}"
+    return status
+
+
+def _round(order: Order, folder: Path, place: Place | None, status: RoundStatus) -> None:
+    outbox = Outbox(folder, order.site, order.igrow_version)
+    try:
+        if order.time is not None:
+            status.sealed = seal_due(outbox, Path(order.store), order.time, order.period, partly=order.partly)
+        place = place or open_place(order.url, known_hosts=order.known_hosts, identity=order.identity)
+        _receive(outbox, place, order.site, status)
+        _send(outbox, place, order.site, status)
+        _send_reports(folder / REPORTS, place, order.site)
+        mirror(place, f"{order.site}/bundles", folder / "bundles")
+    finally:
+        status.given_up = outbox.keep_within(order.budget)
+        waiting = outbox.segments()
+        status.waiting = len(waiting)
+        status.waiting_bytes = sum(outbox.path(name).stat().st_size for name in waiting)
+
+
+def _receive(outbox: Outbox, place: Place, site: str, status: RoundStatus) -> None:
+    """Take the receipts of the chains that segments wait of, and of the present one."""
+    for chain in {outbox.state.chain, *(name.chain for name in outbox.segments())}:
+        data = place.get(f"{site}/receipts/{chain}.json", LARGEST_DOCUMENT)
+        if data is not None:
+            try:
+                status.receipted += outbox.take(read_receipt(data, chain))
+            except IgrowError as error:
+                # What cannot be read is no receipt: everything is kept, and sent.
+                status.problem = f"exchange: {error}"
+
+
+def _send(outbox: Outbox, place: Place, site: str, status: RoundStatus) -> None:
+    """Send the segments that are not there."""
+    waiting = outbox.segments()
+    if not waiting:
+        return
+    there = {SegmentName.parse(entry.name) for entry in place.entries(f"{site}/segments")}
+    for name in waiting:
+        if name not in there:
+            content = outbox.path(name).read_bytes()
+            place.put(f"{site}/segments/{name}", content)
+            status.sent += 1
+            status.sent_bytes += len(content)
+
+
+def _send_reports(reports: Path, place: Place, site: str) -> None:
+    for path in sorted(reports.glob("*.json")):
+        place.put(f"{site}/reports/{path.name}", path.read_bytes())
+        path.unlink()
+
+
+def mirror(place: Place, source: str, target: Path) -> int:
+    """Copy the signed bundles to the gateway's own disk; returns how many files came anew.
+
+    They are checked there, by their signatures (`igrow.edge.updates`). The timestamp comes last, so that the copy is at
+    every moment one that the publisher has signed.
+    """
+    stamp = place.get(f"{source}/metadata/timestamp.json", LARGEST_DOCUMENT)
+    file = target / "metadata" / "timestamp.json"
+    if stamp is None or (file.exists() and file.read_bytes() == stamp):
+        return 0
+    came = 0
+    for kind in ("targets", "metadata"):
+        folder = target / kind
+        folder.mkdir(parents=True, exist_ok=True)
+        entries = [entry for entry in place.entries(f"{source}/{kind}") if entry.name != "timestamp.json"][-MOST_FILES:]
+        for entry in entries:
+            copy = folder / entry.name
+            if not copy.exists() or copy.stat().st_size != entry.size or kind == "metadata":
+                content = place.get(f"{source}/{kind}/{entry.name}", LARGEST_BUNDLE)
+                if content is not None and not (copy.exists() and copy.read_bytes() == content):
+                    write_whole(copy, content)
+                    came += 1
+        names = {entry.name for entry in entries}
+        for path in folder.iterdir():
+            if path.name not in names and path != file:
+                path.unlink(missing_ok=True)
+    write_whole(file, stamp)
+    return came + 1
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    with (folder / "lock").open("w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise IgrowError("an earlier round hangs still") from None
+        yield
+
+
+def main() -> int:
+    """Read the order, make the round."""
+    order = Order(**json.loads(sys.stdin.read()))
+    # With all that it has started, such as `sftp`: it leads a session of its own.
+    signal.signal(signal.SIGALRM, lambda *_: os.killpg(0, signal.SIGKILL))
+    signal.setitimer(signal.ITIMER_REAL, order.deadline)
+    os.nice(10)
+    return 1 if run_round(order).problem else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

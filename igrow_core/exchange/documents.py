@@ -1,0 +1,31 @@
+"""JSON from elsewhere, read with mistrust: nothing in such a file may end the program that reads it."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from igrow.core.errors import IgrowError
+
+LARGEST_DOCUMENT = 4 * 2**20
+"""Bytes; receipts, seals and reports are a thousand times smaller."""
+
+
+def parse_object(data: bytes, what: str, *, largest: int = LARGEST_DOCUMENT) -> dict[str, Any]:
+    """Return the JSON object in `data`; raises IgrowError that begins with `what` for anything else."""
+    if len(data) > largest:
+        raise IgrowError(f"{what}: {len(data)} bytes long, at most {largest} are right")
+    try:
+        document = json.loads(data)
+    except RecursionError:
+        raise IgrowError(f"{what}: nested too deeply for anything that igrow writes") from None
+    except ValueError as error:
+        raise IgrowError(f"{what}: not JSON: {str(error).splitlines()[0]}") from None
+    if not isinstance(document, dict):
+        raise IgrowError(f"{what}: a {type(document).__name__} where an object with names is needed")
+    return document
+
+
+def parse_lines(data: bytes, what: str) -> list[dict[str, Any]]:
+    """Return the JSON objects in `data`, one a line; raises IgrowError with the line that is none."""
+    return [parse_object(line, f"{what}:{number}") for number, line in enumerate(data.splitlines(), 1) if line.strip()]
