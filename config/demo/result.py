@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from datetime import UTC, date, datetime
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator.hindcast import HindcastPredictor
 from igrow.core.site import Site, load_site
 from igrow.core.telemetry import Telemetry, read_csv, to_grid
-from igrow.trainer.publishing import read_exchange
+from igrow.trainer.service.archive import Archive
 
 PREDICTED = ("air_temperature", "air_humidity", "air_co2")
 DAY = 288
@@ -30,7 +31,7 @@ DAY = 288
 def summarise(out: Path, effect: str, days_before: int) -> str:
     """Write result.json and demo.png into `out`, and return the table for the terminal."""
     site = load_site(out / "site.yaml")
-    exchange = read_exchange(out / "exchange", "demo")
+    exchange = Archive(out / "trainer/archive").read("demo", date(2000, 1, 1), datetime.now(UTC).date())
     log = to_grid(exchange.telemetry, 300)
     first = read_bundle(out / "first-bundle")
     corrected = read_bundle(out / "diagnosis/bundle")

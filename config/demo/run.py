@@ -9,6 +9,7 @@ and one without the effect, in which nothing may be found. Every step is a comma
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import shutil
 import signal
@@ -19,6 +20,8 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+
+import numpy as np
 
 from igrow.core.quantities import WEATHER
 from igrow.core.telemetry import write_csv
@@ -34,6 +37,8 @@ from result import summarise  # noqa: E402  # stands beside this file
 WEEKS_BEFORE, DAYS_AFTER, SHADOW_DAYS = 4, 14, 2
 EFFECT = "wind_infiltration=0.12"
 NOTHING, NAMED = 0, 10
+LOG = "trainer/archive/telemetry/site=demo"
+"""Where the trainer has collected the log."""
 
 
 class DemoError(Exception):
@@ -91,7 +96,12 @@ class Demo:
     @property
     def plant_days(self) -> int:
         """Whole days of plant time that the daemon has handed over."""
-        return len(list((self.out / "exchange/telemetry/demo").glob("*.csv.gz")))
+        try:
+            through = json.loads((self.out / "state/exchange/chain.json").read_text())["through"]
+        except (OSError, ValueError):
+            return 0
+        # A day's last row is of some minutes before its end.
+        return max(0, int(through + 3600 - np.datetime64(self.start, "s").astype(int)) // 86_400)
 
     def wait_for_day(self, day: int, what: str) -> None:
         """Show the plant's days pass until so many have been handed over."""
@@ -154,14 +164,15 @@ def run(demo: Demo) -> None:
     }
     for process in beside.values():
         os.setpriority(os.PRIO_PROCESS, process.pid, 15)
+    collect = ["igrow-trainer", "collect", "demo", "--exchange", "exchange", "--state", "trainer"]
     demo.wait_for_day(days_before, "controlled over Modbus with the first bundle")
 
     # In lock step the plant's time stands still while the daemon does: the trainer's minutes cost no plant time.
     daemon.send_signal(signal.SIGSTOP)
-    shutil.copytree(out / "exchange/telemetry/demo", out / "log")
+    demo.run("collect", collect)
     verdict = demo.run(
         "diagnose",
-        ["igrow-trainer", "diagnose", "log", "--bundle", "first-bundle", "--site", "site.yaml",
+        ["igrow-trainer", "diagnose", LOG, "--bundle", "first-bundle", "--site", "site.yaml",
          "--out", "diagnosis"],
         (NOTHING, NAMED, 11, 12, 13),
     )  # fmt: skip
@@ -175,6 +186,7 @@ def run(demo: Demo) -> None:
         demo.running[name].send_signal(signal.SIGTERM)
         demo.finish(name, demo.running[name])
 
+    demo.run("collect", collect)
     for name, process in beside.items():
         demo.finish(name, process)
     demo.say("a second greenhouse, with nothing missing")
@@ -198,8 +210,8 @@ def prepare(demo: Demo) -> None:
     shutil.copy(HERE / "daemon.yaml", out)
     template = (ROOT / "config/register-maps/virtual-plc.yaml").read_text()
     (out / "register-map.yaml").write_text(template.replace("port: 5020", f"port: {free_port()}"))
-    demo.run("keys", ["igrow-trainer", "publish", "--init", "--keys", "keys", "--exchange", "exchange"])
-    shutil.copy(out / "exchange/bundles/metadata/1.root.json", out / "root.json")
+    demo.run("keys", ["igrow-trainer", "keys", "create", "keys"])
+    shutil.copy(out / "keys/1.root.json", out / "root.json")
     # The demo's greenhouse is the one that the built-in bundle was calibrated on.
     demo.run(
         "export",

@@ -14,12 +14,13 @@ exchange once it holds it safely. So no listing grows with history, whatever is 
 """
 
 from igrow.core.exchange.errors import DamagedError, ExchangeError, SegmentError
-from igrow.core.exchange.place import Entry, FolderPlace, Place
+from igrow.core.exchange.place import Below, Entry, FolderPlace, Place
 from igrow.core.exchange.receipt import Receipt, read_receipt
 from igrow.core.exchange.seal import Seal, SegmentName
 from igrow.core.exchange.segment import Segment, open_segment, pack_segment
 
 __all__ = [
+    "Below",
     "DamagedError",
     "Entry",
     "ExchangeError",

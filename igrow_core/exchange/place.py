@@ -43,6 +43,9 @@ class FolderPlace:
     def __init__(self, root: Path) -> None:
         self.root = root
 
+    def __str__(self) -> str:
+        return str(self.root)
+
     def entries(self, folder: str) -> list[Entry]:
         """Return the files directly in `folder`, by name."""
         try:
@@ -91,3 +94,30 @@ class FolderPlace:
 
     def _away(self, path: str, error: OSError) -> ExchangeError:
         return ExchangeError(f"{self.root / path}: {error.strerror or error}")
+
+
+class Below:
+    """A folder of a place, as a place of its own."""
+
+    def __init__(self, place: Place, folder: str) -> None:
+        self._place = place
+        self._folder = folder
+
+    def __str__(self) -> str:
+        return f"{self._place}/{self._folder}"
+
+    def entries(self, folder: str) -> list[Entry]:
+        """Return the files directly in `folder`, by name."""
+        return self._place.entries(f"{self._folder}/{folder}")
+
+    def get(self, path: str, largest: int) -> bytes | None:
+        """Return a file's content, or None."""
+        return self._place.get(f"{self._folder}/{path}", largest)
+
+    def put(self, path: str, content: bytes) -> None:
+        """Write a file in the place of an earlier one."""
+        self._place.put(f"{self._folder}/{path}", content)
+
+    def delete(self, path: str) -> None:
+        """Delete a file."""
+        self._place.delete(f"{self._folder}/{path}")

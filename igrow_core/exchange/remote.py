@@ -23,6 +23,9 @@ class RemotePlace:
         self._name = name
         self._renames = renames
 
+    def __str__(self) -> str:
+        return self._name
+
     def entries(self, folder: str) -> list[Entry]:
         """Return the files directly in `folder`, by name."""
         try:

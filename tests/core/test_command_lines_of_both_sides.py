@@ -47,7 +47,7 @@ def test_a_fault_of_ours_is_not_hidden(monkeypatch):
 def test_an_unreadable_file_at_the_trainer_is_one_line_and_exit_code_2(tmp_path, capsys):
     keys = tmp_path / "keys"
     keys.write_text("a file where a folder is needed")
-    code = igrow.trainer.cli.main(["publish", "--init", "--keys", str(keys), "--exchange", str(tmp_path / "exchange")])
+    code = igrow.trainer.cli.main(["keys", "create", str(keys)])
     printed = capsys.readouterr()
     assert (code, printed.out) == (2, "")
     assert printed.err.count("\n") == 1

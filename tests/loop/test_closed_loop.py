@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from igrow.core.telemetry import concatenate, read_csv
+from igrow.trainer.readers.open_log import open_log
 
 ROOT = Path(__file__).resolve().parents[2]
 BIN = Path(sys.executable).parent
@@ -73,10 +73,10 @@ class Site:
             time.sleep(0.1)
 
     def days(self) -> list[Path]:
-        return sorted((self.folder / "exchange/telemetry/demo").glob("*.csv.gz"))
+        return sorted((self.folder / "exchange/demo/segments").glob("*.zip"))
 
     def reports(self, verdict: str) -> list[dict[str, object]]:
-        paths = sorted((self.folder / "exchange/reports/demo").glob(f"*{verdict}.json"))
+        paths = sorted((self.folder / "exchange/demo/reports").glob(f"*{verdict}.json"))
         return [json.loads(path.read_text()) for path in paths]
 
 
@@ -84,8 +84,8 @@ class Site:
 def site(tmp_path: Path) -> Iterator[Site]:
     """A site whose keys are made and whose first bundle is exported."""
     made = Site(tmp_path)
-    made.run("igrow-trainer", "publish", "--init", "--keys", "keys", "--exchange", "exchange")
-    shutil.copy(tmp_path / "exchange/bundles/metadata/1.root.json", tmp_path / "root.json")
+    made.run("igrow-trainer", "keys", "create", "keys")
+    shutil.copy(tmp_path / "keys/1.root.json", tmp_path / "root.json")
     made.run("igrow-trainer", "export", "--site", "site.yaml", "--out", "first-bundle")
     yield made
     for process in made.running:
@@ -114,7 +114,8 @@ def test_a_published_bundle_is_shadowed_and_adopted_while_the_daemon_controls(si
     assert daemon.wait(60) == 0
     assert "the safe setpoints were written" in site.log("run")
 
-    day = concatenate([read_csv(path) for path in site.days()])
+    site.run("igrow-trainer", "collect", "demo", "--exchange", "exchange", "--state", "trainer")
+    day = open_log(site.folder / "trainer/archive/telemetry/site=demo").telemetry
     commanded = day["heating_setpoint"]
     assert commanded.min() >= 12.0
     assert commanded.max() <= 28.0

@@ -26,7 +26,8 @@ class World:
         self.repository = folder / "bundles"
         create_keys(self.keys)
         self.root = folder / "root.json"
-        shutil.copy(initialise(self.repository, self.keys), self.root)
+        initialise(self.repository, self.keys)
+        shutil.copy(self.keys / "1.root.json", self.root)
         self.source = SignedSource(self.repository, folder / "gateway", self.root)
         self.count = 0
 
@@ -263,12 +264,12 @@ def test_keys_and_repositories_are_never_overwritten(world: World) -> None:
         create_keys(world.keys)
     with pytest.raises(PublishingError, match="exists already"):
         initialise(world.repository, world.keys)
-    assert all(path.stat().st_mode & 0o077 == 0 for path in world.keys.iterdir())
+    assert all(path.stat().st_mode & 0o077 == 0 for path in world.keys.glob("*.pem"))
 
 
 def test_refreshing_needs_neither_the_root_nor_the_targets_key(world: World) -> None:
     world.publish()
-    (world.keys / "root.pem").unlink()
+    (world.keys / "root-1.pem").unlink()
     (world.keys / "targets.pem").unlink()
     refresh(world.repository, world.keys)
     assert world.source.fetch("demo", ()) is not None

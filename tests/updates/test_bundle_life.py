@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
 from tiny_bundle import write_tiny_bundle
 from update_helpers import START, Gateway
 
+from igrow.core.exchange import FolderPlace
+from igrow.edge.exchange import run_round
 from igrow.edge.updates import UpdateRules
-from igrow.trainer.publishing import publish, read_exchange
+from igrow.trainer.publishing import publish
+from igrow.trainer.service.archive import Archive
+from igrow.trainer.service.collecting import collect
 
 RULES = UpdateRules(check_hours=1.0, shadow_hours=30.0, watch_hours=48.0, live_error_hours=6.0)
 
@@ -61,7 +67,7 @@ def test_a_better_bundle_is_adopted_after_its_shadow_run_and_kept_after_its_prob
 
 
 def read_exchange_reports(gateway: Gateway) -> list[dict]:
-    folder = gateway.exchange_root / "reports" / "demo"
+    folder = gateway.folder / "transfer" / "reports"
     return [json.loads(path.read_text()) for path in sorted(folder.glob("*.json"))]
 
 
@@ -174,12 +180,17 @@ def test_a_refusal_is_recorded_once_and_not_at_every_check(gateway: Gateway) -> 
 
 
 def test_the_trainer_reads_what_the_gateway_left(gateway: Gateway) -> None:
-    for _ in range(60):
-        gateway.run(1)
-        gateway.exchange.tick(gateway.now)
-    gateway.exchange.close()
-    log = read_exchange(gateway.exchange_root, "demo")
+    gateway.run(60)
+    gateway.exchange.leave_report(gateway.now, "a-adopted", {"verdict": "adopted", "identity": "a"})
+    gateway.store.flush()
+    order = dataclasses.replace(gateway.exchange._order, time=gateway.now, partly=True)
+    assert run_round(order).problem == ""
+    archive = Archive(gateway.folder / "archive")
+    collect(FolderPlace(gateway.exchange_root), "demo", archive, datetime.fromtimestamp(gateway.now, UTC))
+    first = datetime.fromtimestamp(START, UTC).date()
+    log = archive.read("demo", first, first + timedelta(days=5))
     assert len(log.telemetry) == 360
     assert log.telemetry.time[0].astype("int64") == START
     assert log.events[0]["kind"] == "bundle_installed"
-    assert log.skipped == ()
+    assert [report["verdict"] for report in log.reports] == ["adopted"]
+    assert log.notes == ()

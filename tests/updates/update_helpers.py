@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from igrow.core.bundle import Bundle, open_session, run_graph
-from igrow.edge.exchange import FolderExchange
+from igrow.edge.exchange import ExchangeService
 from igrow.edge.image import Quality, Value
 from igrow.edge.store import SqliteStore, StoreLimits
 from igrow.edge.updates import BundleUpdates, SignedSource, UpdateRules
@@ -44,17 +44,19 @@ class Gateway:
     def __post_init__(self) -> None:
         self.exchange_root = self.folder / "exchange"
         self.keys = self.folder / "keys"
-        self.repository = self.exchange_root / "bundles"
+        self.repository = self.exchange_root / "demo" / "bundles"
         if not self.repository.exists():
             create_keys(self.keys)
-            self.trusted_root = initialise(self.repository, self.keys)
-        self.trusted_root = self.repository / "metadata" / "1.root.json"
+            initialise(self.repository, self.keys)
+        self.trusted_root = self.keys / "1.root.json"
         self.start()
 
     def start(self, first_bundle: Path | None = None) -> None:
         """Start the services, as after a restart of the daemon."""
         self.store = SqliteStore(self.folder / "store", StoreLimits(survive_power_cut=False))
-        self.exchange = FolderExchange(self.exchange_root, "demo", self.store)
+        self.exchange = ExchangeService(
+            str(self.exchange_root), self.folder / "transfer", "demo", self.store, igrow_version="0.1.0"
+        )
         self.updates = BundleUpdates(
             self.folder / "updates",
             site="demo",

@@ -1,15 +1,18 @@
-"""The signed repository of bundles (The Update Framework), written so that a reader always sees a whole one.
+"""The signed repository of a site's bundles (The Update Framework), written so that a reader always sees a whole one.
 
-Each site has one target, `<site>.tar`, whose content changes with each publication; versions of the metadata
-only grow, which is what protects gateways from being given an older one. Files are written in the order
-target, targets, snapshot, timestamp: whoever reads in between still sees the state before.
+It lies in the exchange, `<site>/bundles`, so that a site sees its own bundle and no other's, and what it fetches does
+not grow with the number of sites. There is one target, `<site>.tar`, whose content changes with each publication;
+versions of the metadata only grow, which is what protects gateways from being given an older one. Files are written in
+the order target, targets, snapshot, timestamp: whoever reads in between still sees the state before.
+
+Who can write to the exchange cannot make us sign for them: of what is read from there only version numbers are used,
+and for a refresh what our present key has signed.
 """
 
 from __future__ import annotations
 
 import io
 import tarfile
-from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -19,7 +22,6 @@ from tuf.api.exceptions import RepositoryError
 from tuf.api.metadata import (  # type: ignore[attr-defined]  # the documented place; it does not list them
     Metadata,
     MetaFile,
-    Root,
     Snapshot,
     TargetFile,
     Targets,
@@ -29,9 +31,12 @@ from tuf.api.serialization import DeserializationError
 from tuf.api.serialization.json import JSONSerializer
 
 from igrow.core.bundle import Bundle, read_bundle, self_test
-from igrow.core.whole_files import write_whole
-from igrow.trainer.publishing.keys import ROLES, PublishingError, load_signer
+from igrow.core.exchange import FolderPlace, Place
+from igrow.core.exchange.documents import LARGEST_DOCUMENT
+from igrow.trainer.publishing.keys import PublishingError, load_root, load_signer, root_versions
 
+KEPT_VERSIONS = 8
+"""Old versions of targets and snapshot that stay for gateways that are reading them."""
 _SERIALIZER = JSONSerializer(compact=False)
 
 
@@ -39,118 +44,151 @@ _SERIALIZER = JSONSerializer(compact=False)
 class Lifetimes:
     """How long signed metadata holds; a gateway that sees no newer ones then stops to accept updates."""
 
-    root: timedelta = timedelta(days=3650)
     targets: timedelta = timedelta(days=365)
     snapshot: timedelta = timedelta(days=60)
     timestamp: timedelta = timedelta(days=60)
 
 
 def initialise(
-    repository: Path, keys: Path, *, now: datetime | None = None, lifetimes: Lifetimes | None = None
-) -> Path:
-    """Create an empty signed repository; returns its `1.root.json`, which each gateway gets installed.
-
-    `now` is the time that lifetimes are counted from. Raises PublishingError where there is one already.
-    """
-    metadata = repository / "metadata"
-    path = metadata / "1.root.json"
-    if path.exists():
-        raise PublishingError(f"{path}: the repository exists already")
-    metadata.mkdir(parents=True, exist_ok=True)
-    (repository / "targets").mkdir(exist_ok=True)
+    repository: Place | Path, keys: Path, *, now: datetime | None = None, lifetimes: Lifetimes | None = None
+) -> None:
+    """Create an empty signed repository. Raises PublishingError where there is one already."""
+    place = _place(repository)
+    if place.get("metadata/timestamp.json", LARGEST_DOCUMENT) is not None:
+        raise PublishingError(f"{repository}: the repository exists already")
     now, lifetimes = now or datetime.now(UTC), lifetimes or Lifetimes()
-    root = Root(expires=_expiry(now, lifetimes.root))
-    for role in ROLES:
-        root.add_key(load_signer(keys, role).public_key, role)
-    _sign_and_write(Metadata(root), keys, "root", path)
-    _write_chain(repository, keys, Targets(expires=_expiry(now, lifetimes.targets)), None, now, lifetimes)
-    return path
+    _write_roots(place, keys)
+    _sign_and_write(
+        Metadata(Targets(expires=_expiry(now, lifetimes.targets))), place, keys, "targets", "1.targets.json"
+    )
+    _write_chain(place, keys, 1, now, lifetimes)
 
 
 def publish(
-    bundle: Path, repository: Path, keys: Path, *, now: datetime | None = None, lifetimes: Lifetimes | None = None
+    bundle: Path,
+    repository: Place | Path,
+    keys: Path,
+    *,
+    now: datetime | None = None,
+    lifetimes: Lifetimes | None = None,
 ) -> Bundle:
-    """Test, pack, sign and publish a bundle for the site that its manifest names.
+    """Test, pack, sign and publish a bundle for the site that its manifest names; a missing repository is made.
 
     Raises BundleError where the bundle fails its self-test and PublishingError where the repository cannot be
     read.
     """
     read = read_bundle(bundle)
     self_test(read)
-    site = read.manifest.site
+    place = _place(repository)
     now, lifetimes = now or datetime.now(UTC), lifetimes or Lifetimes()
-    targets: Targets = _load(repository, "targets")
+    if place.get("metadata/timestamp.json", LARGEST_DOCUMENT) is None:
+        initialise(place, keys, now=now, lifetimes=lifetimes)
+    _write_roots(place, keys)
     content = _pack(read)
-    name = f"{site}.tar"
+    name = f"{read.manifest.site}.tar"
     target = TargetFile.from_data(name, content)
     target.unrecognized_fields["custom"] = {"identity": read.identity, "label": read.label}
-    write_whole(repository / "targets" / f"{target.hashes['sha256']}.{name}", content)
-    targets.targets[name] = target
-    targets.version += 1
-    targets.expires = _expiry(now, lifetimes.targets)
-    _write_chain(repository, keys, targets, _load(repository, "snapshot"), now, lifetimes)
-    _forget_old_targets(repository, targets)
+    before = _named(place, keys)
+    place.put(f"targets/{target.hashes['sha256']}.{name}", content)
+    # Nothing of the targets before goes into these but their number: whoever wrote them, we sign what we publish.
+    version = _newest_version(place, "targets") + 1
+    targets = Targets(version, expires=_expiry(now, lifetimes.targets), targets={name: target})
+    _sign_and_write(Metadata(targets), place, keys, "targets", f"{version}.targets.json")
+    _write_chain(place, keys, version, now, lifetimes)
+    _forget_old(place, {f"{target.hashes['sha256']}.{name}", *before})
     return read
 
 
-def refresh(repository: Path, keys: Path, *, now: datetime | None = None, lifetimes: Lifetimes | None = None) -> None:
+def refresh(
+    repository: Place | Path, keys: Path, *, now: datetime | None = None, lifetimes: Lifetimes | None = None
+) -> None:
     """Sign snapshot and timestamp again with a new expiry; needs these two keys only.
 
-    Raises PublishingError.
+    Raises PublishingError where the present key did not sign the newest bundle: it must be published again.
     """
+    place = _place(repository)
     now, lifetimes = now or datetime.now(UTC), lifetimes or Lifetimes()
-    _write_chain(repository, keys, None, _load(repository, "snapshot"), now, lifetimes)
+    _write_roots(place, keys)
+    _write_chain(place, keys, _load_targets(place, keys).version, now, lifetimes)
 
 
-def _write_chain(
-    repository: Path,
-    keys: Path,
-    targets: Targets | None,
-    snapshot: Snapshot | None,
-    now: datetime,
-    lifetimes: Lifetimes,
-) -> None:
-    """Write targets (where given), then a snapshot that names it, then a timestamp that names the snapshot."""
-    metadata = repository / "metadata"
-    version = 1 if snapshot is None else snapshot.version + 1
-    meta: Mapping[str, MetaFile] = {} if snapshot is None else snapshot.meta
-    if targets is not None:
-        _sign_and_write(Metadata(targets), keys, "targets", metadata / f"{targets.version}.targets.json")
-        meta = {"targets.json": MetaFile(targets.version)}
-    fresh = Snapshot(version, expires=_expiry(now, lifetimes.snapshot), meta=dict(meta))
-    _sign_and_write(Metadata(fresh), keys, "snapshot", metadata / f"{version}.snapshot.json")
+def _write_roots(place: Place, keys: Path) -> None:
+    """Write the versions of the root metadata that the repository lacks."""
+    there = {entry.name for entry in place.entries("metadata")}
+    for version, path in sorted(root_versions(keys).items()):
+        if f"{version}.root.json" not in there:
+            place.put(f"metadata/{version}.root.json", path.read_bytes())
+
+
+def _write_chain(place: Place, keys: Path, targets: int, now: datetime, lifetimes: Lifetimes) -> None:
+    """Write a snapshot that names this version of targets, then a timestamp that names the snapshot."""
+    version = _newest_version(place, "snapshot") + 1
+    meta = {"targets.json": MetaFile(targets)}
+    snapshot = Snapshot(version, expires=_expiry(now, lifetimes.snapshot), meta=meta)
+    _sign_and_write(Metadata(snapshot), place, keys, "snapshot", f"{version}.snapshot.json")
     timestamp = Timestamp(version, expires=_expiry(now, lifetimes.timestamp), snapshot_meta=MetaFile(version))
-    _sign_and_write(Metadata(timestamp), keys, "timestamp", metadata / "timestamp.json")
+    _sign_and_write(Metadata(timestamp), place, keys, "timestamp", "timestamp.json")
 
 
-def _load(repository: Path, role: str) -> Any:
-    """Return the newest signed content of targets or snapshot."""
-    metadata = repository / "metadata"
-    versions = sorted(int(path.name.split(".")[0]) for path in metadata.glob(f"*.{role}.json"))
-    if not versions:
-        raise PublishingError(f"{repository}: no repository of bundles here; create it first")
-    path = metadata / f"{versions[-1]}.{role}.json"
+def _newest_version(place: Place, role: str) -> int:
+    """Return the newest version of targets or snapshot that is there, 0 where there is none."""
+    numbers = [entry.name.split(".")[0] for entry in place.entries("metadata") if entry.name.endswith(f".{role}.json")]
+    return max((int(number) for number in numbers if number.isdigit() and len(number) < 10), default=0)
+
+
+def _load_targets(place: Place, keys: Path) -> Targets:
+    """Return the newest targets, which must be signed by the key that signs today; raises PublishingError."""
+    version = _newest_version(place, "targets")
+    if not version:
+        raise PublishingError(f"{place}: no repository of bundles here; publish a bundle first")
+    name = f"metadata/{version}.targets.json"
     try:
-        return Metadata.from_file(str(path)).signed
-    except (RepositoryError, DeserializationError, OSError):
-        raise PublishingError(f"{path}: damaged; put it back from a copy of the exchange") from None
+        metadata: Metadata[Targets] = Metadata[Targets].from_bytes(place.get(name, LARGEST_DOCUMENT) or b"")
+    except (RepositoryError, DeserializationError):
+        raise PublishingError(f"{place}/{name}: damaged; publish the bundle again") from None
+    try:
+        load_root(keys).signed.verify_delegate("targets", metadata.signed_bytes, metadata.signatures)
+    except (RepositoryError, ValueError):
+        raise PublishingError(
+            f"{place}/{name}: not signed by our present key: the key was replaced, or somebody else wrote it; publish "
+            "the bundle again"
+        ) from None
+    return metadata.signed
 
 
-def _sign_and_write(metadata: Metadata[Any], keys: Path, role: str, path: Path) -> None:
+def _named(place: Place, keys: Path) -> set[str]:
+    """Return the archives that the newest targets name; none where they are not ours."""
+    try:
+        return {f"{target.hashes['sha256']}.{path}" for path, target in _load_targets(place, keys).targets.items()}
+    except PublishingError:
+        return set()
+
+
+def _sign_and_write(metadata: Metadata[Any], place: Place, keys: Path, role: str, name: str) -> None:
     metadata.sign(load_signer(keys, role))
-    write_whole(path, metadata.to_bytes(_SERIALIZER))
+    place.put(f"metadata/{name}", metadata.to_bytes(_SERIALIZER))
 
 
-def _forget_old_targets(repository: Path, targets: Targets) -> None:
-    """Delete the packed bundles that the metadata no longer names, once they are older than a day.
+def _forget_old(place: Place, named: set[str]) -> None:
+    """Delete packed bundles and metadata that nothing newer names.
 
-    A gateway that has just read the metadata before may still be fetching one.
+    Those of the publication before stay: a gateway that has just read it may still be fetching.
     """
-    named = {f"{t.hashes['sha256']}.{name}" for name, t in targets.targets.items()}
-    for path in (repository / "targets").glob("*.tar"):
-        age = datetime.now(UTC).timestamp() - path.stat().st_mtime
-        if path.name not in named and age > 86_400:
-            path.unlink(missing_ok=True)
+    for entry in place.entries("targets"):
+        if entry.name.endswith(".tar") and entry.name not in named:
+            place.delete(f"targets/{entry.name}")
+    names = [entry.name for entry in place.entries("metadata")]
+    for role in ("targets", "snapshot"):
+        mine = sorted(
+            (name for name in names if name.endswith(f".{role}.json") and name.split(".")[0].isdigit()),
+            key=lambda name: int(name.split(".")[0]),
+        )
+        for name in mine[:-KEPT_VERSIONS]:
+            place.delete(f"metadata/{name}")
+
+
+def _place(repository: Place | Path) -> Place:
+    return FolderPlace(repository) if isinstance(repository, Path) else repository
 
 
 def _pack(bundle: Bundle) -> bytes:

@@ -1,0 +1,42 @@
+"""`igrow-trainer collect`: bring what gateways left in the exchange into the archive."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from igrow.core.errors import IgrowError
+from igrow.trainer.cli.common import add_exchange, exchange_of
+from igrow.trainer.service.archive import Archive
+from igrow.trainer.service.collecting import collect
+from igrow.trainer.service.recalibration import utc_now
+
+EXAMPLE = (
+    "igrow-trainer collect house --exchange /srv/igrow --state state\n"
+    "  igrow-trainer diagnose state/archive/telemetry/site=house --site site.yaml --out diagnosis"
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.add_argument("site", nargs="+", help="a site's name")
+    add_exchange(parser)
+    parser.add_argument("--state", type=Path, required=True, help="folder whose `archive` takes the logs, as Parquet")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Collect each site; returns 1 where one failed."""
+    place, archive = exchange_of(arguments), Archive(arguments.state / "archive")
+    failed = False
+    for site in arguments.site:
+        try:
+            done = collect(place, site, archive, utc_now())
+        except IgrowError as error:
+            print(f"{site}: error; {error}", flush=True)
+            failed = True
+            continue
+        last = "nothing yet" if done.newest is None else f"the last row is of {done.newest:%Y-%m-%d %H:%M} UTC"
+        print(f"{site}: {done.segments} segments, {done.rows} rows, {done.bytes / 1e6:.2f} MB; {last}")
+        for note in done.notes:
+            print(f"  {note}", flush=True)
+    return int(failed)

@@ -1,0 +1,245 @@
+"""Recalibration of one site: its log against the model in force; a better one is published; what happened is kept.
+
+    archive --> diagnose against the bundle in force --> better? --> publish --> history
+                                ^                                       |
+                                +--------- the gateway's reports <------+
+
+`<state>/sites/<site>` holds `bundles/` with what was published, the newest last, `history.jsonl` with one line a run,
+and the last diagnosis. A bundle that the gateway refused, or took back, is not built upon.
+
+All calls into the rooms of calibration, diagnosis and export stand in this file.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+from igrow.core.bundle import Bundle, BundleError, default_bundle_folder, read_bundle
+from igrow.core.errors import IgrowError
+from igrow.core.site import Site
+from igrow.trainer.service import history
+from igrow.trainer.service.archive import Archive, SiteLog
+
+COMMAND = "recalibrate"
+KEPT = 5
+"""Published bundles that are kept for each site, besides the one in force."""
+LEAST_GAIN = 0.01
+"""Relative fall of the 24 h error on unseen days, mean over quantities, that is worth a new bundle."""
+DAYS = 56
+"""Newest days of the log that are looked at."""
+REFUSED = frozenset({"rejected", "refused", "went_back", "withdrawn"})
+"""Verdicts of a gateway after which a bundle is not in force there."""
+
+Publish = Callable[[Path], object]
+
+
+@dataclass(frozen=True)
+class Turn:
+    """What one run did for one site: a line of its history."""
+
+    site: str
+    time: datetime
+    verdict: str
+    published: bool
+    note: str
+    causes: tuple[str, ...] = ()
+    gain: float = 0.0
+    """Relative fall of the 24 h error on unseen days against the bundle in force."""
+    notes: tuple[str, ...] = ()
+    """What was set aside or is missing, one sentence each."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the line of the history."""
+        return {
+            "time": self.time.strftime("%Y-%m-%dT%H:%M:%SZ"),
+            "command": COMMAND,
+            "site": self.site,
+            "verdict": self.verdict,
+            "causes": list(self.causes),
+            "gain": round(self.gain, 4),
+            "published": self.published,
+            "note": self.note,
+            "notes": list(self.notes),
+        }
+
+
+def next_run(site: Site, folder: Path) -> datetime | None:
+    """Return when a site is due by its own pace; None where it never ran to an end that was no error."""
+    last = history.last_success(history.read(folder), COMMAND)
+    return None if last is None else last + site.planning.recalibrate_every
+
+
+def recalibrate(
+    site: Site,
+    archive: Archive,
+    folder: Path,
+    publish_bundle: Publish | None,
+    *,
+    now: datetime,
+    days: int = DAYS,
+    force: bool = False,
+) -> Turn:
+    """Diagnose one site and publish a better bundle; what happened goes into its history.
+
+    Never raises for what the site sent: whatever fails is a line of its history and is tried again at the next run.
+
+    Args:
+        site: whose log it is.
+        archive: where its log was collected.
+        folder: of this site's memory.
+        publish_bundle: is called with the folder of a bundle that passed; None diagnoses only.
+        now: the time, UTC.
+        days: newest days of the log to look at.
+        force: run also before the site's pace says so.
+    """
+    due = next_run(site, folder)
+    if due is not None and now < due and not force:
+        return Turn(site.name, now, "waiting", False, f"next at {due:%Y-%m-%d %H:%M} UTC")
+    try:
+        turn = _run(site, archive, folder, publish_bundle, now, days)
+    except (IgrowError, OSError) as error:
+        turn = Turn(site.name, now, "error", False, str(error))
+    except Exception as error:  # a fault of ours in one site's data must not cost the others
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "fault.txt").write_text(traceback.format_exc(), encoding="utf-8")
+        what = f"{type(error).__name__}: {(str(error).splitlines() or [''])[0]}"
+        turn = Turn(site.name, now, "error", False, f"a fault of this program: {what}; see {folder / 'fault.txt'}")
+    history.append(folder, turn.to_json())
+    return turn
+
+
+def _run(site: Site, archive: Archive, folder: Path, publish_bundle: Publish | None, now: datetime, days: int) -> Turn:
+    log = archive.read(site.name, (now - timedelta(days=days)).date(), now.date() + timedelta(days=2))
+    notes = log.notes + tuple(_missing(log))
+    if len(log.telemetry) == 0:
+        raise IgrowError(f"no telemetry of site {site.name} in the last {days} days: nothing was collected of it")
+    bundle, unreadable = bundle_in_force(folder, log.reports)
+    outcome = _diagnose(site, log, bundle, folder / "diagnosis")
+    notes += unreadable + outcome.notes
+
+    def turn(note: str, *, published: bool = False) -> Turn:
+        return Turn(site.name, now, outcome.verdict, published, note, outcome.causes, outcome.gain, notes)
+
+    if outcome.write_bundle is None:
+        return turn("; ".join(outcome.notes) or "nothing to publish")
+    if outcome.gain < LEAST_GAIN:
+        return turn(
+            f"the bundle in force stays: the new model is only {100 * outcome.gain:.1f} % better on unseen days"
+        )
+    if publish_bundle is None:
+        return turn(f"a model with {100 * outcome.gain:.1f} % less error a day ahead on unseen days was found")
+    fresh = folder / "bundles" / now.strftime("%Y%m%dT%H%M%SZ")
+    fresh.parent.mkdir(parents=True, exist_ok=True)
+    outcome.write_bundle(fresh)
+    publish_bundle(fresh)
+    forget_old(fresh.parent, bundle.folder)
+    note = f"published {fresh.name}: {100 * outcome.gain:.1f} % less error a day ahead on unseen days"
+    return turn(note, published=True)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a diagnosis means for the loop."""
+
+    verdict: str
+    causes: tuple[str, ...]
+    gain: float
+    notes: tuple[str, ...]
+    write_bundle: Callable[[Path], None] | None
+    """Writes the corrected model as a bundle; None where there is none."""
+
+
+def _diagnose(site: Site, log: SiteLog, bundle: Bundle, target: Path) -> Outcome:
+    """Diagnose a log against a bundle, and write diagnosis and report to `target`."""
+    from igrow.trainer.cli.diagnose import write, write_corrected  # noqa: PLC0415  (torch and scipy are slow to import)
+    from igrow.trainer.diagnosis.deployed import from_manifest  # noqa: PLC0415
+    from igrow.trainer.diagnosis.diagnose import diagnose  # noqa: PLC0415
+
+    deployed = from_manifest(bundle.manifest, site)
+    diagnosis, evidence = diagnose(log.telemetry, site, deployed)
+    write(target, diagnosis, evidence, deployed)
+    write_bundle = None
+    if evidence is not None:
+
+        def write_bundle(folder: Path) -> None:
+            write_corrected(folder, bundle, site, diagnosis, evidence)
+
+    causes = tuple(one.effect for one in diagnosis.findings)
+    return Outcome(diagnosis.verdict, causes, relative_gain(diagnosis.errors), tuple(diagnosis.notes), write_bundle)
+
+
+def relative_gain(errors: Mapping[str, Mapping[str, Mapping[str, float]]]) -> float:
+    """Return the relative fall of the 24 h error on unseen days, mean over quantities (0 where none is known)."""
+    falls = [
+        1.0 - day["corrected"] / day["deployed"]
+        for horizons in errors.values()
+        if (day := horizons.get("24_h")) and day.get("deployed", 0.0) > 0.0 and "corrected" in day
+    ]
+    return sum(falls) / len(falls) if falls else 0.0
+
+
+def refused_bundles(reports: Sequence[Mapping[str, object]]) -> dict[str, str]:
+    """Return the bundles whose newest report says that they are not in force: identity -> verdict."""
+    newest = {str(report.get("identity")): str(report.get("verdict")) for report in reports}
+    return {identity: verdict for identity, verdict in newest.items() if verdict in REFUSED}
+
+
+def bundle_in_force(folder: Path, reports: Sequence[Mapping[str, object]]) -> tuple[Bundle, tuple[str, ...]]:
+    """Return the newest published bundle that the gateway has not refused or taken back, and sentences on damaged ones.
+
+    Where there is none it is the default bundle.
+    """
+    refused, notes = refused_bundles(reports), []
+    published = sorted((folder / "bundles").glob("*"), reverse=True) if (folder / "bundles").is_dir() else []
+    for candidate in published:
+        if candidate.name.endswith(".new"):
+            continue
+        try:
+            bundle = read_bundle(candidate)
+        except BundleError as error:
+            notes.append(f"{error}; its predecessor is built upon")
+            continue
+        if bundle.identity not in refused:
+            return bundle, tuple(notes)
+    return read_bundle(default_bundle_folder()), tuple(notes)
+
+
+def forget_old(bundles: Path, in_force: Path) -> None:
+    """Delete all but the newest published bundles; never the one in force, however many were refused since."""
+    for old in sorted(bundles.iterdir())[:-KEPT]:
+        if old.resolve() != in_force.resolve():
+            shutil.rmtree(old)
+
+
+def _missing(log: SiteLog) -> list[str]:
+    if not log.missing_days:
+        return []
+    days = ", ".join(f"{day}" for day in log.missing_days[:10])
+    more = f" and {len(log.missing_days) - 10} more" if len(log.missing_days) > 10 else ""
+    return [f"{len(log.missing_days)} days have no row: {days}{more}"]
+
+
+def site_folder(state: Path, site: str) -> Path:
+    """Return the folder of one site's memory."""
+    return state / "sites" / site
+
+
+def read_diagnosis(folder: Path) -> dict[str, Any] | None:
+    """Return the last diagnosis of a site, None where there is none that can be read."""
+    try:
+        document: dict[str, Any] = json.loads((folder / "diagnosis" / "diagnosis.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return None
+    return document if isinstance(document, dict) else None
+
+
+def utc_now() -> datetime:
+    """Return the time, UTC."""
+    return datetime.now(UTC)
