@@ -16,6 +16,7 @@ COMMANDS = {
     "export": ("igrow.trainer.cli.export", "write a bundle from a fitted simulator"),
     "policy": ("igrow.trainer.policies.train", "train a policy by soft actor-critic"),
     "publish": ("igrow.trainer.cli.publish", "sign a bundle and put it into the exchange"),
+    "fleet": ("igrow.trainer.cli.fleet", "collect, diagnose and publish for many sites; one page for all of them"),
     "keys": ("igrow.trainer.cli.keys", "make, keep and replace the signing keys"),
     "reproduce": ("igrow.trainer.reproduce.command", "reproduce the tables and figures of the iGrow paper"),
     "evaluate": ("igrow.trainer.reproduce.evaluate", "run a bundle on logged or virtual seasons and print its errors"),

@@ -1,0 +1,134 @@
+"""`igrow-trainer fleet`: the same work for many sites, and one page that says who needs attention."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from igrow.trainer.fleet.overview import SiteRow, overview, utc
+from igrow.trainer.fleet.registry import Entry, Registry, load_registry
+from igrow.trainer.fleet.runner import run_tasks
+from igrow.trainer.fleet.tasks import Ending, Outcome, Task
+from igrow.trainer.service import history
+from igrow.trainer.service.recalibration import DAYS, site_folder, utc_now
+
+EXAMPLE = (
+    "igrow-trainer fleet collect /srv/fleet\n"
+    "  igrow-trainer fleet recalibrate /srv/fleet             # those that are due; --site NAME for one\n"
+    "  igrow-trainer fleet status /srv/fleet --page /var/www/greenhouses"
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's actions."""
+    actions = parser.add_subparsers(title="actions", dest="action", metavar="ACTION", required=True)
+    status = actions.add_parser("status", help="show all sites, who needs attention first")
+    collect = actions.add_parser("collect", help="bring what the gateways left into the archive")
+    diagnose = actions.add_parser("diagnose", help="diagnose now, publish nothing")
+    recalibrate = actions.add_parser("recalibrate", help="diagnose the sites that are due, and publish what is better")
+    publish = actions.add_parser("publish", help="sign again what expires soon")
+    for one in (status, collect, diagnose, recalibrate, publish):
+        one.add_argument("fleet", type=Path, help="folder with fleet.yaml and sites/")
+        one.add_argument("--site", action="append", default=[], metavar="NAME", help="only this one; may be repeated")
+    status.add_argument("--page", type=Path, metavar="FOLDER", help="write the page and the reports into this folder")
+    for one in (diagnose, recalibrate):
+        one.add_argument("--days", type=int, default=DAYS, help=f"newest days of the log (default {DAYS})")
+    recalibrate.add_argument("--force", action="store_true", help="also the sites that are not due")
+    publish.add_argument("--again", action="store_true", help="publish each site's bundle again, as after a new key")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Do the work for each site; returns 1 where one failed, which is tried again at the next run."""
+    registry = load_registry(arguments.fleet, arguments.site)
+    now = utc_now()
+    if arguments.action == "status":
+        rows = overview(registry, now)
+        print_rows(rows)
+        if arguments.page is not None:
+            from igrow.trainer.fleet.page import write_page  # noqa: PLC0415
+
+            print(f"wrote {write_page(arguments.page, rows, now)}")
+        return 0
+    for name, problem in registry.problems.items():
+        print(f"{name}: error; {problem}", flush=True)
+    tasks = [make_task(arguments, registry, entry, now) for entry in registry.entries if not entry.paused]
+    failed = len(registry.problems)
+    file = registry.file
+    outcomes = run_tasks(tasks, file.backend, workers=file.workers, address=file.ray_address)
+    for number, outcome in enumerate(outcomes, 1):
+        failed += outcome.ending is not Ending.DONE
+        remember(registry, arguments.action, outcome, now)
+        print(f"[{number}/{len(tasks)}] {sentence(outcome)}", flush=True)
+    print(f"{len(tasks) + len(registry.problems)} sites, {failed} failed", file=sys.stderr)
+    return int(failed > 0)
+
+
+def make_task(arguments: argparse.Namespace, registry: Registry, entry: Entry, now: datetime) -> Task:
+    """Return the task of one site."""
+    exchange = {
+        "url": entry.exchange,
+        "base": str(registry.folder.resolve()),
+        "known_hosts": registry.path(registry.file.known_hosts),
+        "identity": registry.path(registry.file.identity),
+    }
+    common = {"state": str(registry.state.resolve()), "exchange": exchange, "now": now.timestamp()}
+    keys = str(registry.keys.resolve())
+    given: dict[str, Callable[[], tuple[str, dict[str, Any]]]] = {
+        "collect": lambda: ("collect_site", {"site": entry.site.name}),
+        "publish": lambda: ("publish_site", {"site": entry.site.name, "keys": keys, "again": arguments.again}),
+        "diagnose": lambda: (
+            "recalibrate_site",
+            {"file": str(entry.file.resolve()), "keys": keys, "publish": False, "force": True, "days": arguments.days},
+        ),
+        "recalibrate": lambda: (
+            "recalibrate_site",
+            {"file": str(entry.file.resolve()), "keys": keys, "publish": True, "force": arguments.force,
+             "days": arguments.days},
+        ),
+    }  # fmt: skip
+    function, own = given[arguments.action]()
+    limits = registry.file.limits
+    return Task(
+        entry.site.name,
+        f"igrow.trainer.fleet.work:{function}",
+        {**common, **own},
+        seconds=limits.time.total_seconds(),
+        megabytes=limits.memory,
+        retries=limits.retries,
+    )
+
+
+def remember(registry: Registry, action: str, outcome: Outcome, now: datetime) -> None:
+    """Write into a site's history what its task could not write itself."""
+    written = action in ("diagnose", "recalibrate") and outcome.ending is Ending.FAILED
+    if outcome.ending is Ending.DONE or written:
+        return
+    command = "recalibrate" if action == "diagnose" else action
+    line = {"time": now.strftime("%Y-%m-%dT%H:%M:%SZ"), "command": command, "site": outcome.name,
+            "verdict": "error", "note": outcome.note}  # fmt: skip
+    history.append(site_folder(registry.state, outcome.name), line)
+
+
+def sentence(outcome: Outcome) -> str:
+    """Return what became of one site's task, in one line and one more for each note."""
+    cost = f"({outcome.seconds:.1f} s, {outcome.megabytes:.0f} MB)"
+    if outcome.ending is not Ending.DONE:
+        tried = f" after {outcome.attempts} attempts" if outcome.attempts > 1 else ""
+        return f"{outcome.name}: error{tried}; {outcome.note} {cost}"
+    result = outcome.result
+    if "segments" in result:
+        text = f"{result['segments']} segments, {result['rows']} rows"
+    else:
+        text = "; ".join(str(result[key]) for key in ("verdict", "note") if result.get(key))
+    return "\n  ".join([f"{outcome.name}: {text} {cost}", *map(str, result.get("notes", []))])
+
+
+def print_rows(rows: list[SiteRow]) -> None:
+    """Print the table for a terminal."""
+    width = max((len(row.site) for row in rows), default=4)
+    for row in rows:
+        print(f"{row.site:<{width}}  {utc(row.newest) or 'never':<16}  {'; '.join(row.reasons) or 'all is well'}")

@@ -1,0 +1,115 @@
+"""What a task does for one site. Arguments and results are plain JSON, since they may travel to another machine."""
+
+from __future__ import annotations
+
+import json
+from datetime import UTC, datetime, timedelta
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from igrow.core.errors import IgrowError
+from igrow.core.exchange import Below, Place
+from igrow.core.exchange.documents import LARGEST_DOCUMENT, parse_object
+from igrow.core.site import load_site
+from igrow.core.whole_files import write_whole
+from igrow.trainer.service import history
+from igrow.trainer.service.archive import Archive
+from igrow.trainer.service.collecting import collect
+from igrow.trainer.service.places import open_place
+from igrow.trainer.service.recalibration import recalibrate, site_folder
+
+COLLECTED = "collected.json"
+REFRESH_BEFORE = timedelta(days=30)
+"""Signatures that hold for less than this are made again."""
+
+
+def collect_site(site: str, state: str, exchange: dict[str, str | None], now: float) -> dict[str, Any]:
+    """Collect one site; its newest outcome stands in `collected.json`, and what people should know in its history."""
+    moment = datetime.fromtimestamp(now, UTC)
+    done = collect(_place(exchange), site, Archive(Path(state) / "archive"), moment)
+    document = {
+        "time": moment.strftime("%Y-%m-%dT%H:%M:%SZ"),
+        "command": "collect",
+        "site": site,
+        "verdict": "done",
+        "segments": done.segments,
+        "rows": done.rows,
+        "bytes": done.bytes,
+        "newest": None if done.newest is None else done.newest.strftime("%Y-%m-%dT%H:%M:%SZ"),
+        "notes": done.notes,
+    }
+    folder = site_folder(Path(state), site)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_whole(folder / COLLECTED, json.dumps(document).encode())
+    if done.notes:
+        history.append(folder, document)
+    return document
+
+
+def recalibrate_site(
+    file: str,
+    state: str,
+    exchange: dict[str, str | None],
+    keys: str,
+    now: float,
+    *,
+    publish: bool,
+    force: bool,
+    days: int,
+) -> dict[str, Any]:
+    """Diagnose one site, and publish what is better where `publish` says so."""
+    from igrow.trainer.publishing import publish as publish_bundle  # noqa: PLC0415  (collecting needs no signatures)
+
+    site = load_site(file)
+    turn = recalibrate(
+        site,
+        Archive(Path(state) / "archive"),
+        site_folder(Path(state), site.name),
+        partial(publish_bundle, repository=_repository(exchange, site.name), keys=Path(keys)) if publish else None,
+        now=datetime.fromtimestamp(now, UTC),
+        days=days,
+        force=force,
+    )
+    if turn.verdict == "error":
+        raise IgrowError(turn.note)  # its line is in the history already
+    return turn.to_json()
+
+
+def publish_site(
+    site: str, state: str, exchange: dict[str, str | None], keys: str, now: float, *, again: bool
+) -> dict[str, Any]:
+    """Sign a site's bundles again where the signatures expire soon; with `again` publish its bundle once more."""
+    from igrow.trainer.publishing import publish, refresh  # noqa: PLC0415
+    from igrow.trainer.service.recalibration import bundle_in_force  # noqa: PLC0415
+
+    repository, moment = _repository(exchange, site), datetime.fromtimestamp(now, UTC)
+    folder = site_folder(Path(state), site)
+    stamp = repository.get("metadata/timestamp.json", LARGEST_DOCUMENT)
+    if again:
+        reports, _ = Archive(Path(state) / "archive").reports(site)
+        bundle, _ = bundle_in_force(folder, reports)
+        if bundle.manifest.site != site:
+            return {"site": site, "note": "nothing was published for it yet"}
+        publish(bundle.folder, repository, Path(keys), now=moment)
+        return {"site": site, "note": f"published {bundle.label} again"}
+    if stamp is None:
+        return {"site": site, "note": "nothing was published for it yet"}
+    expires = datetime.fromisoformat(str(parse_object(stamp, "timestamp.json").get("signed", {}).get("expires", "")))
+    if expires - moment > REFRESH_BEFORE:
+        return {"site": site, "note": f"signed until {expires:%Y-%m-%d}"}
+    refresh(repository, Path(keys), now=moment)
+    return {"site": site, "note": "signed again"}
+
+
+def _place(exchange: dict[str, str | None]) -> Place:
+    return open_place(
+        str(exchange["url"]),
+        base=Path(str(exchange["base"])),
+        known_hosts=exchange["known_hosts"],
+        identity=exchange["identity"],
+    )
+
+
+def _repository(exchange: dict[str, str | None], site: str) -> Place:
+    return Below(_place(exchange), f"{site}/bundles")
