@@ -19,7 +19,6 @@ from igrow.core.exchange.place import Entry
 
 # -rw-r--r--    ? 1000  1000   48213 Nov 22 09:58 name
 _LINE = re.compile(r"-\S{9,10}\s+\S+\s+\S+\s+\S+\s+(\d+)\s+\S+\s+\S+\s+\S+\s(.+)")
-_PART = re.compile(r"\.(.+)\.part")
 
 
 class SftpPlace:
@@ -36,6 +35,7 @@ class SftpPlace:
             )
         options = [
             "BatchMode=yes",
+            "LogLevel=ERROR",
             "StrictHostKeyChecking=yes",
             f"UserKnownHostsFile={known_hosts}",
             "GlobalKnownHostsFile=/dev/null",
@@ -47,7 +47,7 @@ class SftpPlace:
             *([f"IdentityFile={identity}", "IdentitiesOnly=yes"] if identity else []),
         ]
         user = f"{address.user}@" if address.user else ""
-        self._command = ["sftp", "-F", "/dev/null", "-q", "-b", "-", "-P", str(address.port)]
+        self._command = ["sftp", "-F", "/dev/null", "-b", "-", "-P", str(address.port)]
         self._command += [word for option in options for word in ("-o", option)]
         self._command += ["--", user + address.host]
 
@@ -71,7 +71,7 @@ class SftpPlace:
     def put(self, path: str, content: bytes) -> None:
         """Write a file, going on where an earlier attempt was cut off."""
         folder, name = posixpath.split(path)
-        part = self._remote(f"{folder}/.{name}.part")
+        part = self._remote(posixpath.join(folder, f".{name}.part"))
         begun = next((entry.size for entry in self._listing(folder) if entry.name == f".{name}.part"), None)
         with tempfile.TemporaryDirectory() as scratch:
             source = Path(scratch) / "file"
@@ -119,7 +119,7 @@ class SftpPlace:
 
 def _parents(folder: str) -> list[str]:
     parts = folder.split("/")
-    return ["/".join(parts[: number + 1]) for number in range(len(parts))]
+    return ["/".join(parts[: number + 1]) for number in range(len(parts))] if folder else []
 
 
 def _quoted(path: str) -> str:

@@ -1,0 +1,153 @@
+"""The same log over a folder, a real SFTP server and a real S3 interface: it arrives whole, once, and the keys hold."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from igrow.core.exchange import ExchangeError, FolderPlace, Place
+from igrow.core.exchange.address import parse_address
+from igrow.edge.exchange.places import open_place as open_at_gateway
+from igrow.edge.exchange.sftp import SftpPlace
+from igrow.trainer.publishing import create_keys, publish
+from igrow.trainer.service.places import open_place as open_at_trainer
+from tests.exchange.gateway_and_trainer import DAY, SITE, START, World
+from tests.exchange.peers import Sftp, s3_server, sftp_server
+
+DIGEST = "ab" * 32
+
+
+@pytest.fixture(scope="module")
+def sftp(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Sftp]:
+    with sftp_server(tmp_path_factory.mktemp("sftp") / "server") as server:
+        yield server
+
+
+@pytest.fixture(scope="module")
+def s3(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
+            patch.setenv(name, "testing")
+        patch.setenv("AWS_DEFAULT_REGION", "us-east-1")
+        with s3_server(tmp_path_factory.mktemp("s3") / "server") as url:
+            yield url
+
+
+@pytest.fixture(params=["folder", "sftp", "s3"])
+def sides(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Place, Place]:
+    """Return the same place as the gateway and as the trainer reach it."""
+    if request.param == "folder":
+        return FolderPlace(tmp_path / "exchange"), FolderPlace(tmp_path / "exchange")
+    if request.param == "sftp":
+        server: Sftp = request.getfixturevalue("sftp")
+        keys = {"known_hosts": str(server.known_hosts), "identity": str(server.identity)}
+        url = f"{server.url}/{tmp_path.name}"
+        (server.root / tmp_path.name).mkdir()
+        return open_at_gateway(url, **keys), open_at_trainer(url, **keys)
+    address, _, query = request.getfixturevalue("s3").partition("?")
+    url = f"{address}/{tmp_path.name}?{query}"
+    return open_at_gateway(url), open_at_trainer(url)
+
+
+def test_every_place_keeps_files_whole(sides: tuple[Place, Place]) -> None:
+    for place in sides:
+        assert place.entries("a/b") == []
+        assert place.get("a/b/none", 10) is None
+        place.delete("a/b/none")
+        place.put("a/b/c d.txt", b"first")
+        place.put("a/b/c d.txt", b"second")
+        assert [(one.name, one.size) for one in place.entries("a/b")] == [("c d.txt", 6)]
+        assert place.get("a/b/c d.txt", 6) == b"second"
+        with pytest.raises(ExchangeError, match="more than 5 bytes"):
+            place.get("a/b/c d.txt", 5)
+        place.delete("a/b/c d.txt")
+        assert place.entries("a/b") == []
+
+
+def test_a_log_arrives_once_is_receipted_and_a_bundle_comes_back(sides: tuple[Place, Place], tmp_path: Path) -> None:
+    from tiny_bundle import write_tiny_bundle
+
+    from igrow.core.exchange import Below
+    from igrow.edge.updates import SignedSource
+
+    gateway, trainer = sides
+    world = World(tmp_path / "world", gateway)
+    for day in range(3):
+        world.log(START + day * DAY, START + (day + 1) * DAY)
+        assert world.round(START + (day + 1) * DAY + 300).problem == ""
+    done = world.collect(START + 3 * DAY, trainer)
+    assert (done.segments, done.notes) == (3, [])
+    create_keys(tmp_path / "keys")
+    made = publish(
+        write_tiny_bundle(tmp_path / "made", site=SITE).folder, Below(trainer, f"{SITE}/bundles"), tmp_path / "keys"
+    )
+    status = world.round(START + 3 * DAY + 900)
+    assert (status.problem, status.receipted, status.waiting) == ("", 3, 0)
+    world.assert_complete()
+    source = SignedSource(world.outbox / "bundles", tmp_path / "trust", tmp_path / "keys" / "1.root.json")
+    fetched = source.fetch(SITE, ())
+    assert fetched is not None
+    assert fetched.identity == made.identity
+    world.store.close()
+
+
+def test_a_server_with_another_key_is_refused_on_both_sides(sftp: Sftp, tmp_path: Path) -> None:
+    subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", str(tmp_path / "other")], check=True)
+    other = " ".join((tmp_path / "other.pub").read_text().split()[:2])
+    pinned = tmp_path / "known_hosts"
+    pinned.write_text(f"[127.0.0.1]:{sftp.port} {other}\n")
+    keys = {"known_hosts": str(pinned), "identity": str(sftp.identity)}
+    with pytest.raises(ExchangeError, match="not the pinned one"):
+        open_at_gateway(sftp.url, **keys).entries("x")
+    with pytest.raises(ExchangeError, match="not the pinned one"):
+        open_at_trainer(sftp.url, **keys)
+
+
+def test_a_server_whose_key_is_not_known_is_refused_on_both_sides(sftp: Sftp, tmp_path: Path) -> None:
+    (tmp_path / "known_hosts").write_text("")
+    keys = {"known_hosts": str(tmp_path / "known_hosts"), "identity": str(sftp.identity)}
+    with pytest.raises(ExchangeError):
+        open_at_gateway(sftp.url, **keys).entries("x")
+    with pytest.raises(ExchangeError):
+        open_at_trainer(sftp.url, **keys)
+
+
+def test_a_client_whose_key_the_server_does_not_know_is_told_so(sftp: Sftp, tmp_path: Path) -> None:
+    subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", str(tmp_path / "mine")], check=True)
+    keys = {"known_hosts": str(sftp.known_hosts), "identity": str(tmp_path / "mine")}
+    with pytest.raises(ExchangeError, match="does not know our key"):
+        open_at_gateway(sftp.url, **keys).entries("x")
+
+
+def test_an_upload_that_was_cut_off_goes_on_where_it_stopped(sftp: Sftp, tmp_path: Path) -> None:
+    content = bytes(range(256)) * 4000
+    folder = sftp.root / "cut"
+    folder.mkdir()
+    part = folder / f".x-{DIGEST}.zip.part"
+    part.write_bytes(content[:600_000])
+    begun = part.stat().st_ino
+    place = SftpPlace(
+        parse_address(f"{sftp.url}/cut"), known_hosts=sftp.known_hosts, identity=sftp.identity, timeout=60.0
+    )
+    place.put(f"x-{DIGEST}.zip", content)
+    finished = folder / f"x-{DIGEST}.zip"
+    assert finished.read_bytes() == content
+    assert finished.stat().st_ino == begun, "the file that was begun was gone on with"
+    assert not part.exists()
+
+
+def test_a_server_that_takes_a_connection_and_says_nothing_holds_no_round_for_ever(tmp_path: Path) -> None:
+    import socket
+
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        port = silent.getsockname()[1]
+        (tmp_path / "known_hosts").write_text("x")
+        place = SftpPlace(
+            parse_address(f"sftp://nobody@127.0.0.1:{port}/x"),
+            known_hosts=tmp_path / "known_hosts", identity=None, timeout=3.0,
+        )  # fmt: skip
+        with pytest.raises(ExchangeError, match="no end within 3 s"):
+            place.entries("x")
