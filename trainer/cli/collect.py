@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from datetime import timedelta
 from pathlib import Path
 
 from igrow.core.errors import IgrowError
 from igrow.trainer.cli.common import add_exchange, exchange_of
 from igrow.trainer.service.archive import Archive
 from igrow.trainer.service.collecting import collect
+from igrow.trainer.service.forwarding import forward
 from igrow.trainer.service.recalibration import utc_now
 
 EXAMPLE = (
@@ -22,6 +24,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("site", nargs="+", help="a site's name")
     add_exchange(parser)
     parser.add_argument("--state", type=Path, required=True, help="folder whose `archive` takes the logs, as Parquet")
+    parser.add_argument(
+        "--forward", metavar="TARGET", help="write new days to InfluxDB or PostgreSQL too, or to a file"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -31,6 +36,8 @@ def run(arguments: argparse.Namespace) -> int:
     for site in arguments.site:
         try:
             done = collect(place, site, archive, utc_now())
+            if arguments.forward is not None:
+                forward(archive, site, arguments.forward, utc_now().date() + timedelta(days=1))
         except IgrowError as error:
             print(f"{site}: error; {error}", flush=True)
             failed = True

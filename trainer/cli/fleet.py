@@ -78,7 +78,7 @@ def make_task(arguments: argparse.Namespace, registry: Registry, entry: Entry, n
     common = {"state": str(registry.state.resolve()), "exchange": exchange, "now": now.timestamp()}
     keys = str(registry.keys.resolve())
     given: dict[str, Callable[[], tuple[str, dict[str, Any]]]] = {
-        "collect": lambda: ("collect_site", {"site": entry.site.name}),
+        "collect": lambda: ("collect_site", {"site": entry.site.name, "forward_to": registry.file.forward}),
         "publish": lambda: ("publish_site", {"site": entry.site.name, "keys": keys, "again": arguments.again}),
         "diagnose": lambda: (
             "recalibrate_site",

@@ -60,6 +60,7 @@ class FleetFile:
     backend: Backend = setting(default=Backend.PROCESSES, help="processes or ray")
     workers: int = setting(low=1, high=1000, default=1, help="how many tasks run at once on this machine")
     ray_address: str | None = setting(default=None, help="address of the Ray cluster, or null: one on this machine")
+    forward: str | None = setting(default=None, help="a database that collected logs are written to as well, or null")
     limits: Limits = setting(default_factory=Limits, help="limits of the work for one site")
     sites: Mapping[str, SiteOptions] = setting(default_factory=dict, help="options by site name")
 

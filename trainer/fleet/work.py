@@ -16,6 +16,7 @@ from igrow.core.whole_files import write_whole
 from igrow.trainer.service import history
 from igrow.trainer.service.archive import Archive
 from igrow.trainer.service.collecting import collect
+from igrow.trainer.service.forwarding import forward
 from igrow.trainer.service.places import open_place
 from igrow.trainer.service.recalibration import recalibrate, site_folder
 
@@ -24,7 +25,9 @@ REFRESH_BEFORE = timedelta(days=30)
 """Signatures that hold for less than this are made again."""
 
 
-def collect_site(site: str, state: str, exchange: dict[str, str | None], now: float) -> dict[str, Any]:
+def collect_site(
+    site: str, state: str, exchange: dict[str, str | None], now: float, forward_to: str | None = None
+) -> dict[str, Any]:
     """Collect one site; its newest outcome stands in `collected.json`, and what people should know in its history."""
     moment = datetime.fromtimestamp(now, UTC)
     done = collect(_place(exchange), site, Archive(Path(state) / "archive"), moment)
@@ -44,6 +47,8 @@ def collect_site(site: str, state: str, exchange: dict[str, str | None], now: fl
     write_whole(folder / COLLECTED, json.dumps(document).encode())
     if done.notes:
         history.append(folder, document)
+    if forward_to is not None:
+        forward(Archive(Path(state) / "archive"), site, forward_to, moment.date() + timedelta(days=1))
     return document
 
 

@@ -67,6 +67,13 @@ class Archive:
         """Return the folder with the Parquet files of one site."""
         return self.root / "telemetry" / f"site={site}"
 
+    def changed(self, site: str, day: date) -> int | None:
+        """Return a stamp of a day's rows that changes with them, None where there are none."""
+        try:
+            return self._day("telemetry", site, np.datetime64(day)).stat().st_mtime_ns
+        except FileNotFoundError:
+            return None
+
     def add_telemetry(self, site: str, telemetry: Telemetry, *, kind: str = "telemetry") -> int:
         """Merge rows into their days; returns how many of their values differ from what is there and stay out."""
         conflicts = 0
