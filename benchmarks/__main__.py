@@ -12,6 +12,7 @@ BENCHMARKS = {
     "greenhouse": ["benchmarks.greenhouse", "speed"],
     "bus": ["benchmarks.bus"],
     "gateway": ["benchmarks.gateway"],
+    "fleet": ["benchmarks.fleet"],
 }
 
 

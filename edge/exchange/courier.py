@@ -1,6 +1,6 @@
 """The courier: one round between the gateway's own disk and the exchange, as a process that may be ended at any time.
 
-`python -m igrow.edge.exchange.courier` reads its order as JSON from standard input. Beside itself it needs nothing
+`python -m igrow.edge.exchange` reads its order as JSON from standard input. Beside itself it needs nothing
 of the daemon: it reads the log as a second process, and answers in `status.json`.
 """
 
@@ -188,7 +188,3 @@ def main() -> int:
     signal.setitimer(signal.ITIMER_REAL, order.deadline)
     os.nice(10)
     return 1 if run_round(order).problem else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -84,6 +84,8 @@ def seal_due(outbox: Outbox, store: Path, time: float, period: int, *, partly: b
     Raises OSError, and StoreError where the log cannot be read.
     """
     before = outbox.state.number
+    if not outbox.state.sealed_at:
+        outbox.move(replace(outbox.state, sealed_at=time))
     state, left = observe(outbox.state, time, period)
     if newest_sequence(store) < state.sequence:
         state = replace(state, sequence=0)  # the ledger was lost and began again

@@ -135,7 +135,7 @@ class ExchangeService:
         environment["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))
         try:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "igrow.edge.exchange.courier"],
+                [sys.executable, "-m", "igrow.edge.exchange"],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,
                 env=environment,

@@ -1,0 +1,153 @@
+"""What a fleet costs: collecting a day of each of a thousand sites, a year of history behind one, bytes on the wire.
+
+`python -m benchmarks.fleet [--sites N] [--seconds S]` seals one day of 23 points for each site, puts it into the
+exchange, and runs `igrow-trainer fleet collect` as a user would; then one site day by day through a year.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from igrow.core.exchange import FolderPlace, Seal, pack_segment
+from igrow.core.quantities import QUANTITIES
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.service.archive import Archive
+from igrow.trainer.service.collecting import collect
+
+DAY = 86_400
+START = 20_500 * DAY
+
+
+def day_of_log(day: int, step: float, seed: int) -> Telemetry:
+    """Return one day of 25 points as sensors give it: slow courses, noise, a resolution."""
+    generator = np.random.default_rng(seed)
+    time = START + day * DAY + np.arange(0, DAY, step)
+    columns = {}
+    for name in [
+        one for one in QUANTITIES if QUANTITIES[one].kind.value in ("weather", "climate", "setpoint", "actuator")
+    ]:
+        quantity = QUANTITIES[name]
+        middle, half = (quantity.low + quantity.high) / 2.0, (quantity.high - quantity.low) / 8.0
+        course = middle + half * np.sin(2 * np.pi * (time % DAY) / DAY + len(name))
+        noise = 0.002 * half * generator.normal(size=len(time))
+        if quantity.kind.value == "setpoint":
+            values = np.round(course[:: max(1, int(21_600 / step))], 1).repeat(max(1, int(21_600 / step)))[: len(time)]
+        else:
+            values = course + noise
+        resolution = 10.0 ** np.floor(np.log10(half) - 1.5)
+        columns[name] = np.round(values / resolution) * resolution
+    return Telemetry(time.astype("datetime64[s]"), columns)
+
+
+def seal_day(site: str, day: int, previous: str, step: float, seed: int) -> tuple[str, bytes, str]:
+    """Return name, content and digest of one day's segment, with the records that a day brings."""
+    rows = day_of_log(day, step, seed)
+    events = [
+        {"sequence": 300 * day + n, "category": "write", "time": START + day * DAY + 288 * n, "requested": 18.123,
+         "point": "heating_setpoint", "applied": 18.1, "source": "plan", "reason": "", "outcome": "confirmed"}
+        for n in range(1, 300)
+    ]  # fmt: skip
+    start = float(START + day * DAY)
+    units = {name: QUANTITIES[name].unit for name in rows.columns}
+    seal = Seal(
+        site,
+        "e" * 12,
+        day + 1,
+        previous,
+        start,
+        start + DAY,
+        start + DAY,
+        "0.1.0",
+        units,
+        0,
+        "",
+        0,
+        "",
+        300 * (day + 1),
+    )
+    name, data = pack_segment(seal, rows, events)
+    return str(name), data, name.digest
+
+
+def collect_fleet(sites: int, step: float) -> None:
+    with tempfile.TemporaryDirectory() as text:
+        root = Path(text)
+        fleet = root / "fleet"
+        (fleet / "sites").mkdir(parents=True)
+        (fleet / "fleet.yaml").write_text("exchange: ../exchange\n")
+        sent = 0
+        place = FolderPlace(root / "exchange")
+        for number in range(sites):
+            site = f"house-{number:05}"
+            (fleet / "sites" / f"{site}.yaml").write_text(f"name: {site}\nlatitude: 52\nlongitude: 4.5\n")
+            name, data, _ = seal_day(site, 0, "", step, number % 20)
+            place.put(f"{site}/segments/{name}", data)
+            sent += len(data)
+        command = [sys.executable, "-c", "import sys; from igrow.trainer.cli import main; sys.exit(main())"]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, [str(Path.cwd()), *sys.path]))}
+        began, used = time.perf_counter(), os.times()
+        done = subprocess.run(
+            [*command, "fleet", "collect", str(fleet)], env=environment, capture_output=True, text=True, check=False
+        )
+        wall, after = time.perf_counter() - began, os.times()
+        assert done.returncode == 0, done.stderr[-2000:]
+        cpu = after.children_user + after.children_system - used.children_user - used.children_system
+        kept = sum(path.stat().st_size for path in (fleet / "state").rglob("*") if path.is_file())
+        peak = max(float(line.rsplit(",", 1)[1].split()[0]) for line in done.stdout.splitlines() if " MB)" in line)
+        print(f"sites                                 {sites}")
+        print(
+            f"a day on the wire                     {sent / sites / 1e6:8.3f} MB a site "
+            f"({86_400 / step:.0f} rows of 23 points, 299 records)"
+        )
+        print(f"collecting, one process at a time     {wall / sites:8.3f} s a site ({cpu / sites:.3f} s of processor)")
+        print(f"kept in the archive                   {kept / sites / 1e6:8.3f} MB a site and day")
+        print(f"largest process                       {peak:8.0f} MB")
+        began = time.perf_counter()
+        subprocess.run([*command, "fleet", "status", str(fleet), "--page", str(root / "www")], env=environment,
+                       check=True, stdout=subprocess.DEVNULL)  # fmt: skip
+        print(f"status and page of all sites          {time.perf_counter() - began:8.1f} s, "
+              f"{(root / 'www' / 'index.html').stat().st_size / 1e6:.2f} MB")  # fmt: skip
+
+
+def with_history(days: int, step: float) -> None:
+    """Compare collecting a day behind a week of history with a day behind a year."""
+    with tempfile.TemporaryDirectory() as text:
+        root, previous, seconds = Path(text), "", []
+        place, archive = FolderPlace(root / "exchange"), Archive(root / "archive")
+        for day in range(days):
+            name, data, previous = seal_day("house", day, previous, step, day % 20)
+            place.put(f"house/segments/{name}", data)
+            began = time.perf_counter()
+            collect(place, "house", archive, datetime.fromtimestamp(START + (day + 1) * DAY, UTC))
+            seconds.append(time.perf_counter() - began)
+        week, year = float(np.median(seconds[1:8])), float(np.median(seconds[-7:]))
+        ledger = (root / "archive" / "ledger" / "house.json").stat().st_size
+        receipt = len(json.dumps(json.loads(next((root / "exchange" / "house" / "receipts").iterdir()).read_text())))
+        shutil.rmtree(root / "exchange")
+    print(f"behind {days} days of history             {year / week:8.2f} times the time behind a week "
+          f"(ledger {ledger / 1e3:.0f} kB, receipt {receipt} bytes)")  # fmt: skip
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sites", type=int, default=1000)
+    parser.add_argument("--seconds", type=float, default=60.0, help="between two rows of the log (default 60)")
+    parser.add_argument("--history", type=int, default=365, help="days")
+    options = parser.parse_args()
+    collect_fleet(options.sites, options.seconds)
+    with_history(options.history, 600.0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,120 @@
+"""The daemon's side: a courier does the work in a process of its own, and nothing that it meets holds anybody."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from pathlib import Path
+
+import pytest
+
+from igrow.core.exchange import SegmentName
+from igrow.edge.exchange import ExchangeService
+from igrow.edge.exchange.service import TransferRules
+from igrow.edge.image import Quality, Value
+from igrow.edge.store import SqliteStore, StoreLimits
+
+DAY = 86_400
+START = 20_500 * DAY
+
+
+@pytest.fixture
+def store(tmp_path: Path):
+    made = SqliteStore(tmp_path / "store", StoreLimits(survive_power_cut=False))
+    for hour in range(24):
+        made.append(START + 3600 * hour, {"air_temperature": Value(20.0, Quality.GOOD, 0.0)})
+    made.record_event(START + DAY, "test", {})
+    yield made
+    made.close()
+
+
+def service(tmp_path: Path, store: SqliteStore, **rules: float) -> ExchangeService:
+    return ExchangeService(
+        str(tmp_path / "exchange"), tmp_path / "state", "house", store,
+        igrow_version="0.1.0", rules=TransferRules(**rules),  # type: ignore[arg-type]
+    )  # fmt: skip
+
+
+def finish(exchange: ExchangeService, now: float) -> None:
+    until = time.monotonic() + 120
+    while exchange.busy and time.monotonic() < until:
+        time.sleep(0.05)
+        exchange._reap()
+    assert not exchange.busy
+
+
+def test_a_day_that_is_over_is_sealed_and_sent_by_a_process_of_its_own(tmp_path: Path, store: SqliteStore) -> None:
+    exchange = service(tmp_path, store)
+    exchange.tick(START + DAY + 300)
+    assert exchange.busy
+    finish(exchange, START + DAY + 300)
+    assert exchange.health == ""
+    (path,) = (tmp_path / "exchange" / "house" / "segments").iterdir()
+    assert SegmentName.parse(path.name).number == 1
+    exchange.tick(START + DAY + 310)
+    assert not exchange.busy, "nothing is due"
+    exchange.close()
+
+
+def test_without_a_true_clock_nothing_is_sealed_and_receipts_are_still_taken(
+    tmp_path: Path, store: SqliteStore
+) -> None:
+    exchange = service(tmp_path, store)
+    exchange.tick(None)
+    finish(exchange, START)
+    assert exchange.health == ""
+    assert json.loads((tmp_path / "state" / "status.json").read_text())["sealed"] == 0
+    exchange.close()
+
+
+def test_a_report_is_sent_with_the_log_that_belongs_to_it(tmp_path: Path, store: SqliteStore) -> None:
+    exchange = service(tmp_path, store)
+    exchange.leave_report(START + DAY / 2, "a-adopted", {"verdict": "adopted"})
+    exchange.tick(START + DAY / 2)
+    finish(exchange, START + DAY / 2)
+    assert len(list((tmp_path / "exchange" / "house" / "reports").iterdir())) == 1
+    assert len(list((tmp_path / "exchange" / "house" / "segments").iterdir())) == 1
+    exchange.close()
+
+
+def hang(tmp_path: Path) -> None:
+    """Make the exchange hang whoever opens it: a pipe that nobody writes to stands where a receipt is read."""
+    folder = tmp_path / "state" / "bundles" / "metadata"
+    folder.mkdir(parents=True)
+    os.mkfifo(folder / "timestamp.json")
+    source = tmp_path / "exchange" / "house" / "bundles" / "metadata"
+    source.mkdir(parents=True)
+    (source / "timestamp.json").write_text("{}")
+
+
+def test_an_exchange_that_hangs_holds_neither_a_tick_nor_the_stop_and_is_told(tmp_path: Path, store) -> None:
+    hang(tmp_path)
+    exchange = service(tmp_path, store, deadline=2.0)
+    exchange.tick(START + DAY + 300)
+    for _ in range(20):
+        began = time.monotonic()
+        exchange.tick(START + DAY + 300)
+        assert time.monotonic() - began < 5.0  # a hang, not a speed
+        time.sleep(0.01)
+    finish(exchange, START + DAY + 300)
+    assert "no end within 2 s" in exchange.health
+    assert (tmp_path / "exchange" / "house" / "segments").exists(), "what came before the hang was done"
+    exchange._started = float("-inf")
+    exchange.tick(START + 2 * DAY + 300)
+    courier = exchange._process
+    assert courier is not None
+    exchange.close()
+    assert courier.poll() is not None, "a round that hangs is ended by the stop"
+
+
+def test_a_stop_seals_what_there_is_of_the_day(tmp_path: Path, store: SqliteStore) -> None:
+    exchange = service(tmp_path, store)
+    exchange.tick(START + DAY / 2)
+    finish(exchange, START + DAY / 2)
+    assert not (tmp_path / "exchange" / "house").exists()
+    exchange.tick(START + DAY / 2 + 60)
+    exchange.close()
+    status = json.loads((tmp_path / "state" / "status.json").read_text())
+    assert status["problem"] == ""
+    assert len(list((tmp_path / "exchange" / "house" / "segments").iterdir())) == 1
