@@ -14,7 +14,7 @@ help: ## List the targets.
 
 $(STAMP): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[edge,trainer,dev]'
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[edge,trainer,exchange,postgresql,dev]'
 	@touch $@
 
 demo: $(STAMP) ## Run the whole loop on a virtual greenhouse with an undeclared effect (at most 5 minutes).
