@@ -133,7 +133,7 @@ def _exchange(configuration: Configuration, store: SqliteStore) -> ExchangeServi
         configuration.state_folder / "exchange",
         configuration.site.name,
         store,
-        igrow_version=importlib.metadata.version("igrow"),
+        igrow_version=__version__,
         rules=rules,
     )
 

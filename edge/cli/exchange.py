@@ -10,7 +10,7 @@ from pathlib import Path
 from igrow import __version__
 from igrow.core.errors import IgrowError
 from igrow.core.exchange.documents import parse_object
-from igrow.edge.cli.common import DEFAULT_CONFIGURATION, configuration_of, store_folder
+from igrow.edge.cli.common import DEFAULT_CONFIGURATION, configuration_of
 from igrow.edge.clock import EARLIEST_PLAUSIBLE
 from igrow.edge.configuration import ClockSource, Configuration
 from igrow.edge.exchange import Order, run_round
@@ -58,7 +58,7 @@ def order(configuration: Configuration, url: str | None) -> Order:
     known = configuration.file.cycle.clock is ClockSource.SYSTEM and now >= EARLIEST_PLAUSIBLE
     return Order(
         str(configuration.state_folder / "exchange"),
-        str(store_folder(configuration)),
+        str(configuration.store_folder),
         configuration.site.name,
         url or str(configuration.exchange),
         __version__,
