@@ -17,6 +17,7 @@ COMMANDS = {
     "alarms": ("igrow.edge.cli.alarms", "list the alarms, or say that you know of them"),
     "notify": ("igrow.edge.cli.notify", "tell people of alarms, by e-mail, ntfy or a web hook"),
     "mqtt": ("igrow.edge.cli.mqtt", "publish the daemon's state to an MQTT broker"),
+    "model": ("igrow.edge.cli.model", "show the bundles of this gateway, and at which step each is"),
     "exchange": (
         "igrow.edge.cli.exchange",
         "show what waits for the trainer; make a round now, such as to a USB stick",
