@@ -22,6 +22,9 @@ import numpy as np
 from igrow.core.exchange import FolderPlace, Seal, pack_segment
 from igrow.core.quantities import QUANTITIES
 from igrow.core.telemetry import Telemetry
+from igrow.trainer.fleet.runner import run_tasks
+from igrow.trainer.fleet.tasks import Ending, Task
+from igrow.trainer.readers.open_log import open_log
 from igrow.trainer.service.archive import Archive
 from igrow.trainer.service.collecting import collect
 
@@ -139,14 +142,45 @@ def with_history(days: int, step: float) -> None:
           f"(ledger {ledger / 1e3:.0f} kB, receipt {receipt} bytes)")  # fmt: skip
 
 
+def weekly_diagnosis(days: int) -> None:
+    """Diagnose one virtual greenhouse as the fleet does, and project what that costs for many."""
+    with tempfile.TemporaryDirectory() as text:
+        root = Path(text)
+        site = root / "house.yaml"
+        site.write_text("name: house\nlatitude: 52\nlongitude: 4.5\n")
+        command = [sys.executable, "-c", "import sys; from igrow.trainer.cli import main; sys.exit(main())"]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, [str(Path.cwd()), *sys.path]))}
+        generate = ["generate", "--site", str(site), "--days", str(days), "--start", "2026-02-01", "--seed", "1"]
+        subprocess.run([*command, *generate, "--out", str(root / "log")], env=environment, check=True,
+                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)  # fmt: skip
+        archive = Archive(root / "state" / "archive")
+        archive.add_telemetry("house", open_log(root / "log").telemetry)
+        now = datetime(2026, 2, 1, tzinfo=UTC).timestamp() + days * DAY
+        exchange = {"url": str(root / "exchange"), "base": str(root), "known_hosts": None, "identity": None}
+        arguments = {"file": str(site), "state": str(root / "state"), "exchange": exchange, "keys": str(root / "keys"),
+                     "now": now, "publish": False, "force": True, "days": 56}  # fmt: skip
+        task = Task("house", "igrow.trainer.fleet.work:recalibrate_site", arguments, 3600.0, 8000, 0)
+        (outcome,) = run_tasks([task])
+        assert outcome.ending is Ending.DONE, outcome.note
+    print(f"a diagnosis of {days} days               {outcome.processor:8.0f} s of processor, "
+          f"{outcome.megabytes:.0f} MB (verdict {outcome.result['verdict']})")  # fmt: skip
+    cores = 100_000 * outcome.processor / (7 * DAY)
+    print(f"100,000 sites, each once a week       {cores:8.0f} cores of this machine kept busy, by these seconds")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sites", type=int, default=1000)
     parser.add_argument("--seconds", type=float, default=60.0, help="between two rows of the log (default 60)")
     parser.add_argument("--history", type=int, default=365, help="days")
+    parser.add_argument(
+        "--diagnose", type=int, default=28, help="days of log to diagnose (default 28; 0 leaves it out)"
+    )
     options = parser.parse_args()
     collect_fleet(options.sites, options.seconds)
     with_history(options.history, 600.0)
+    if options.diagnose:
+        weekly_diagnosis(options.diagnose)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ import json
 import os
 import resource
 import sys
+import time
 import traceback
 from typing import Any
 
@@ -30,6 +31,7 @@ def main() -> int:
 
 
 def _do(task: dict[str, Any]) -> dict[str, Any]:
+    began = time.process_time()
     try:
         module, _, name = str(task["function"]).partition(":")
         result = getattr(importlib.import_module(module), name)(**task["arguments"])
@@ -41,6 +43,7 @@ def _do(task: dict[str, Any]) -> dict[str, Any]:
     except Exception as error:  # a fault in one site's task is that site's
         traceback.print_exc()
         answer = {"note": f"a fault of this program: {type(error).__name__}: {(str(error).splitlines() or [''])[0]}"}
+    answer["processor"] = time.process_time() - began
     answer["megabytes"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
     return answer
 

@@ -45,6 +45,8 @@ class Outcome:
     note: str = ""
     """One sentence on what went wrong."""
     seconds: float = 0.0
+    processor: float = 0.0
+    """Seconds of processor that it used, which other work on the machine does not change."""
     megabytes: float = 0.0
     """Largest resident memory of the process that did it."""
     attempts: int = 1

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import threading
 import time
+from dataclasses import replace
 
 from igrow.trainer.fleet.tasks import Ending, Outcome, Task
 
@@ -58,9 +59,10 @@ class Worker:
         answer = json.loads(line)
         if answer.get("spent"):
             self.done = MOST_TASKS
+        used = {"seconds": seconds, "processor": answer["processor"], "megabytes": answer["megabytes"]}
         if "result" in answer:
-            return Outcome(task.name, Ending.DONE, answer["result"], "", seconds, answer["megabytes"])
-        return Outcome(task.name, Ending.FAILED, {}, answer["note"], seconds, answer["megabytes"])
+            return Outcome(task.name, Ending.DONE, answer["result"], **used)
+        return Outcome(task.name, Ending.FAILED, {}, answer["note"], **used)
 
     def close(self) -> None:
         """End the child, with all that it started."""
@@ -108,9 +110,7 @@ def run_limited(task: Task) -> Outcome:
             _local.worker = None
         if outcome.ending is not Ending.KILLED or attempt > task.retries:
             break
-    return Outcome(
-        outcome.name, outcome.ending, outcome.result, outcome.note, outcome.seconds, outcome.megabytes, attempt
-    )
+    return replace(outcome, attempts=attempt)
 
 
 def close_all() -> None:
