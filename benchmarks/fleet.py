@@ -43,12 +43,13 @@ def day_of_log(day: int, step: float, seed: int) -> Telemetry:
         quantity = QUANTITIES[name]
         middle, half = (quantity.low + quantity.high) / 2.0, (quantity.high - quantity.low) / 8.0
         course = middle + half * np.sin(2 * np.pi * (time % DAY) / DAY + len(name))
-        noise = 0.002 * half * generator.normal(size=len(time))
-        if quantity.kind.value == "setpoint":
-            values = np.round(course[:: max(1, int(21_600 / step))], 1).repeat(max(1, int(21_600 / step)))[: len(time)]
-        else:
-            values = course + noise
         resolution = 10.0 ** np.floor(np.log10(half) - 1.5)
+        if quantity.kind.value == "setpoint":
+            held = max(1, int(21_600 / step))
+            values = np.round(course[::held], 1).repeat(held)[: len(time)]
+        else:
+            # A sensor's noise is about as large as the step in which it is read.
+            values = course + resolution * generator.normal(size=len(time))
         columns[name] = np.round(values / resolution) * resolution
     return Telemetry(time.astype("datetime64[s]"), columns)
 
