@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.planner import SITE, recipe_table
+from igrow.core.agronomy import Memory
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.economics import harvest_income, local_days
 from igrow.core.planner import Objective, Outcome, PlanningState, Simulator, optimise
@@ -68,6 +69,8 @@ class Situation:
     simulator: Simulator
     """Corrected by what the last days used and grew."""
     seed: int
+    memory: Memory | None
+    """What the crop has had, as its limits count it."""
 
 
 Strategy = Callable[[Situation], Values]
@@ -141,7 +144,8 @@ def lead(
                 now = {key: float(value[row]) for key, value in present.items()}
                 model = Scaled(simulator, recent(past[row])) if corrected else simulator
                 seed = 1000 * choice + house
-                situation = Situation(begin, now, applied[row], weather, recipe, float(co2[row]), model, seed)
+                had = houses.memory(row)
+                situation = Situation(begin, now, applied[row], weather, recipe, float(co2[row]), model, seed, had)
                 began = time.monotonic()
                 setpoints = strategy(situation)
                 books[name].seconds += time.monotonic() - began
@@ -185,7 +189,11 @@ def genetic(site: Site) -> Strategy:
 
     def choose(now: Situation) -> Values:
         state = PlanningState(
-            now.time, now.present, dict(zip(SETPOINTS, now.applied, strict=True)), co2_before=now.co2_before
+            now.time,
+            now.present,
+            dict(zip(SETPOINTS, now.applied, strict=True)),
+            co2_before=now.co2_before,
+            memory=now.memory,
         )
         rng = np.random.default_rng(now.seed)
         return optimise(now.simulator, site, state, now.forecast, now.recipe, rng).setpoints

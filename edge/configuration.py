@@ -16,6 +16,7 @@ from enum import Enum
 from pathlib import Path
 from zoneinfo import ZoneInfo
 
+from igrow.core.agronomy import Place
 from igrow.core.bundle import default_bundle_folder
 from igrow.core.errors import IgrowError
 from igrow.core.exchange.address import Address, parse_address
@@ -362,7 +363,7 @@ def put_together(path: Path, file: DaemonFile, site: Site, register_map: Registe
         file=file,
         site=site,
         register_map=register_map,
-        guard_rules=GuardRules(rules, interlocks),
+        guard_rules=GuardRules(rules, interlocks, Place.of(site)),
         sensor_rules=sensor_rules(register_map, file),
         setpoints=setpoints,
     )

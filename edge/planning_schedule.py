@@ -1,4 +1,7 @@
-"""When a plan is asked for, and from what: each K1, and only from an image that may be believed."""
+"""When a plan is asked for, and from what: each K1, and only from an image that may be believed.
+
+A plan is asked for before it begins, so that it is ready when the one before it ends.
+"""
 
 from __future__ import annotations
 
@@ -23,6 +26,8 @@ LEAST_HISTORY = 24 * 3600.0
 """Seconds of log that a plan needs: its weather is that of the last days."""
 RETRY = 900.0
 """Seconds after a failed plan until the next is tried."""
+LEAD = 2 * RETRY
+"""Seconds before its beginning that a plan is asked for, so that one may fail; at most half of the pace."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +54,10 @@ class PlanningSchedule:
         self._recipe = recipe
         self._zone = zone
         self._due = float("-inf")
+        self._asked: float | None = None
+        """Seconds since 1970 UTC at which the plan that was last asked for begins."""
+        self._next: float | None = None
+        """Seconds since 1970 UTC at which the next plan is to begin."""
         self._began: float | None = None
         self._requests = 0
         self.problem = ""
@@ -73,12 +82,17 @@ class PlanningSchedule:
             return False
         self._service.request(request)
         self._requests += 1
-        self._due = image.monotonic + self._rules.every
+        self._asked, self._next = request.time, request.time + self._rules.every
+        self._due = image.monotonic + (self._next - self._lead - image.true_time)
         return True
 
     def retry_soon(self, monotonic: float) -> None:
         """Ask again before the next K1, since the last plan failed."""
         self._due = min(self._due, monotonic + RETRY)
+
+    @property
+    def _lead(self) -> float:
+        return min(LEAD, 0.5 * self._rules.every)
 
     def _obstacle(self, image: Image, bundle: ActiveBundle | None) -> str:
         if bundle is None:
@@ -106,6 +120,10 @@ class PlanningSchedule:
     def _request(self, now: float, bundle: ActiveBundle) -> PlanRequest:
         rules = self._rules
         start = now - now % rules.step
+        for begins in (self._asked, self._next):
+            if begins is not None and now <= begins <= now + self._lead:
+                start = begins
+                break
         steps = max(1, round(rules.horizon / rules.step))
         forecast: Telemetry | None = None
         if rules.forecast is not None and rules.forecast.exists():

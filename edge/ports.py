@@ -101,7 +101,7 @@ class PlanRequest:
     step_seconds: float
     """Length of one step of the plan and of `recipe`."""
     telemetry: Telemetry
-    """The log of the last days up to `time`."""
+    """The log of the last days, up to now: `time` may lie a little ahead."""
     recipe: Mapping[str, tuple[float, ...]]
     """What the grower's recipe would command over the horizon, by setpoint: (steps,)."""
     bundle: Path
@@ -135,6 +135,8 @@ class Plan:
     note: str = ""
     predicted: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     """By quantity: the expected course at the end of each step, (steps,)."""
+    binding: Mapping[str, tuple[tuple[str, ...], ...]] = field(default_factory=dict)
+    """By setpoint and step: the crop's limits that kept it from what the search asked for, (steps,)."""
 
 
 class PlanningService(Protocol):

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from igrow import __version__
+from igrow.core import agronomy
 from igrow.core.simulator.hindcast import HindcastPredictor
 from igrow.core.sun import position
 from igrow.edge.bus.plc import RegisterPlc
@@ -17,7 +18,8 @@ from igrow.edge.cycle import ControlCycle
 from igrow.edge.exchange import ExchangeService
 from igrow.edge.exchange.service import TransferRules
 from igrow.edge.guard import GuardedWriter, GuardState, Readback
-from igrow.edge.guard.core import with_earlier_writes
+from igrow.edge.guard.core import DAY, with_earlier_writes
+from igrow.edge.guard.crop import restored
 from igrow.edge.holds import HoldFile
 from igrow.edge.journal import Journal
 from igrow.edge.overriding import override_file
@@ -199,13 +201,20 @@ def build_control(
 
 
 def remember(control: Control, store: Store, *, budgets: bool) -> None:
-    """Carry over what a restart must not forget: hands that are respected and, with `budgets`, writes of the last day.
+    """Carry over what a restart must not forget.
+
+    Hands that are respected, what the crop has had and, with `budgets`, writes of the last day.
 
     To be called when the clock was first read. A write whose age cannot be known counts as just done.
     """
     now, true_time = control.clock.monotonic(), control.clock.true_time()
     for name, seconds in control.holds.load(true_time).items():
         control.cycle.readback.restore_hold(name, now + seconds)
+    place = control.configuration.guard_rules.crop
+    if place is not None and true_time is not None and control.cycle.state.crop.at is None:
+        log = store.telemetry(true_time - 2 * DAY, true_time)
+        had = restored(agronomy.remember(place, log, true_time))
+        control.cycle.state = replace(control.cycle.state, crop=had)
     rules = control.configuration.guard_rules.points
     if not budgets or all(rule.daily_budget is None for rule in rules.values()):
         return
@@ -223,7 +232,7 @@ def _schedule(configuration: Configuration, services: Services) -> PlanningSched
         return None
     settings, site = configuration.file.planning, configuration.site
     rules = PlanningRules(
-        every=site.planning.replan_every.total_seconds(),
+        every=min(site.planning.replan_every, site.planning.horizon).total_seconds(),
         horizon=site.planning.horizon.total_seconds(),
         step=settings.step.total_seconds(),
         history=settings.history.total_seconds(),

@@ -18,6 +18,7 @@ from dataclasses import dataclass, fields
 from itertools import pairwise
 
 from igrow.core import yaml_schema
+from igrow.core.agronomy.limits import Agronomy
 from igrow.core.errors import IgrowError
 from igrow.core.local_time import zone
 from igrow.core.quantities import ACTUATORS, CLIMATE, QUANTITIES, SETPOINTS, WEATHER
@@ -107,10 +108,8 @@ class Crop:
     )
     temperature_low: float = setting(unit="degC", low=0, high=30, default=13.0, help="colder air harms the crop")
     temperature_high: float = setting(unit="degC", low=15, high=50, default=32.0, help="hotter air harms the crop")
-    mean_temperature_low: float = setting(
-        unit="degC", low=0, high=30, default=18.0, help="a colder day's mean delays truss and fruit"
-    )
     humidity_high: float = setting(unit="%", low=50, high=100, default=93.0, help="damper air invites disease")
+    agronomy: Agronomy = setting(help="what no plan may leave", default_factory=Agronomy)
 
 
 @dataclass(frozen=True)
@@ -325,10 +324,29 @@ class Site:
             zone(self.time_zone)
         except IgrowError as error:
             raise SettingError(str(error), "time_zone") from None
+        self._check_agronomy()
         for key, known in (("actuators", ACTUATORS), ("setpoints", SETPOINTS)):
             for position, name in enumerate(getattr(self, key)):
                 if name not in known:
                     raise SettingError(f"{key} has {name}: {yaml_schema.nearest(name, known)}", key, position)
+
+    def _check_agronomy(self) -> None:
+        """Raise SettingError where the limits of the heating setpoint leave nothing of what the crop needs."""
+        crop, heating = self.crop.agronomy, self.limits.heating_setpoint
+        for name in ("day_temperature", "night_temperature", "mean_temperature"):
+            band = getattr(crop, name)
+            if band.low > heating.high or band.high < heating.low:
+                raise SettingError(
+                    f"crop.agronomy.{name} is {band.low:g} to {band.high:g} degC, limits.heating_setpoint only allows "
+                    f"{heating.low:g} to {heating.high:g}",
+                    *("crop", "agronomy", name),
+                )
+        if not heating.low <= crop.anchor <= heating.high:
+            raise SettingError(
+                f"the crop needs {crop.anchor:g} degC by day and night, limits.heating_setpoint only allows "
+                f"{heating.low:g} to {heating.high:g}",
+                *("limits", "heating_setpoint"),
+            )
 
 
 def load_site(path: str | os.PathLike[str]) -> Site:

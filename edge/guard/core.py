@@ -3,12 +3,13 @@
 For each point, in this order:
 
 1. a request that is no number is refused;
-2. absolute limits cut it;
-3. slew lets a ramp run towards it;
-4. interlocks force it between their bounds at once, the earlier interlock first, also when only the ramp, or what
+2. the crop's limits bring it to the nearest value that leaves none (`igrow.edge.guard.crop`);
+3. absolute limits cut it;
+4. slew lets a ramp run towards it;
+5. interlocks force it between their bounds at once, the earlier interlock first, also when only the ramp, or what
    stands in the PLC, is outside them;
-5. a change by hand at the PLC is left alone while it is respected (an interlock still comes first);
-6. dead band, minimum interval and daily budget say whether this is the moment to write.
+6. a change by hand at the PLC is left alone while it is respected (an interlock still comes first);
+7. dead band, minimum interval and daily budget say whether this is the moment to write.
 
 Invariants, tested with arbitrary input: a write never leaves the limits; two writes never differ by more than the
 slew allows for the time between them, unless an interlock, the stop or a hand at the PLC moved the point in
@@ -21,6 +22,8 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from igrow.edge.guard import crop
+from igrow.edge.guard.crop import CropMemory
 from igrow.edge.guard.interlocks import Force, evaluate
 from igrow.edge.guard.rules import GuardRules, PointRule
 from igrow.edge.image import Image
@@ -62,7 +65,7 @@ class Clamp:
     """None when the request was refused or nothing may be written now."""
     reason: str
     kind: str
-    """limit, interlock, slew, hand, minimum_interval, budget or refused."""
+    """crop, limit, interlock, slew, hand, minimum_interval, budget or refused."""
     source: str
 
 
@@ -85,6 +88,7 @@ class GuardState:
     engaged: frozenset[str] = frozenset()
     at: float | None = None
     """When it last decided."""
+    crop: CropMemory = field(default_factory=CropMemory)
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,6 +133,7 @@ def guard(
     writes: list[Write] = []
     clamps: list[Clamp] = []
     points: dict[str, PointState] = {}
+    requests, had = _for_the_crop(requests, shown, image, state, rules, passed, clamps)
     for name, rule in rules.points.items():
         memory = state.points.get(name, PointState())
         request = Request(rule.safe, "stop") if stopping else requests.get(name)
@@ -139,7 +144,37 @@ def guard(
         point = _Point(name, rule, memory, current, now, passed)
         points[name] = point.decide(request, forces, held.get(name), stopping, writes, clamps)
     writes.sort(key=lambda write: not write.urgent)
-    return Verdict(tuple(writes), tuple(clamps), GuardState(points, engaged, now), tuple(forces))
+    return Verdict(tuple(writes), tuple(clamps), GuardState(points, engaged, now, had), tuple(forces))
+
+
+def _for_the_crop(
+    requests: Mapping[str, Request],
+    shown: Mapping[str, float | None],
+    image: Image,
+    state: GuardState,
+    rules: GuardRules,
+    passed: float,
+    clamps: list[Clamp],
+) -> tuple[Mapping[str, Request], CropMemory]:
+    """Return the requests as the crop's limits leave them, and what the crop has had by now."""
+    if rules.crop is None:
+        return requests, state.crop
+    standing = {name: shown.get(name) for name in rules.points}
+    ramp = state.points.get("heating_setpoint", PointState()).ramp
+    if ramp is not None:
+        # The drift of the crop counts from where the ramp is, not from what was worth a write.
+        standing["heating_setpoint"] = ramp
+    had = crop.observed(rules.crop, state.crop, image, standing)
+    asked = {
+        name: request.value
+        for name, request in requests.items()
+        if request.source not in crop.EXEMPT and math.isfinite(request.value)
+    }
+    changed = dict(requests)
+    for name, (value, reason) in crop.held(rules.crop, had, image.monotonic, passed, asked).items():
+        changed[name] = replace(requests[name], value=value)
+        clamps.append(Clamp(name, asked[name], value, reason, "crop", requests[name].source))
+    return changed, had
 
 
 def never_sent(state: GuardState, before: GuardState, point: str) -> GuardState:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from igrow.core.agronomy import Place
 from igrow.core.errors import IgrowError
 from igrow.edge.guard.interlocks import Interlock
 
@@ -61,3 +62,5 @@ class GuardRules:
 
     points: Mapping[str, PointRule]
     interlocks: tuple[Interlock, ...] = ()
+    crop: Place | None = None
+    """The crop's limits and where it stands; None holds none."""

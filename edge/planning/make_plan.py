@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from igrow.core.agronomy import Place, remember
 from igrow.core.bundle import Bundle, read_bundle
 from igrow.core.errors import IgrowError
 from igrow.core.planner import Budget, PlanningState, Simulator, optimise
 from igrow.core.planner.onnx_generation import OnnxGeneration
 from igrow.core.planner.recent_use import SCALED, Scaled, factors, totals, used_in
-from igrow.core.planner.template import for_site
 from igrow.core.quantities import SETPOINTS
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Greenhouse, Site
@@ -29,7 +30,7 @@ RECENT_DAYS = 3
 PRESENT_SECONDS = 2 * HOUR
 """A value of the log that is older says nothing about the present (slow quantities excepted)."""
 VALID_HOURS = 24
-"""Longest time a plan is followed; the site's pace of planning replaces it much sooner."""
+"""Longest time a plan is followed, where the site's pace of planning is not slower."""
 SLOW = ("leaf_area_index", "plant_load", "net_growth", "fruit_fresh_weight")
 """Quantities whose last value counts, however old: they are counted by hand, weekly."""
 
@@ -51,6 +52,7 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
         initial=present(request.telemetry, start),
         applied=present(request.telemetry.only(name for name in SETPOINTS if name in request.telemetry), start),
         co2_before=co2_since_planting(site, request.telemetry, start),
+        memory=remember(Place.of(site), request.telemetry, start),
     )
     corrected = Scaled(simulator, recent_factors(simulator, site, request.telemetry, start))
     result = optimise(
@@ -62,7 +64,6 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
         np.random.default_rng(request.seed),
         Budget(),
         generation=generation,
-        template=for_site(site, state.time, hours),
     )
     steps = round(horizon / request.step_seconds)
     hour_of_step = [int(step * request.step_seconds) // HOUR for step in range(steps)]
@@ -76,7 +77,7 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
             for column, name in enumerate(SETPOINTS)
             if name in request.recipe
         },
-        valid_until=request.time + min(horizon, VALID_HOURS * HOUR),
+        valid_until=request.time + min(horizon, max(VALID_HOURS * HOUR, site.planning.replan_every.total_seconds())),
         bundle=bundle.label,
         expected_profit=result.expected_profit,
         recipe_profit=result.recipe_profit,
@@ -90,7 +91,16 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
                 ("air_co2", outcome.air_co2),
             )
         },
+        binding=_by_step(result.binding, hour_of_step),
     )
+
+
+def _by_step(
+    binding: Sequence[Mapping[str, tuple[str, ...]]], hour_of_step: Sequence[int]
+) -> dict[str, tuple[tuple[str, ...], ...]]:
+    """Return by setpoint and step the crop's limits that stood in the way; setpoints that none did are left out."""
+    names = {name for hour in binding for name in hour}
+    return {name: tuple(binding[hour].get(name, ()) for hour in hour_of_step) for name in sorted(names)}
 
 
 def present(log: Telemetry, start: int) -> dict[str, float]:

@@ -26,23 +26,31 @@ class _Anchored:
 
 
 class PlanKeeper:
-    """Takes the newest plan from where plans are made and ties it to the monotonic clock."""
+    """Takes plans from where they are made and ties them to the monotonic clock.
+
+    A plan is made before it begins; until then the one before it is followed.
+    """
 
     def __init__(self, latest: Callable[[], Plan | None]) -> None:
         self._latest = latest
         self._anchored: _Anchored | None = None
+        self._coming: _Anchored | None = None
 
     def anchored(self, image: Image) -> _Anchored | None:
-        """Return the newest plan that could be tied to the clock."""
+        """Return the newest plan that could be tied to the clock and has begun; else the first that will."""
         plan = self._latest()
-        is_new = plan is not None and (self._anchored is None or self._anchored.plan is not plan)
+        newest = self._coming or self._anchored
+        is_new = plan is not None and (newest is None or newest.plan is not plan)
         if is_new and plan is not None and image.true_time is not None:
-            self._anchored = _Anchored(plan, image.true_time - image.monotonic)
+            self._coming = _Anchored(plan, image.true_time - image.monotonic)
+        coming = self._coming
+        if coming is not None and (self._anchored is None or coming.now(image.monotonic) >= coming.plan.start):
+            self._anchored, self._coming = coming, None
         return self._anchored
 
     @property
     def plan(self) -> Plan | None:
-        """The plan that was last tied to the clock."""
+        """The plan that is followed, or was last."""
         return self._anchored.plan if self._anchored else None
 
 

@@ -8,8 +8,8 @@ plan. What a plan makes is growth. Growth is worth the fruit that it becomes:
 where `price_of_growth` is the product's price averaged over the days on which the fruit now on the plant ripens.
 Fruit of every age takes up growth, so those days are spread evenly from now to `days_to_harvest`; the part that
 falls behind the crop's end date is worth nothing (unripe fruit is not sold), and a discount is taken off for the risk
-of the wait. This leaves out that warm air ripens fruit sooner and that a plant without fruit cannot use growth;
-`mean_temperature_low` of the crop stands in for the first.
+of the wait. A cold day's growth is worth less, the less the colder (`igrow.core.agronomy.cold`). This leaves out that
+warm air ripens fruit sooner and that a plant without fruit cannot use growth.
 
 Costs are those of `igrow.core.economics`, with CO2 in tiers from what the crop has had before.
 """
@@ -22,6 +22,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from igrow.core.agronomy.cold import worth_of_growth
+from igrow.core.air import saturation_pressure
 from igrow.core.economics import Balance, local_days, product_price, running_costs
 from igrow.core.site import Site
 
@@ -29,9 +31,6 @@ Values = NDArray[np.float64]
 
 HARM_PER_DEGREE_HOUR = 0.002
 """EUR m-2 for each kelvin and hour outside the crop's bounds, and each % of humidity and hour above its bound."""
-DELAY_PER_DEGREE_DAY = 0.02
-"""EUR m-2 for each kelvin that the mean of 24 h lies below the crop's bound: some 5 % of a summer day's income
-per kelvin, as much as fruit development slows down."""
 DISBELIEF = 2.0
 """Growth promised outside the training data counts less by this much for each width of the range: half a width
 outside it counts for nothing. A network may promise any growth there, and a search finds where it does."""
@@ -128,7 +127,7 @@ class Objective:
         )
         believed = outcome.net_growth * np.clip(1.0 - DISBELIEF * outcome.outside, 0.0, 1.0)
         fresh = believed * (crop.fruit_share / crop.dry_matter_fraction)
-        income = np.sum(fresh * self.growth_price(), axis=-1)
+        income = np.sum(fresh * by_day(outcome.air_temperature) * self.growth_price(), axis=-1)
         return Valuation(
             balance=Balance(income, costs.plants, costs.upkeep, costs.electricity, costs.heat, costs.co2),
             harm=self._harm(outcome),
@@ -152,10 +151,25 @@ class Objective:
         cold = np.maximum(crop.temperature_low - air, 0.0)
         damp = np.maximum(outcome.air_humidity - crop.humidity_high, 0.0)
         harm = HARM_PER_DEGREE_HOUR * np.sum(hot + cold + damp, axis=-1)
-        for first in range(0, air.shape[-1] - 23, 24):
-            mean = air[..., first : first + 24].mean(axis=-1)
-            harm = harm + DELAY_PER_DEGREE_DAY * np.maximum(crop.mean_temperature_low - mean, 0.0)
         return np.asarray(harm)
+
+
+def by_day(air_temperature: Values) -> Values:
+    """Return for each hour (..., H) what the growth of its day is worth at that day's mean temperature, 0 to 1."""
+    worth = np.empty_like(air_temperature)
+    for first in range(0, air_temperature.shape[-1], 24):
+        day = slice(first, first + 24)
+        worth[..., day] = worth_of_growth(air_temperature[..., day].mean(axis=-1))[..., None]
+    return worth
+
+
+def damp_hours(outcome: Outcome, site: Site) -> Values:
+    """Return how many hours of the worst day are expected to be damp, mean over the ensemble, (B,)."""
+    crop = site.crop
+    deficit = saturation_pressure(np, outcome.air_temperature) * (1.0 - outcome.air_humidity / 100.0) * 1e-3
+    damp = (outcome.air_humidity > crop.humidity_high) | (deficit < crop.agronomy.deficit_low)
+    days = [damp[..., first : first + 24].sum(axis=-1) for first in range(0, damp.shape[-1], 24)]
+    return np.asarray(np.max(np.stack(days), axis=0).mean(axis=0))
 
 
 def cautious(valuation: Valuation, reference: Valuation, caution: float) -> tuple[Values, Values]:

@@ -9,14 +9,18 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from igrow.core.agronomy import Memory
 from igrow.core.errors import IgrowError
 from igrow.core.planner.evolution import WORST, Generation, NumpyGeneration, draw
-from igrow.core.planner.objective import Objective, Outcome, Simulator, Valuation, cautious
+from igrow.core.planner.objective import Objective, Outcome, Simulator, Valuation, cautious, damp_hours
 from igrow.core.planner.template import Setpoints, Template, for_site
-from igrow.core.quantities import SETPOINTS
+from igrow.core.quantities import SETPOINTS, WEATHER
 from igrow.core.site import Site
 
 Values = NDArray[np.float64]
+RADIATION = WEATHER.index("global_radiation")
+NOT_ADMITTED = -1e6
+"""Fitness of a candidate that leaves a limit of the climate, EUR m-2 for one at the limit."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +47,8 @@ class PlanningState:
     """Setpoints in force, from which slew limits count."""
     co2_before: float = 0.0
     """kg m-2 of CO2 that the crop has had before."""
+    memory: Memory | None = None
+    """What the crop has had until then, as its limits count it; None where that is not known."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +79,8 @@ class PlanResult:
     """The recipe's."""
     evaluations: int
     """Candidates simulated."""
+    binding: tuple[Mapping[str, tuple[str, ...]], ...]
+    """By hour and setpoint: the crop's limits that kept it from what the search asked for."""
 
 
 def optimise(
@@ -114,21 +122,28 @@ def optimise(
     budget = budget or Budget()
     run = generation or NumpyGeneration()
     time = state.time.astype("datetime64[s]") + np.arange(hours) * np.timedelta64(3600, "s")
-    template = template or for_site(site, state.time, hours)
+    template = template or for_site(site, state.time, hours, radiation=forecast[:, RADIATION])
     objective = Objective(site, time, state.co2_before)
     applied = np.array([state.applied.get(name, np.nan) for name in SETPOINTS])
-    recipe = template.limit(recipe[None], applied)[0]
+    recipe_course = template.follow(recipe[None], applied, state.memory)
+    recipe = recipe_course.setpoints[0]
 
     def simulate(setpoints: Setpoints) -> tuple[Outcome, Valuation]:
         outcome = simulator.simulate(dict(state.initial), forecast, setpoints, state.time)
         return outcome, objective.value(outcome)
 
-    _, recipe_valuation = simulate(recipe[None])
+    recipe_outcome, recipe_valuation = simulate(recipe[None])
+    # No plan may expect more damp hours than the crop bears, or than the recipe has too where that is more.
+    damp = max(site.crop.agronomy.damp_hours, float(damp_hours(recipe_outcome, site)[0]))
 
     def fitness(genes: NDArray[np.float32]) -> NDArray[np.float32]:
-        _, valuation = simulate(template.decode(genes, recipe, applied))
+        outcome, valuation = simulate(template.decode(genes, recipe, applied, state.memory))
         gain, _ = cautious(valuation, recipe_valuation, site.planning.caution)
-        return np.where(np.isfinite(gain), gain, WORST).astype(np.float32)
+        too_damp = np.maximum(damp_hours(outcome, site) - damp, 0.0)
+        # The less a candidate leaves the limit the better, but any that does not is better still (Deb 2000, Comput.
+        # Methods Appl. Mech. Eng. 186, 311-338).
+        admitted = np.where(too_damp > 0.0, NOT_ADMITTED * (1.0 + too_damp), gain)
+        return np.where(np.isfinite(gain), admitted, WORST).astype(np.float32)
 
     began = monotonic()
     settings = run.settings
@@ -150,7 +165,10 @@ def optimise(
             break
 
     follows_recipe = parent_fitness[0] <= 0.0
-    plan = recipe if follows_recipe else template.decode(parents[:1], recipe, applied)[0]
+    course = recipe_course
+    if not follows_recipe:
+        course = template.follow(template.wanted(parents[:1], recipe), applied, state.memory)
+    plan = course.setpoints[0]
     outcome, valuation = simulate(plan[None])
     _, doubt = cautious(valuation, recipe_valuation, site.planning.caution)
     return PlanResult(
@@ -166,6 +184,7 @@ def optimise(
         valuation=valuation,
         recipe_valuation=recipe_valuation,
         evaluations=evaluations + 1,
+        binding=course.binding(),
     )
 
 

@@ -3,6 +3,9 @@
 Cao et al. (2022) search four actions for each of 3984 hours, 15,936 numbers. Growers think in periods of the day,
 and so does the sun; a plan of two days in eight blocks has 16 genes a setpoint and is searched in seconds. The
 blocks begin and end where the electricity tariff changes too.
+
+What a gene stands for passes the limits of setpoints and crop (`igrow.core.agronomy`) hour by hour, so that no
+candidate leaves them.
 """
 
 from __future__ import annotations
@@ -13,9 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from igrow.core import agronomy
+from igrow.core.agronomy import Held, Memory, Moment, Place, SunToCome
 from igrow.core.local_time import to_local
 from igrow.core.quantities import SETPOINTS
 from igrow.core.site import Site
+from igrow.core.sun import unix_seconds
 
 Setpoints = NDArray[np.float64]
 """(..., H, 4) in the units of the registry, in its order."""
@@ -24,6 +30,22 @@ BLOCK_STARTS = (0, 4, 7, 10, 13, 16, 19, 23)
 """Local hours at which a block begins."""
 STEPS = {"heating_setpoint": 0.5, "co2_setpoint": 25.0, "lamp_on": 1.0, "irrigation_on": 0.05}
 """Setpoints are whole multiples of these: finer ones would not show in the greenhouse."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """Setpoints that leave no limit, and what they leave to be counted."""
+
+    setpoints: Setpoints
+    """(B, H, 4)."""
+    memory: Memory
+    """At the end of the horizon."""
+    held: tuple[Held, ...]
+    """What the crop's limits changed, by hour."""
+
+    def binding(self) -> tuple[dict[str, tuple[str, ...]], ...]:
+        """Return by hour the crop's limits that stood in the way of any candidate, by setpoint."""
+        return tuple({name: one.limits(name) for name in one.binding} for one in self.held)
 
 
 @dataclass(frozen=True)
@@ -40,6 +62,12 @@ class Template:
     """Largest allowed value of each setpoint, shape (4,)."""
     slew: NDArray[np.float64]
     """Most change per hour of each setpoint, infinite without a limit, shape (4,)."""
+    place: Place
+    """With the crop's limits."""
+    moments: tuple[Moment, ...]
+    """At which the hours begin."""
+    sunlight: NDArray[np.float64]
+    """Of the sun above the crop, mol m-2 in each hour, shape (H,)."""
 
     @property
     def blocks(self) -> int:
@@ -51,19 +79,28 @@ class Template:
         """Number of genes: blocks for each free setpoint, one setpoint after the other."""
         return len(self.free) * self.blocks
 
-    def decode(self, genes: NDArray[np.float32], recipe: Setpoints, applied: NDArray[np.float64]) -> Setpoints:
+    def decode(
+        self,
+        genes: NDArray[np.float32],
+        recipe: Setpoints,
+        applied: NDArray[np.float64],
+        memory: Memory | None = None,
+    ) -> Setpoints:
         """Return the setpoints (B, H, 4) of candidates (B, G).
 
-        `recipe` (H, 4) gives the setpoints that are not free; `applied` (4,) is what holds before the first hour
-        (NaN where unknown), from which the slew limit counts.
+        `recipe` (H, 4) gives the setpoints that are not free; `applied` and `memory` as in `follow`.
         """
+        return self.limit(self.wanted(genes, recipe), applied, memory)
+
+    def wanted(self, genes: NDArray[np.float32], recipe: Setpoints) -> Setpoints:
+        """Return what candidates (B, G) ask for, (B, H, 4), before any limit."""
         setpoints = np.repeat(recipe[None], len(genes), axis=0)
         for position, name in enumerate(self.free):
             column = SETPOINTS.index(name)
             part = genes[:, position * self.blocks : (position + 1) * self.blocks].astype(np.float64)
             values = self.low[column] + part * (self.high[column] - self.low[column])
             setpoints[:, :, column] = (np.round(values / STEPS[name]) * STEPS[name])[:, self.block]
-        return self.limit(setpoints, applied)
+        return setpoints
 
     def encode(self, setpoints: Setpoints) -> NDArray[np.float32]:
         """Return the genes (G,) nearest to setpoints (H, 4): the mean over each block."""
@@ -76,23 +113,52 @@ class Template:
             parts.append(np.clip((mean - self.low[column]) / span, 0.0, 1.0))
         return np.concatenate(parts).astype(np.float32)
 
-    def limit(self, setpoints: Setpoints, applied: NDArray[np.float64]) -> Setpoints:
-        """Return setpoints (..., H, 4) within limits and slew, as the guard would let them pass."""
+    def limit(self, setpoints: Setpoints, applied: NDArray[np.float64], memory: Memory | None = None) -> Setpoints:
+        """Return setpoints (..., H, 4) within all limits; see `follow`."""
+        batch = setpoints.reshape(-1, *setpoints.shape[-2:])
+        return self.follow(batch, applied, memory).setpoints.reshape(setpoints.shape)
+
+    def follow(self, setpoints: Setpoints, applied: NDArray[np.float64], memory: Memory | None = None) -> Course:
+        """Return setpoints (B, H, 4) within limits, slew and the crop's limits, as the guard would let them pass.
+
+        `applied` (4,) or (B, 4) is what holds before the first hour (NaN where unknown), from which the slew limit
+        counts; `memory` is what the crop has had until then. Without one the crop's past is not known.
+        """
         limited = np.clip(setpoints, self.low, self.high)
-        before = np.where(np.isnan(applied), limited[..., 0, :], applied)
-        for hour in range(limited.shape[-2]):
-            before = np.clip(limited[..., hour, :], before - self.slew, before + self.slew)
-            limited[..., hour, :] = before
-        return limited
+        before = np.where(np.isnan(applied), limited[:, 0], applied)
+        heating = SETPOINTS.index("heating_setpoint")
+        memory = memory or Memory(heating=np.broadcast_to(applied, before.shape)[:, heating])
+        held = []
+        for hour, now in enumerate(self.moments):
+            step = np.clip(limited[:, hour], before - self.slew, before + self.slew)
+            asked = {name: step[:, column] for column, name in enumerate(SETPOINTS)}
+            one = agronomy.hold(self.place, memory, now, asked, 1.0, self._sun_to_come(hour))
+            before = np.stack([one.setpoints[name] for name in SETPOINTS], axis=1)
+            memory = agronomy.observe(memory, self.place, now, one.setpoints, 1.0, float(self.sunlight[hour]))
+            limited[:, hour] = before
+            held.append(one)
+        return Course(limited, memory, tuple(held))
+
+    def _sun_to_come(self, hour: int) -> SunToCome:
+        ahead = slice(hour, hour + 50)
+        times = np.array([one.seconds for one in self.moments[ahead]])
+        return agronomy.sun_to_come(self.moments[hour], times, self.sunlight[ahead])
 
 
 def for_site(
-    site: Site, start: np.datetime64, hours: int, *, days_per_pattern: int = 1, starts: Sequence[int] = BLOCK_STARTS
+    site: Site,
+    start: np.datetime64,
+    hours: int,
+    *,
+    days_per_pattern: int = 1,
+    starts: Sequence[int] = BLOCK_STARTS,
+    radiation: NDArray[np.float64] | None = None,
 ) -> Template:
     """Return the template of a horizon of `hours` from `start` (UTC), in blocks of the site's local day.
 
     Consecutive local days share one pattern of blocks for `days_per_pattern` days: 1 lets each day differ, a large
-    number repeats one day over a whole season.
+    number repeats one day over a whole season. `radiation` (H,) is the global radiation to be expected, W m-2; without
+    it the sun counts nothing in the crop's light.
     """
     time = start.astype("datetime64[s]") + np.arange(hours) * np.timedelta64(3600, "s")
     local = to_local(time, site.time_zone)
@@ -103,10 +169,14 @@ def for_site(
     period = (np.searchsorted(np.array(starts), hour, side="right") - 1) % len(starts)
     _, block = np.unique(pattern * len(starts) + period, return_inverse=True)
     limits = [site.limits[name] for name in SETPOINTS]
+    place = Place.of(site)
     return Template(
         free=tuple(name for name in SETPOINTS if name in site.setpoints and name in site.planning.optimise),
         block=block.astype(np.int64),
         low=np.array([limit.low for limit in limits]),
         high=np.array([limit.high for limit in limits]),
         slew=np.array([np.inf if limit.slew is None else limit.slew for limit in limits]),
+        place=place,
+        moments=tuple(agronomy.moment(place, seconds) for seconds in unix_seconds(time).tolist()),
+        sunlight=np.zeros(hours) if radiation is None else place.sunlight(1.0) * np.maximum(radiation, 0.0),
     )

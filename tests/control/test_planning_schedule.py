@@ -13,7 +13,7 @@ from igrow.core.telemetry import Telemetry, write_csv
 from igrow.edge.image import Image, Quality, Value
 from igrow.edge.planning_schedule import ESSENTIAL, PlanningRules, PlanningSchedule
 from igrow.edge.ports import ActiveBundle, Plan, PlanRequest
-from igrow.edge.sources import Recipe
+from igrow.edge.sources import FreshPlan, PlanKeeper, Recipe
 
 T0 = 1_772_323_200.0
 HOUR = 3600.0
@@ -57,11 +57,49 @@ def image(hours=0.0, *, dated=True, **quality):
     return Image(hours * HOUR, T0 + hours * HOUR if dated else None, values)
 
 
-async def test_a_plan_is_asked_for_at_once_and_then_at_the_sites_pace():
+async def test_a_plan_is_asked_for_at_once_and_then_at_the_sites_pace_before_it_begins():
     schedule, planning = make()
     asked = [await schedule.tick(image(0.5 * step), BUNDLE) for step in range(25)]
-    assert [0.5 * step for step, was in enumerate(asked) if was] == [0.0, 6.0, 12.0]
-    assert len(planning.requests) == 3
+    assert [0.5 * step for step, was in enumerate(asked) if was] == [0.0, 5.5, 11.5]
+    assert [(request.time - T0) / HOUR for request in planning.requests] == [0.0, 6.0, 12.0]
+
+
+async def test_a_plan_that_fails_is_asked_for_again_before_it_should_have_begun():
+    schedule, planning = make()
+    await schedule.tick(image(), BUNDLE)
+    await schedule.tick(image(5.5), BUNDLE)
+    schedule.retry_soon(5.5 * HOUR)
+    assert await schedule.tick(image(5.75), BUNDLE)
+    assert [(request.time - T0) / HOUR for request in planning.requests] == [0.0, 6.0, 6.0]
+
+
+@pytest.mark.parametrize("every", [1.0, 6.0, 24.0])
+@pytest.mark.parametrize("takes", [0.0, 0.2])
+async def test_nobody_else_leads_between_two_plans(every, takes):
+    """Three days of five-minute cycles: from the first plan on, each is there when the one before it ends."""
+    planning = FakePlanning()
+    rules = PlanningRules(every=every * HOUR, horizon=24 * HOUR, step=HOUR, history=96 * HOUR, seed=5)
+    schedule = PlanningSchedule(rules, planning, LogStore(48.0), Recipe(), ZoneInfo("UTC"))
+    made = None
+
+    def plan_of(request):
+        end = request.time + every * HOUR
+        return Plan(request.time, request.time, HOUR, {"heating_setpoint": (18.0,) * 24}, end, "b1")
+
+    keeper = PlanKeeper(lambda: made)
+    leader = FreshPlan(keeper, fresh_for=1.5 * every * HOUR)
+    silent, asked_at = [], []
+    for step in range(3 * 288):
+        now = image(step / 12)
+        if await schedule.tick(now, BUNDLE):
+            asked_at.append(step / 12)
+        if planning.requests and step / 12 >= asked_at[-1] + takes:
+            request = planning.requests[-1]
+            made = made if made is not None and made.start == request.time else plan_of(request)
+        if not leader.offer(now).setpoints:
+            silent.append(step / 12)
+    assert all(hour < takes + 0.1 for hour in silent)
+    assert len(planning.requests) >= 72 / every
 
 
 async def test_a_request_holds_what_a_plan_is_made_from():

@@ -11,7 +11,7 @@ from toy_greenhouse import HOURS, START, ToySimulator
 
 from igrow.core.economics import product_price
 from igrow.core.planner import Objective
-from igrow.core.planner.objective import DELAY_PER_DEGREE_DAY, HARM_PER_DEGREE_HOUR, cautious
+from igrow.core.planner.objective import HARM_PER_DEGREE_HOUR, by_day, cautious
 from igrow.core.site import Prices, ProductPrice, Site
 
 TIME = START + np.arange(HOURS) * np.timedelta64(3600, "s")
@@ -21,7 +21,8 @@ def test_growth_is_worth_the_fruit_it_becomes(site, weather, recipe) -> None:
     flat = replace(site, prices=Prices(product=(ProductPrice(datetime.date(2020, 1, 1), 2.0, 0.0),)))
     outcome = ToySimulator().simulate({}, weather, recipe[None], START)
     income = Objective(flat, TIME).value(outcome).balance.income[0, 0]
-    assert income == pytest.approx(outcome.net_growth.sum() * 0.7 / 0.09 * 2.0 * (1 - 0.2))
+    grown = (outcome.net_growth * by_day(outcome.air_temperature)).sum()
+    assert income == pytest.approx(grown * 0.7 / 0.09 * 2.0 * (1 - 0.2))
 
 
 def test_growth_promised_far_outside_the_data_is_not_believed(site, weather, recipe) -> None:
@@ -47,7 +48,7 @@ def test_fruit_that_cannot_ripen_before_the_end_is_worth_nothing(site) -> None:
     np.testing.assert_array_equal(Objective(over, TIME).growth_price(), 0.0)
 
 
-def test_cold_hot_and_damp_hours_are_harm_and_a_cold_day_is_delay(site: Site, weather, recipe) -> None:
+def test_cold_hot_and_damp_hours_are_harm(site: Site, weather, recipe) -> None:
     outcome = ToySimulator().simulate({}, weather, recipe[None], START)
     mild = replace(outcome, air_temperature=np.full((1, 1, HOURS), 20.0), air_humidity=np.full((1, 1, HOURS), 80.0))
     objective = Objective(site, TIME)
@@ -55,8 +56,21 @@ def test_cold_hot_and_damp_hours_are_harm_and_a_cold_day_is_delay(site: Site, we
     damp = replace(mild, air_humidity=np.full((1, 1, HOURS), 95.0))
     assert objective.value(damp).harm[0, 0] == pytest.approx(2 * HOURS * HARM_PER_DEGREE_HOUR)
     cold = replace(mild, air_temperature=np.full((1, 1, HOURS), 12.0))
-    expected = HOURS * HARM_PER_DEGREE_HOUR + 2 * 6.0 * DELAY_PER_DEGREE_DAY
-    assert objective.value(cold).harm[0, 0] == pytest.approx(expected)
+    assert objective.value(cold).harm[0, 0] == pytest.approx(HOURS * HARM_PER_DEGREE_HOUR)
+
+
+def test_each_kelvin_of_cold_costs_a_day_more_than_the_one_before(site: Site, weather, recipe) -> None:
+    outcome = ToySimulator().simulate({}, weather, recipe[None], START)
+    objective = Objective(site, TIME)
+    income = [
+        objective.value(replace(outcome, air_temperature=np.full((1, 1, HOURS), mean))).balance.income[0, 0]
+        for mean in (19.0, 18.0, 17.0, 16.0, 15.0)
+    ]
+    lost = -np.diff(income) / income[0]
+    assert (np.diff(lost) > 0).all()
+    # A crop at 15.7 degC brought 15 EUR m-2 less in 150 days of some 0.25 EUR each.
+    cold = by_day(np.full((1, 1, 24), 15.7))[0, 0, 0]
+    assert 0.25 * 150 * (1.0 - cold) == pytest.approx(15.0, abs=3.0)
 
 
 def test_doubt_that_plan_and_recipe_share_does_not_count(site, weather, recipe) -> None:

@@ -12,6 +12,7 @@ from igrow.core.errors import IgrowError
 from igrow.core.planner import Budget, NumpyGeneration, Objective, PlanningState, optimise
 from igrow.core.planner.objective import Simulator
 from igrow.core.planner.onnx_generation import OnnxGeneration
+from igrow.core.planner.template import for_site
 from igrow.core.site import Site
 
 QUICK = Budget(generations=40, patience=15)
@@ -39,10 +40,12 @@ def test_the_search_comes_near_the_best_that_a_full_search_of_one_setpoint_finds
     hours = np.arange(HOURS)
     best = result.recipe_valuation.score[0, 0]
     chosen = recipe.copy()
-    # The toy's lamp hours do not act on one another, so each hour can be tried alone.
+    template = for_site(only, START, HOURS, radiation=weather[:, 3])
+    # The toy's lamp hours do not act on one another but through the dark hours, so each can be tried alone.
     for hour in hours:
         trials = np.repeat(chosen[None], 2, axis=0)
         trials[:, hour, 2] = [0.0, 1.0]
+        trials = template.limit(trials, np.full(4, np.nan))
         score = objective.value(ToySimulator().simulate({}, weather, trials, START)).score[0]
         chosen = trials[int(np.argmax(score))]
         best = score.max()

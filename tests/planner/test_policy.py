@@ -121,7 +121,7 @@ def test_trials_of_one_course_share_what_they_see_and_the_first_is_followed(site
     np.testing.assert_array_equal(seen[0], seen[2])
     assert (seen[0] != seen[3]).any()
     actions = np.zeros((6, ACTIONS), dtype=np.float32)
-    actions[0] = 0.5
+    actions[0] = -0.1875
     setpoints = to_setpoints(site, actions)
     score = world.step(setpoints).score
     assert score.shape == (1, 6)

@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from igrow.core.agronomy import Memory, one_of
 from igrow.core.economics import Balance
 from igrow.core.greenhouse import GreenhouseParameters, generate_weather
 from igrow.core.greenhouse.disturbances import QUIET
@@ -22,6 +23,7 @@ from igrow.core.greenhouse.plant import Plant
 from igrow.core.greenhouse.sensors import EXACT
 from igrow.core.greenhouse.weather_table import WeatherTable
 from igrow.core.planner.objective import Objective, Outcome, Simulator, Valuation
+from igrow.core.planner.optimise import RADIATION
 from igrow.core.planner.plant_simulator import run
 from igrow.core.planner.policy import HOURS, PRESENT, observe
 from igrow.core.planner.template import Setpoints, for_site
@@ -88,7 +90,8 @@ class Greenhouses:
             disturbances=QUIET,
             sensors=EXACT,
         )
-        self._applied = np.full((self.count, 1, 4), np.nan)
+        self._applied = np.full((self.count, 4), np.nan)
+        self._memory: Memory | None = None
 
     def measurements(self) -> dict[str, Values]:
         """Return the present truth by quantity, (N,) each; actuators as means of the last hour."""
@@ -102,17 +105,21 @@ class Greenhouses:
 
     def applied(self) -> Values:
         """Return the setpoints of the last hour, (N, 4), NaN before the first."""
-        return self._applied[:, 0]
+        return self._applied
 
     def advance(self, setpoints: Setpoints) -> Outcome:
-        """Live through hours under setpoints (N, H, 4) within limits and slew; returns what happened, (1, N, H)."""
+        """Live through hours under setpoints (N, H, 4) within all limits; returns what happened, (1, N, H)."""
         hours = setpoints.shape[1]
-        template = for_site(self.site, self.time, hours)
-        first = np.where(np.isnan(self._applied), setpoints[:, :1], self._applied)
-        limited = template.limit(np.concatenate([first, setpoints], axis=1), np.full(4, np.nan))[:, 1:]
-        self._applied = limited[:, -1:]
+        radiation = self.coming_weather(hours)[:, :, RADIATION].mean(axis=0)
+        template = for_site(self.site, self.time, hours, radiation=radiation)
+        course = template.follow(setpoints, self._applied, self._memory)
+        self._applied, self._memory = course.setpoints[:, -1], course.memory
         self.time = self.time + hours * np.timedelta64(3600, "s")
-        return run(self._plant, limited)
+        return run(self._plant, course.setpoints)
+
+    def memory(self, house: int) -> Memory | None:
+        """Return what one crop has had, as its limits count it."""
+        return None if self._memory is None else one_of(self._memory, house)
 
 
 class DailyGreenhouses:
