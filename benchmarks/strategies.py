@@ -29,7 +29,14 @@ from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.economics import harvest_income, local_days
 from igrow.core.planner import Objective, Outcome, PlanningState, Simulator, optimise
 from igrow.core.planner.policy import OnnxPolicy
-from igrow.core.planner.recent_use import SCALED, Scaled, factors, totals
+from igrow.core.planner.recent_use import (
+    SCALED,
+    Corrected,
+    factors,
+    grown_days,
+    growth_of_days,
+    totals,
+)
 from igrow.core.planner.template import for_site
 from igrow.core.quantities import SETPOINTS
 from igrow.core.simulator.plan import BundleSimulator
@@ -73,6 +80,8 @@ class Situation:
     """What the crop has had, as its limits count it."""
 
 
+Day = tuple[dict[str, Values], dict[str, Values], tuple[float, float]]
+"""What the simulator says of a day that has passed, what it used and grew, and what drove its growth."""
 Strategy = Callable[[Situation], Values]
 """Returns setpoints (HORIZON, 4)."""
 
@@ -113,7 +122,7 @@ def lead(
     site: Site,
     scenario: Scenario,
     strategies: Mapping[str, Strategy],
-    simulator: Simulator,
+    simulator: BundleSimulator,
     every: int,
     forecast: str,
     corrected: bool,
@@ -125,9 +134,7 @@ def lead(
         houses.advance(np.repeat(recipe_table(site, houses.time, 24)[None], houses.count, axis=0))
     books = {name: Book() for name in strategies}
     co2 = np.zeros(houses.count)
-    past: list[deque[tuple[dict[str, Values], dict[str, Values]]]] = [
-        deque(maxlen=round(RECENT_DAYS * 24 / every)) for _ in range(houses.count)
-    ]
+    past: list[deque[Day]] = [deque(maxlen=round(RECENT_DAYS * 24 / every)) for _ in range(houses.count)]
     for choice in range((scenario.days - SETTLING) * 24 // every):
         begin = houses.time
         present, applied = houses.measurements(), houses.applied()
@@ -142,7 +149,7 @@ def lead(
                 else:
                     weather = coming[row]
                 now = {key: float(value[row]) for key, value in present.items()}
-                model = Scaled(simulator, recent(past[row])) if corrected else simulator
+                model = recently(simulator, site, past[row]) if corrected else simulator
                 seed = 1000 * choice + house
                 had = houses.memory(row)
                 situation = Situation(begin, now, applied[row], weather, recipe, float(co2[row]), model, seed, had)
@@ -155,7 +162,9 @@ def lead(
         outcome = houses.advance(np.stack(chosen)[:, :every])
         for row, now in enumerate(states):
             again = first_hours(simulator.simulate(now, coming[row], chosen[row][None], begin), every)
-            past[row].append((totals(again), {name: each[[row]] for name, each in totals(outcome).items()}))
+            had = {name: each[[row]] for name, each in totals(outcome).items()}
+            driven = (0.0, 0.0) if simulator.growth is None else grown_days(simulator.growth, again)
+            past[row].append((totals(again), had, driven))
         for place, book in enumerate(books.values()):
             part = slice(place * scenario.count, (place + 1) * scenario.count)
             mine = Outcome(**{one.name: getattr(outcome, one.name)[:, part] for one in fields(Outcome)})
@@ -172,12 +181,17 @@ def lead(
     return books
 
 
-def recent(days: Iterable[tuple[dict[str, Values], dict[str, Values]]]) -> dict[str, float]:
-    """Return the factors of what was expected of the last days and what they used."""
+def recently(simulator: BundleSimulator, site: Site, days: Iterable[Day]) -> Corrected:
+    """Return the simulator corrected by what was expected of the last days and what they used and grew."""
     found = list(days)
-    return factors(
+    factor = factors(
         *({name: np.array([float(day[side][name][0]) for day in found]) for name in SCALED} for side in (0, 1))
     )
+    balance = simulator.growth
+    if balance is None:
+        return Corrected(simulator, factor)
+    grown = [float(day[1]["net_growth"][0]) for day in found]
+    return Corrected(simulator, factor, balance, growth_of_days(balance, site.crop, [day[2] for day in found], grown))
 
 
 def _past(weather: Telemetry, now: np.datetime64) -> Telemetry:

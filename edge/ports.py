@@ -133,6 +133,8 @@ class Plan:
     leaves_range: bool = False
     """The plan visits states or actions that the simulator was not trained on."""
     note: str = ""
+    growth: str = ""
+    """One line: what the log told of how this crop grows."""
     predicted: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     """By quantity: the expected course at the end of each step, (steps,)."""
     binding: Mapping[str, tuple[tuple[str, ...], ...]] = field(default_factory=dict)

@@ -15,8 +15,17 @@ from igrow.core.bundle import Bundle, read_bundle
 from igrow.core.errors import IgrowError
 from igrow.core.planner import Budget, PlanningState, Simulator, optimise
 from igrow.core.planner.onnx_generation import OnnxGeneration
-from igrow.core.planner.recent_use import SCALED, Scaled, factors, totals, used_in
+from igrow.core.planner.recent_use import (
+    SCALED,
+    Corrected,
+    factors,
+    grown_days,
+    growth_of_days,
+    totals,
+    used_in,
+)
 from igrow.core.quantities import SETPOINTS
+from igrow.core.simulator.growth import GrowthBalance
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Greenhouse, Site
 from igrow.core.telemetry import Telemetry
@@ -54,7 +63,7 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
         co2_before=co2_since_planting(site, request.telemetry, start),
         memory=remember(Place.of(site), request.telemetry, start),
     )
-    corrected = Scaled(simulator, recent_factors(simulator, site, request.telemetry, start))
+    corrected = recently(simulator, simulator.growth, site, request.telemetry, start)
     result = optimise(
         corrected,
         site,
@@ -83,6 +92,7 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
         recipe_profit=result.recipe_profit,
         leaves_range=result.leaves_range,
         note="follows the recipe: nothing better was found" if result.follows_recipe else "",
+        growth="" if corrected.growth is None else corrected.growth.sentence,
         predicted={
             name: tuple(float(values[:, 0, hour].mean()) for hour in hour_of_step)
             for name, values in (
@@ -117,13 +127,15 @@ def present(log: Telemetry, start: int) -> dict[str, float]:
     return values
 
 
-def recent_factors(simulator: Simulator, site: Site, log: Telemetry, start: int) -> dict[str, float]:
-    """Return by how much the last whole days of the log departed from what the simulator says of them."""
+def recently(simulator: Simulator, balance: GrowthBalance | None, site: Site, log: Telemetry, start: int) -> Corrected:
+    """Return the simulator corrected by how the last whole days of the log departed from what it says of them."""
     begin = np.datetime64(start, "s")
     lacking = [name for name in SETPOINTS if name not in log]
     log = log.with_columns({name: np.full(len(log), site.limits[name].safe) for name in lacking})
     expected: dict[str, list[float]] = {name: [] for name in SCALED}
     used: dict[str, list[float]] = {name: [] for name in SCALED}
+    driven: list[tuple[float, float]] = []
+    grown: list[float] = []
     for back in range(1, RECENT_DAYS + 1):
         morning = start - back * DAY
         day = log.select(begin - np.timedelta64(back * DAY, "s"), begin - np.timedelta64((back - 1) * DAY, "s"))
@@ -135,13 +147,19 @@ def recent_factors(simulator: Simulator, site: Site, log: Telemetry, start: int)
         except IgrowError:
             continue
         outcome = simulator.simulate(present(log, morning), weather, setpoints[None], np.datetime64(morning, "s"))
-        for column, values in ((expected, totals(outcome)), (used, used_in(day, site.greenhouse))):
+        measured = used_in(day, site.greenhouse)
+        for column, values in ((expected, totals(outcome)), (used, measured)):
             for name in SCALED:
                 column[name].append(float(np.mean(values[name])))
-    return factors(
+        if balance is not None:
+            driven.append(grown_days(balance, outcome))
+            grown.append(measured["net_growth"])
+    factor = factors(
         {name: np.array(values) for name, values in expected.items()},
         {name: np.array(values) for name, values in used.items()},
     )
+    growth = None if balance is None else growth_of_days(balance, site.crop, driven, grown)
+    return Corrected(simulator, factor, balance, growth)
 
 
 def co2_since_planting(site: Site, log: Telemetry, start: int) -> float:
@@ -178,7 +196,7 @@ def _covered(course: tuple[float, ...], request: PlanRequest, hours: int) -> int
 
 
 @functools.lru_cache(maxsize=1)
-def _open(folder: Path, greenhouse: Greenhouse) -> tuple[Bundle, Simulator, OnnxGeneration]:
+def _open(folder: Path, greenhouse: Greenhouse) -> tuple[Bundle, BundleSimulator, OnnxGeneration]:
     """Open the bundle in force once; a request with another bundle closes it."""
     bundle = read_bundle(folder)
     return bundle, BundleSimulator(bundle, greenhouse), OnnxGeneration(bundle.graph("optimizer"))

@@ -1,27 +1,31 @@
-"""What the last days used and grew, over what the simulator says of them: the factor that plans are corrected by.
+"""What the last days used and grew, over what the simulator says of them: what plans are corrected by.
 
 No simulator is right on average at every site and in every week, and a search prefers what it errs on in its favour
 (the winner's curse). Run again over the days that have just passed, from what was measured, under their weather and
 the setpoints that were in force, it shows by how much it errs on what plans did; the next plan is expected to err as
-much (model output statistics; Glahn and Lowry (1972), J. Appl. Meteor. 11, 1203-1211).
+much (model output statistics; Glahn and Lowry (1972), J. Appl. Meteor. 11, 1203-1211). Resources are corrected by a
+factor each, growth by its conversion and its maintenance (`igrow.core.simulator.growth`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from igrow.core.planner.objective import Outcome, Simulator
-from igrow.core.site import Greenhouse
+from igrow.core.simulator.growth import Count, GrowthBalance, GrowthDays, GrowthFit, regress, warmth
+from igrow.core.site import Crop, Greenhouse
 from igrow.core.telemetry import Telemetry
 
 Values = NDArray[np.float64]
 
-SCALED = ("heat", "electricity", "co2", "net_growth")
-"""What plans are paid and charged for."""
+SCALED = ("heat", "electricity", "co2")
+"""What plans are charged for."""
+GROWTH_ERROR = 0.2
+"""Standard deviation of a day's growth over its size, as a simulator errs on single days."""
 _STEADY_DAYS = 1.0
 """Days of "no error" that count beside those that have passed, so that one odd day does not decide."""
 _LARGEST = 2.0
@@ -46,12 +50,37 @@ def factors(expected: Mapping[str, Values], used: Mapping[str, Values]) -> dict[
 
 
 def totals(outcome: Outcome) -> dict[str, Values]:
-    """Return the totals of an outcome by `SCALED`, mean over the ensemble, (B,)."""
-    return {name: getattr(outcome, name).sum(axis=-1).mean(axis=0) for name in SCALED}
+    """Return the totals of an outcome by `SCALED` and ``net_growth``, mean over the ensemble, (B,)."""
+    return {name: getattr(outcome, name).sum(axis=-1).mean(axis=0) for name in (*SCALED, "net_growth")}
+
+
+def grown_days(balance: GrowthBalance, outcome: Outcome) -> tuple[float, float]:
+    """Return what drove one candidate's growth: CO2 taken up, kg m-2, and warmth, h (see `growth.GrowthDays`)."""
+    air = outcome.air_temperature[0, 0]
+    return float(balance.assimilated(outcome.net_growth[0, 0], air).sum()), float(warmth(air).sum())
+
+
+def growth_of_days(
+    balance: GrowthBalance, crop: Crop, driven: Sequence[tuple[float, float]], grown: Sequence[float]
+) -> GrowthFit:
+    """Return conversion and maintenance by days that have passed.
+
+    Args:
+        balance: of the simulator, which is what is expected before.
+        crop: that grew.
+        driven: by day, from `grown_days`.
+        grown: net growth of each as counted, kg m-2; NaN where it was not.
+    """
+    table = np.array(driven, dtype=np.float64).reshape(-1, 2)
+    known = np.array([amount for amount in grown if np.isfinite(amount)])
+    usual = float(np.abs(known).mean()) if len(known) else 0.0
+    counts = [Count(day, day + 1, amount, max(GROWTH_ERROR * usual, 1e-4)) for day, amount in enumerate(grown)]
+    mean = np.array([balance.conversion, balance.maintenance])
+    return regress(GrowthDays(table[:, 0], table[:, 1]), counts, crop, mean, balance.covariance)
 
 
 def used_in(log: Telemetry, greenhouse: Greenhouse) -> dict[str, float]:
-    """Return what a log of some hours says was used and grown, by `SCALED`; NaN where it does not say.
+    """Return what a log of some hours says was used, by `SCALED`, and its ``net_growth``; NaN where it does not say.
 
     Heat is what leaves the pipes by the site's coefficients; growth is the difference of its last and first value.
     """
@@ -84,14 +113,28 @@ def used_in(log: Telemetry, greenhouse: Greenhouse) -> dict[str, float]:
 
 
 @dataclass(frozen=True)
-class Scaled:
-    """A simulator whose amounts are multiplied by `factors`; implements `objective.Simulator`."""
+class Corrected:
+    """A simulator whose resources are multiplied by `factor` and whose crop grows as counted."""
 
     simulator: Simulator
     factor: Mapping[str, float]
     """By `SCALED`."""
+    balance: GrowthBalance | None = None
+    """What the simulator's growth was computed with; None leaves growth as it is."""
+    growth: GrowthFit | None = None
+    """What it is to be computed with; its doubt is spread over the ensemble."""
 
     def simulate(self, initial: dict[str, float], weather: Values, setpoints: Values, start: np.datetime64) -> Outcome:
         """Return what candidates do; see `objective.Simulator`."""
         outcome = self.simulator.simulate(initial, weather, setpoints, start)
-        return replace(outcome, **{name: self.factor[name] * getattr(outcome, name) for name in SCALED})
+        changes = {name: self.factor[name] * getattr(outcome, name) for name in SCALED}
+        if self.balance is not None and self.growth is not None:
+            changes["net_growth"] = regrown(outcome, self.balance, self.growth)
+        return replace(outcome, **changes)
+
+
+def regrown(outcome: Outcome, balance: GrowthBalance, growth: GrowthFit) -> Values:
+    """Return net growth (M, B, H) as it is with the fitted conversion and maintenance, one draw for each member."""
+    pairs = growth.draws(len(outcome.net_growth))[:, :, None, None]
+    assimilated = balance.assimilated(outcome.net_growth, outcome.air_temperature)
+    return np.asarray(pairs[:, 0] * assimilated - pairs[:, 1] * warmth(outcome.air_temperature))

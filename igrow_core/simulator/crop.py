@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from igrow.core.effects.definition import Array
 from igrow.core.simulator.network import Stage
 
@@ -21,6 +24,8 @@ class CropStages:
     """Dry matter per CO2 that the climate stage's canopy takes up, kg kg-1."""
     maintenance: float
     """Dry matter that maintenance takes at 20 degC, kg m-2 h-1."""
+    covariance: NDArray[np.float64] | None = None
+    """Of conversion and maintenance, (2, 2); None where this crop was never counted."""
 
 
 def net_growth_rate(

@@ -12,6 +12,7 @@ from igrow.core.bundle import Bundle, BundleError, open_session
 from igrow.core.errors import IgrowError
 from igrow.core.planner.objective import Outcome
 from igrow.core.quantities import GROWTH, WEATHER
+from igrow.core.simulator.growth import GrowthBalance
 from igrow.core.simulator.hindcast import SimulatorSettings
 from igrow.core.simulator.hybrid.measurement import PREDICTED
 from igrow.core.site import Greenhouse
@@ -59,6 +60,8 @@ class BundleSimulator:
             BundleError: the graph or the manifest cannot be used.
         """
         self.settings = SimulatorSettings.of(bundle)
+        self.growth = GrowthBalance.of(bundle.manifest.simulator)
+        """What growth is computed with; None where it is a network's affair."""
         self._session = open_session(bundle.graph("simulator"), threads=threads)
         try:
             tensors = {one.name: one.quantities for one in bundle.manifest.graphs["simulator"].inputs}

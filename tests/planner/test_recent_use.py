@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import fields, replace
+
 import numpy as np
 import pytest
 from toy_greenhouse import START, ToySimulator
 
-from igrow.core.planner.recent_use import SCALED, Scaled, factors, totals, used_in
-from igrow.core.site import Greenhouse
+from igrow.core.planner import Outcome
+from igrow.core.planner.recent_use import (
+    SCALED,
+    Corrected,
+    factors,
+    grown_days,
+    growth_of_days,
+    totals,
+    used_in,
+)
+from igrow.core.simulator.growth import GrowthBalance
+from igrow.core.site import Crop, Greenhouse
 from igrow.core.telemetry import Telemetry
 
 
@@ -37,13 +49,46 @@ def test_no_factor_is_beyond_belief() -> None:
 def test_amounts_are_scaled_and_the_climate_is_not(weather) -> None:
     setpoints = np.tile([20.0, 600.0, 1.0, 0.5], (2, 48, 1))
     plain = ToySimulator().simulate({}, weather, setpoints, START)
-    factor = dict(zip(SCALED, (0.5, 1.0, 2.0, 0.8), strict=True))
-    scaled = Scaled(ToySimulator(), factor).simulate({}, weather, setpoints, START)
+    factor = dict(zip(SCALED, (0.5, 1.0, 2.0), strict=True))
+    scaled = Corrected(ToySimulator(), factor).simulate({}, weather, setpoints, START)
     np.testing.assert_array_equal(scaled.air_temperature, plain.air_temperature)
     before, after = totals(plain), totals(scaled)
     for name in SCALED:
         np.testing.assert_allclose(after[name], factor[name] * before[name])
+    np.testing.assert_array_equal(scaled.net_growth, plain.net_growth)
     assert before["net_growth"].shape == (2,)
+
+
+def test_growth_is_corrected_by_what_was_assimilated_and_not_by_a_factor(weather) -> None:
+    """Twice the maintenance takes as much from a day with lamps as from one without: lamps stay worth what they add."""
+    balance = GrowthBalance(0.6, 1e-4, np.diag([0.2, 2e-4]) ** 2)
+    setpoints = np.tile([20.0, 600.0, 0.0, 0.5], (2, 48, 1))
+    setpoints[1, :, 2] = 1.0
+    plain = ToySimulator(members=(1.0, 1.0, 1.0)).simulate({}, weather, setpoints, START)
+    days = [first_day(plain, one) for one in range(2)]
+    driven = [grown_days(balance, day) for day in days] * 3
+    lost = 24 * 1e-4
+    grown = [float(day.net_growth[0, 0].sum()) - lost for day in days] * 3
+    fit = growth_of_days(replace(balance, covariance=balance.covariance * 100.0), Crop(), driven, grown)
+    assert fit.conversion == pytest.approx(0.6, rel=0.02)
+    assert fit.maintenance == pytest.approx(2e-4, rel=0.05)
+    after = Corrected(ToySimulator(members=(1.0, 1.0, 1.0)), dict.fromkeys(SCALED, 1.0), balance, fit).simulate(
+        {}, weather, setpoints, START
+    )
+    gain = [each.net_growth[0, 1].sum() - each.net_growth[0, 0].sum() for each in (plain, after)]
+    assert gain[1] == pytest.approx(gain[0], rel=0.02)
+    assert after.net_growth.sum(axis=-1).std(axis=0).min() > 0.0
+
+
+def test_without_counted_growth_the_simulators_own_stays_with_its_doubt(weather) -> None:
+    balance = GrowthBalance(0.6, 1e-4, np.diag([0.1, 1e-4]) ** 2)
+    fit = growth_of_days(balance, Crop(), [(0.02, 24.0)], [float("nan")])
+    assert (fit.conversion, fit.maintenance) == (0.6, 1e-4)
+    assert "counts no growth" in fit.sentence
+
+
+def first_day(outcome, candidate):
+    return Outcome(**{one.name: getattr(outcome, one.name)[:, [candidate], :24] for one in fields(Outcome)})
 
 
 def test_a_log_tells_what_was_used() -> None:

@@ -13,7 +13,7 @@ from igrow.core.planner import Outcome
 from igrow.core.quantities import SETPOINTS
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
-from igrow.edge.planning.make_plan import co2_since_planting, hourly_recipe, make_plan, present, recent_factors
+from igrow.edge.planning.make_plan import co2_since_planting, hourly_recipe, make_plan, present, recently
 from igrow.edge.ports import PlanRequest
 
 START = 1_780_012_800
@@ -92,11 +92,11 @@ class OneUnitAnHour:
 
 def test_plans_are_corrected_by_what_the_log_s_last_days_used() -> None:
     dosed = log().with_columns({"co2_dosing": np.full(len(log()), 1.4)})
-    found = recent_factors(OneUnitAnHour(), SITE, dosed, START)
+    found = recently(OneUnitAnHour(), None, SITE, dosed, START).factor
     assert 1.2 < found["co2"] < 1.4
-    assert [found[name] for name in ("heat", "electricity", "net_growth")] == [1.0, 1.0, 1.0]
+    assert [found[name] for name in ("heat", "electricity")] == [1.0, 1.0]
     short = dosed.select(np.datetime64(START - 20 * 3600, "s"), np.datetime64(START + 1, "s"))
-    assert recent_factors(OneUnitAnHour(), SITE, short, START)["co2"] == 1.0
+    assert recently(OneUnitAnHour(), None, SITE, short, START).factor["co2"] == 1.0
 
 
 def test_the_co2_that_the_crop_has_had_follows_from_the_log_s_days_and_those_since_planting() -> None:

@@ -89,6 +89,7 @@ def write_hybrid_bundle(folder: Path, model: HybridModel, *, created: datetime, 
             CALIBRATED_ON_KEY: model.calibrated_on,
             "conversion": model.crop.conversion,
             "maintenance": model.crop.maintenance,
+            "growth_covariance": None if model.crop.covariance is None else model.crop.covariance.tolist(),
             "reference_time": reference.astimezone(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
             "parameters": values,
             "members": [
@@ -124,6 +125,7 @@ def read_hybrid_model(bundle: Bundle, site: Site) -> HybridModel:
         raise BundleError(f"{bundle.folder}: {CROP_FILE} is not readable: {error.strerror}") from None
     stages, _ = stages_from_bytes(content, where=str(bundle.folder / CROP_FILE))
     given = manifest.simulator.get("parameters", {})
+    covariance = manifest.simulator.get("growth_covariance")
     return HybridModel(
         site=site,
         posterior=posterior,
@@ -135,6 +137,7 @@ def read_hybrid_model(bundle: Bundle, site: Site) -> HybridModel:
             stages["harvest"],
             float(manifest.simulator.get("conversion", 0.0)),
             float(manifest.simulator.get("maintenance", 0.0)),
+            None if covariance is None else np.array(covariance, dtype=np.float64),
         ),
         effects=tuple(effect for effect in manifest.effects if effect.kind != "remainder"),
         training_span=manifest.training_span,
