@@ -80,6 +80,13 @@ class Simulator(Protocol):
         """
 
 
+class Worth(Protocol):
+    """Says what outcomes are worth to the crop."""
+
+    def income(self, outcome: Outcome, time: NDArray[np.datetime64]) -> Values:
+        """Return EUR m-2 over the horizon, (M, B); `time` are the UTC starts of its hours, (H,)."""
+
+
 @dataclass(frozen=True)
 class Valuation:
     """What B candidates are worth over the horizon, EUR m-2, by each of M members: arrays (M, B)."""
@@ -111,6 +118,8 @@ class Objective:
     """UTC starts of the hours, (H,)."""
     co2_before: Values | float = 0.0
     """kg m-2 of CO2 that the crop has had before; one value, or one for each candidate, (B,)."""
+    worth: Worth | None = None
+    """What the crop's growth is worth; None takes the average price of the days on which fruit now growing ripens."""
 
     def value(self, outcome: Outcome) -> Valuation:
         """Return what the candidates are worth."""
@@ -125,14 +134,18 @@ class Objective:
             crop.stem_density,
             self.co2_before,
         )
-        believed = outcome.net_growth * np.clip(1.0 - DISBELIEF * outcome.outside, 0.0, 1.0)
-        fresh = believed * (crop.fruit_share / crop.dry_matter_fraction)
-        income = np.sum(fresh * by_day(outcome.air_temperature) * self.growth_price(), axis=-1)
+        income = self._income(outcome) if self.worth is None else self.worth.income(outcome, self.time)
         return Valuation(
             balance=Balance(income, costs.plants, costs.upkeep, costs.electricity, costs.heat, costs.co2),
             harm=self._harm(outcome),
             outside=OUTSIDE_PENALTY * np.sum(outcome.outside, axis=-1) / 24.0,
         )
+
+    def _income(self, outcome: Outcome) -> Values:
+        crop = self.site.crop
+        believed = outcome.net_growth * np.clip(1.0 - DISBELIEF * outcome.outside, 0.0, 1.0)
+        fresh = believed * (crop.fruit_share / crop.dry_matter_fraction)
+        return np.asarray(np.sum(fresh * by_day(outcome.air_temperature) * self.growth_price(), axis=-1))
 
     def growth_price(self) -> Values:
         """Return what fresh fruit growing in each hour will earn on average, EUR kg-1, (H,)."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from igrow.core.agronomy import Memory
 from igrow.core.errors import IgrowError
 from igrow.core.planner.evolution import WORST, Generation, NumpyGeneration, draw
-from igrow.core.planner.objective import Objective, Outcome, Simulator, Valuation, cautious, damp_hours
+from igrow.core.planner.objective import Objective, Outcome, Simulator, Valuation, Worth, cautious, damp_hours
 from igrow.core.planner.template import Setpoints, Template, for_site
 from igrow.core.quantities import SETPOINTS, WEATHER
 from igrow.core.site import Site
@@ -95,6 +95,7 @@ def optimise(
     generation: Generation | None = None,
     template: Template | None = None,
     seeds: Sequence[Setpoints] = (),
+    worth: Worth | None = None,
     monotonic: Callable[[], float] = clock.monotonic,
 ) -> PlanResult:
     """Search for setpoints that earn more than the recipe.
@@ -110,6 +111,7 @@ def optimise(
         generation: the genetic algorithm, in numpy or from optimizer.onnx.
         template: genes to setpoints; by default blocks of the local day, each day its own.
         seeds: further starting points (H, 4), such as what is left of the last plan.
+        worth: what growth is worth to the crop; by default the average price of the days on which it ripens.
         monotonic: clock in seconds.
 
     Raises:
@@ -123,7 +125,7 @@ def optimise(
     run = generation or NumpyGeneration()
     time = state.time.astype("datetime64[s]") + np.arange(hours) * np.timedelta64(3600, "s")
     template = template or for_site(site, state.time, hours, radiation=forecast[:, RADIATION])
-    objective = Objective(site, time, state.co2_before)
+    objective = Objective(site, time, state.co2_before, worth)
     applied = np.array([state.applied.get(name, np.nan) for name in SETPOINTS])
     recipe_course = template.follow(recipe[None], applied, state.memory)
     recipe = recipe_course.setpoints[0]

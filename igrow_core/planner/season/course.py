@@ -1,0 +1,136 @@
+"""A season under strategies: typical days through the simulator, every day through the crop, the balance at the end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow.core.economics import Balance, harvest_income, local_days, running_costs
+from igrow.core.greenhouse import tomato
+from igrow.core.greenhouse.parameters import GreenhouseParameters
+from igrow.core.greenhouse.tomato import Crop
+from igrow.core.planner.objective import DISBELIEF, OUTSIDE_PENALTY, Outcome, Simulator
+from igrow.core.planner.season.crop import fresh, like, live, supplied
+from igrow.core.planner.season.strategy import Strategy
+from igrow.core.planner.template import Setpoints, Template, for_site
+from igrow.core.quantities import WEATHER
+from igrow.core.site import Site
+
+Values = NDArray[np.float64]
+DAY = np.timedelta64(86_400, "s")
+RADIATION = WEATHER.index("global_radiation")
+MORNING = {"air_temperature": 18.0, "air_humidity": 80.0, "air_co2": 600.0, "leaf_area_index": 3.0}
+"""Where a typical day begins, at local midnight."""
+
+
+@dataclass(frozen=True)
+class Season:
+    """A season to be planned."""
+
+    site: Site
+    simulator: Simulator
+    plant: GreenhouseParameters
+    """The crop's parameters."""
+    start: np.datetime64
+    """UTC of the first day's local midnight."""
+    days: int
+    weather: Values
+    """Of typical days, (T, 24, 6): the first stands for the first `days` / T days, and so on."""
+    recipe: Setpoints
+    """The grower's day, (24, 4), for what strategies say nothing of."""
+    first_day: int = 0
+    """Day of the season on which the start lies; the strategies' days are counted from the season's beginning."""
+
+    @property
+    def every(self) -> int:
+        """Days for which a typical one stands."""
+        return -(-self.days // len(self.weather))
+
+
+@dataclass(frozen=True)
+class SeasonOutcome:
+    """What B strategies bring, EUR m-2; net profit counts only fruit that was ripe and harvested."""
+
+    balance: Balance
+    harvest: Values
+    """kg m-2, (B,)."""
+    penalty: Values
+    """For leaving the range of the training data, EUR m-2, (B,)."""
+    crop: Crop
+    """At the end."""
+    used: dict[str, Values]
+    """heat (MJ m-2), electricity (kWh m-2), co2 and net_growth (kg m-2), (B,)."""
+
+
+def run_season(season: Season, strategy: Strategy, genes: NDArray[np.float32], crop: Crop) -> SeasonOutcome:
+    """Return what strategies (B, G) bring from a crop on, which may be one for all or (B,) of one strategy."""
+    site, p = season.site, season.plant
+    count = max(len(genes), np.shape(crop.leaf)[0] if np.ndim(crop.leaf) else 1)
+    plants = crop if np.ndim(crop.leaf) else like(crop, count)
+    planted = fresh(p, plants)
+    parts: list[Balance] = []
+    used = {name: np.zeros(count) for name in ("heat", "electricity", "co2", "net_growth")}
+    penalty = np.zeros(count)
+    for typical, weather in enumerate(season.weather):
+        first = typical * season.every
+        repeats = min(season.every, season.days - first)
+        if repeats <= 0:
+            break
+        start = season.start + first * DAY
+        outcome = _typical_day(season, strategy, genes, first + repeats // 2, start, weather)
+        supply = np.broadcast_to(supplied(p, believed(outcome), outcome.air_temperature[0]), (count, 24))
+        warm = np.broadcast_to(outcome.air_temperature[0], (count, 24))
+        time = start + np.arange(24) * np.timedelta64(3600, "s")
+        heat, electricity, co2 = (
+            np.tile(getattr(outcome, name)[0], (1, repeats)) for name in ("heat", "electricity", "co2")
+        )
+        hours = np.tile(time, repeats)
+        # The price of CO2 rises with what the crop has had.
+        parts.append(
+            running_costs(
+                site.prices, site.time_zone, hours, heat, electricity, co2, site.crop.stem_density, used["co2"]
+            )
+        )
+        used = {name: before + repeats * getattr(outcome, name)[0].sum(axis=-1) for name, before in used.items()}
+        penalty = penalty + repeats * OUTSIDE_PENALTY * outcome.outside[0].sum(axis=-1) / 24.0
+        for day in range(first, first + repeats):
+            before = fresh(p, plants)
+            plants = live(p, plants, supply, warm)
+            if (day + season.first_day) % max(int(p.deleafing_interval), 1) == 0:
+                plants = tomato.deleaf(np, p, plants)
+            picked = fresh(p, plants) - before
+            when = local_days(np.array([season.start + day * DAY + DAY // 2]), site.time_zone)
+            income = harvest_income(site.prices, when, picked, 0.0 * picked, site.crop.brix)
+            nothing = np.zeros(count)
+            parts.append(Balance(income, nothing, nothing, nothing, nothing, nothing))
+    total = parts[0]
+    for part in parts[1:]:
+        total = total + part
+    return SeasonOutcome(total, fresh(p, plants) - planted, penalty, plants, used)
+
+
+def believed(outcome: Outcome) -> Values:
+    """Return the net growth (B, H) of the first member, less of it outside of the training data."""
+    return np.asarray(outcome.net_growth[0] * np.clip(1.0 - DISBELIEF * outcome.outside[0], 0.0, 1.0))
+
+
+def _typical_day(
+    season: Season, strategy: Strategy, genes: NDArray[np.float32], day: int, start: np.datetime64, weather: Values
+) -> Outcome:
+    template = for_site(season.site, start, 48, radiation=np.tile(weather[:, RADIATION], 2))
+    wanted = asked(strategy, genes, season.first_day + day, template, weather, season.recipe)
+    # The day before is like it, so that the night that ends in the morning has had its dark hours, or has not.
+    course = template.follow(np.tile(wanted, (1, 2, 1)), np.full(4, np.nan)).setpoints[:, 24:]
+    return season.simulator.simulate(dict(MORNING), weather, course, start)
+
+
+def asked(
+    strategy: Strategy, genes: NDArray[np.float32], day: float, template: Template, weather: Values, recipe: Setpoints
+) -> Setpoints:
+    """Return what strategies ask of a day, (B, 24, 4), whose hours are the first 24 of a template."""
+    moments = template.moments[:24]
+    local_hour = np.array([one.clock for one in moments])
+    sun_up = np.array([one.sun_up for one in moments])
+    return strategy.setpoints(genes, day, local_hour, sun_up, weather, recipe)

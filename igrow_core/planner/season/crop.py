@@ -1,0 +1,86 @@
+"""The mechanistic tomato at the pace of a season, fed by what a simulator says that the canopy takes up.
+
+A simulator's balance of growth knows one crop. Here the same assimilates meet a crop of any leaf area, with a buffer
+that may be full and fruit that may be young: `igrow.core.greenhouse.tomato`, in steps of hours.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow.core.greenhouse import tomato
+from igrow.core.greenhouse.parameters import GreenhouseParameters
+from igrow.core.greenhouse.tomato import Crop
+
+Values = NDArray[np.float64]
+
+HOURS = 3
+"""Hours of a step."""
+GROWTH_COST = 0.28
+"""Carbohydrate respired for each growing into an organ, mean of fruit, leaf and stem (Heuvelink 1996)."""
+INTERCEPTION = 0.7
+"""Extinction of light in the canopy, 1."""
+ITERATIONS = 5
+REFERENCE_LEAF_AREA = 3.0
+"""Leaf area index at which a simulator's assimilation is given."""
+
+
+def supplied(p: GreenhouseParameters, net_growth: Values, air_temperature: Values) -> Values:
+    """Return the carbohydrate that the reference crop took up behind a net growth in kg m-2 an hour, (B, H).
+
+    What it kept, what its maintenance took, and what growing cost.
+    """
+    reference = tomato.mature_crop(p, 1.0, REFERENCE_LEAF_AREA)
+    pools = (("fruit", tomato.total(reference.fruit)), ("leaf", reference.leaf), ("stem", reference.stem))
+    at_25 = 3600.0 * sum(tomato.MAINTENANCE[name] * size for name, size in pools)
+    idle = at_25 * np.exp(0.0693147 * (air_temperature - 25.0))
+    seconds = 3600.0 * sum(size for _, size in pools)
+    # Maintenance rises with growth, and growth is what net growth and maintenance leave.
+    maintenance = 0.5 * idle
+    for _ in range(ITERATIONS):
+        growth_rate = (net_growth + maintenance).mean(axis=-1, keepdims=True) / seconds
+        maintenance = idle * (1.0 - np.exp(-tomato.ACTIVITY * np.maximum(growth_rate, 0.0)))
+    return np.asarray(np.maximum((1.0 + GROWTH_COST) * (net_growth + maintenance), 0.0))
+
+
+def live(p: GreenhouseParameters, crop: Crop, supply: Values, air_temperature: Values) -> Crop:
+    """Return the crops (B,) after hours with a supply and an air temperature of (B, H); H a multiple of `HOURS`."""
+    count, hours = supply.shape
+    fed = supply.reshape(count, hours // HOURS, HOURS).sum(axis=2)
+    warm = air_temperature.reshape(count, hours // HOURS, HOURS).mean(axis=2)
+    for step in range(hours // HOURS):
+        crop = _step(p, crop, fed[:, step], warm[:, step], 3600.0 * HOURS)
+    return crop
+
+
+def _step(p: GreenhouseParameters, crop: Crop, fed: Values, temperature: Values, seconds: float) -> Crop:
+    area = tomato.leaf_area_index(p, crop)
+    light = (1.0 - np.exp(-INTERCEPTION * area)) / (1.0 - np.exp(-INTERCEPTION * REFERENCE_LEAF_AREA))
+    assimilated = fed * light * tomato.assimilation_share(np, crop)
+    rate = tomato.rates(np, p, crop, temperature)
+    # In a step of hours growth may not take more than there is.
+    need = (rate.fruit + rate.leaf + rate.stem + rate.growth_respiration) * seconds
+    share = np.minimum(1.0, (np.maximum(crop.buffer, 0.0) + assimilated) / np.maximum(need, 1e-12))
+    rate = rate._replace(
+        fruit=rate.fruit * share,
+        leaf=rate.leaf * share,
+        stem=rate.stem * share,
+        growth_respiration=rate.growth_respiration * share,
+    )
+    return tomato.grow(np, p, crop, rate, assimilated, temperature, seconds)
+
+
+def like(crop: Crop, count: int) -> Crop:
+    """Return `count` crops equal to one."""
+
+    def one(value: object) -> NDArray[np.float64]:
+        array = np.asarray(value, dtype=np.float64)
+        return np.repeat(array.reshape(*array.shape[: array.ndim], 1), count, axis=-1)
+
+    return Crop(*(one(value) for value in crop))
+
+
+def fresh(p: GreenhouseParameters, crop: Crop) -> Values:
+    """Return the fresh fruit harvested so far, kg m-2, (B,)."""
+    return np.asarray(crop.harvested / p.fruit_dry_matter)
