@@ -93,10 +93,16 @@ def season_of(site: Site, days: int) -> Season:
     return Season(site, simulator, parameters_of(site), START, days, typical_days(days), recipe)
 
 
-def genetic(value: Callable[[Genes], Values], genes: int, generations: int, seed: int) -> tuple[Genes, list[float]]:
+def genetic(
+    value: Callable[[Genes], Values], genes: int, generations: int, seed: int, first: Genes | None = None
+) -> tuple[Genes, list[float]]:
     """Return the best genes by the elitist genetic algorithm, and the best value after each generation."""
     rng, step = np.random.default_rng(seed), NumpyGeneration(SETTINGS)
     offspring: Genes = rng.random((SETTINGS.offspring, genes), dtype=np.float32)
+    if first is not None:
+        near = first + 0.1 * rng.standard_normal((SETTINGS.offspring // 2, genes))
+        offspring[: len(near)] = np.clip(near, 0.0, 1.0)
+        offspring[0] = first
     parents, fitness = offspring[: SETTINGS.parents], np.full(SETTINGS.parents, -3e38, dtype=np.float32)
     history = []
     for _ in range(generations):
@@ -106,13 +112,16 @@ def genetic(value: Callable[[Genes], Values], genes: int, generations: int, seed
     return parents[0], history
 
 
-def cma_es(value: Callable[[Genes], Values], genes: int, generations: int, seed: int) -> tuple[Genes, list[float]]:
+def cma_es(
+    value: Callable[[Genes], Values], genes: int, generations: int, seed: int, first: Genes | None = None
+) -> tuple[Genes, list[float]]:
     """Return the best genes by CMA-ES with as many candidates."""
     import cma  # noqa: PLC0415 - wanted by this table alone
 
     options = {"bounds": [0.0, 1.0], "popsize": SETTINGS.offspring, "seed": seed + 1, "verbose": -9}
-    search = cma.CMAEvolutionStrategy(np.full(genes, 0.5), 0.25, options)
-    best, best_value = np.full(genes, 0.5, dtype=np.float32), -np.inf
+    start = np.full(genes, 0.5, dtype=np.float32) if first is None else first
+    search = cma.CMAEvolutionStrategy(start, 0.25 if first is None else 0.1, options)
+    best, best_value = start, -np.inf
     history = []
     for _ in range(generations):
         candidates = search.ask()
@@ -124,32 +133,47 @@ def cma_es(value: Callable[[Genes], Values], genes: int, generations: int, seed:
     return best, history
 
 
+def worth(season: Season, strategy: Strategy) -> Callable[[Genes], Values]:
+    """Return what candidates of a strategy are worth in a season from a mature crop on, EUR m-2, (B,)."""
+    crop = tomato.mature_crop(season.plant, 1.0)
+
+    def value(genes: Genes) -> Values:
+        outcome = run_season(season, strategy, genes, crop)
+        return np.asarray(outcome.balance.net_profit - outcome.penalty)
+
+    return value
+
+
 def tune(arguments: argparse.Namespace) -> None:
     """Search all and write them down."""
-    days = arguments.days
-    strategies = {"rule": Strategy(days, 1, ends=True), "season": Strategy(days, 6)}
-    result: dict[str, Any] = {"days": days, "strategies": {}}
-    print(f"{'prices':10s}{'strategy':10s}{'search':10s}{'EUR m-2':>9s}{'half way':>9s}{'seconds':>9s}")
-    for prices in ("today", "doubled"):
-        season = season_of(described(prices == "doubled", days), days)
-        crop = tomato.mature_crop(season.plant, 1.0)
-        for name, strategy in strategies.items():
-
-            def value(genes: Genes, season: Season = season, strategy: Strategy = strategy, crop: Any = crop) -> Values:
-                outcome = run_season(season, strategy, genes, crop)
-                return np.asarray(outcome.balance.net_profit - outcome.penalty)
-
-            for label, search in (("genetic", genetic), ("CMA-ES", cma_es)):
-                began = time.monotonic()
-                genes, history = search(value, strategy.genes, arguments.generations, 1)
-                seconds = time.monotonic() - began
-                half = history[len(history) // 2]
-                print(f"{prices:10s}{name:10s}{label:10s}{history[-1]:9.2f}{half:9.2f}{seconds:9.0f}", flush=True)
-                entry = {"genes": genes.tolist(), "value": history[-1], "knots": strategy.knots, "ends": strategy.ends}
-                best = result["strategies"].setdefault(prices, {}).get(name)
-                if best is None or history[-1] > best["value"]:
-                    result["strategies"][prices][name] = entry
-                arguments.out.write_text(json.dumps(result))
+    days, generations = arguments.days, arguments.generations
+    rule, strategy = Strategy(days, 1, ends=True), Strategy(days, 6)
+    result: dict[str, Any] = {"days": days, "strategies": {"today": {}, "doubled": {}}}
+    print(f"{'prices':10s}{'search':10s}{'strategy':10s}{'EUR m-2':>9s}{'half way':>9s}{'seconds':>9s}")
+    for label, search in (("genetic", genetic), ("CMA-ES", cma_es)):
+        for prices, best in result["strategies"].items():
+            season = season_of(described(prices == "doubled", days), days)
+            began = time.monotonic()
+            third = generations // 3
+            rest = generations - third
+            short, _ = search(worth(season, rule), rule.genes, third, 1)
+            found: dict[str, Any] = {
+                # A strategy grows out of a rule; both have as many simulated seasons in all.
+                "season": search(worth(season, strategy), strategy.genes, rest, 1, strategy.of_rule(rule, short)),
+                "rule": search(worth(season, rule), rule.genes, rest, 2, short),
+            }
+            seconds = time.monotonic() - began
+            for name, (genes, history) in found.items():
+                half, last = history[len(history) // 2], history[-1]
+                print(f"{prices:10s}{label:10s}{name:10s}{last:9.2f}{half:9.2f}{seconds:9.0f}", flush=True)
+                one = {"season": strategy, "rule": rule}[name]
+                entry = {"genes": genes.tolist(), "value": last, "knots": one.knots, "ends": one.ends}
+                if name not in best or last > best[name]["value"]:
+                    best[name] = entry
+            arguments.out.write_text(json.dumps(result))
+    for prices, best in result["strategies"].items():
+        print(f"\n{prices}, season:")
+        print("\n".join(strategy.table(np.array(best["season"]["genes"], dtype=np.float32), 30)))
 
 
 @dataclass

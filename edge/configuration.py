@@ -178,7 +178,9 @@ class PlanningSettings:
     timeout: datetime.timedelta = setting(
         low=_SECOND, high=6 * _HOUR, default=10 * _MINUTE, help="longest time that one plan may take"
     )
-    forecast: str | None = setting(default=None, help="file with a weather forecast, as telemetry; null: persistence")
+    forecast: str | None = setting(
+        default=None, help="file with a forecast: Open-Meteo's .json, or telemetry; null: persistence"
+    )
     seed: int = setting(low=0, default=1, help="seed of the planner's random numbers")
 
 

@@ -12,8 +12,9 @@ from pathlib import Path
 from zoneinfo import ZoneInfo
 
 from igrow.core.errors import IgrowError
-from igrow.core.telemetry import Telemetry, read_csv
+from igrow.core.telemetry import Telemetry
 from igrow.edge.image import Image
+from igrow.edge.planning.open_meteo import read_forecast
 from igrow.edge.ports import ActiveBundle, PlanningService, PlanRequest, Store
 from igrow.edge.sensors.consequences import usable_for_planning
 from igrow.edge.sources.recipe import Recipe, recipe_course
@@ -125,9 +126,9 @@ class PlanningSchedule:
                 start = begins
                 break
         steps = max(1, round(rules.horizon / rules.step))
-        forecast: Telemetry | None = None
+        forecast: tuple[Telemetry, ...] = ()
         if rules.forecast is not None and rules.forecast.exists():
-            forecast = read_csv(rules.forecast)
+            forecast = read_forecast(rules.forecast)
         return PlanRequest(
             time=start,
             step_seconds=rules.step,

@@ -13,11 +13,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from igrow.core.telemetry import Telemetry
 from igrow.edge.alarm_levels import Level
 from igrow.edge.image import Value
+
+if TYPE_CHECKING:
+    from igrow.core.planner.explain import Explanation
 
 # --- records --------------------------------------------------------------------------------------------------
 
@@ -106,8 +109,8 @@ class PlanRequest:
     """What the grower's recipe would command over the horizon, by setpoint: (steps,)."""
     bundle: Path
     """Folder of the bundle in force."""
-    forecast: Telemetry | None = None
-    """Weather over the horizon, when there is a forecast; else the planner takes persistence of the last days."""
+    forecast: tuple[Telemetry, ...] = ()
+    """Weather over the horizon: the members of a forecast; none means persistence of the last days."""
     seed: int = 0
 
 
@@ -133,12 +136,13 @@ class Plan:
     leaves_range: bool = False
     """The plan visits states or actions that the simulator was not trained on."""
     note: str = ""
-    growth: str = ""
-    """One line: what the log told of how this crop grows."""
+    """For the grower: that it follows the recipe, which limits of the crop bind, what is not known of growth."""
     predicted: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     """By quantity: the expected course at the end of each step, (steps,)."""
     binding: Mapping[str, tuple[tuple[str, ...], ...]] = field(default_factory=dict)
     """By setpoint and step: the crop's limits that kept it from what the search asked for, (steps,)."""
+    explanation: Explanation | None = None
+    """What the plan is expected to bring over its horizon, and what each change is for."""
 
 
 class PlanningService(Protocol):

@@ -9,23 +9,25 @@ from pathlib import Path
 from zoneinfo import ZoneInfo
 
 from igrow.core.errors import IgrowError
+from igrow.core.planner.explain import WORDS, limits_in_force
 from igrow.core.quantities import QUANTITIES
-from igrow.core.telemetry import read_csv
 from igrow.edge.cli.common import add_configuration, configuration_of, parse_time
 from igrow.edge.configuration import Configuration
 from igrow.edge.planning.make_plan import make_plan
+from igrow.edge.planning.open_meteo import read_forecast
 from igrow.edge.ports import Plan, PlanRequest
 from igrow.edge.sources.recipe import recipe_course
 from igrow.edge.store import read_telemetry
 from igrow.edge.updates.state import load_state
 
-EXAMPLE = "igrow-edge plan /etc/igrow/daemon.yaml"
+EXAMPLE = "igrow-edge plan /etc/igrow/daemon.yaml --explain"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
     add_configuration(parser)
     parser.add_argument("--bundle", type=Path, help="folder of a bundle (default: the one in force)")
+    parser.add_argument("--explain", action="store_true", help="tell what each change is for, and which limit binds")
     parser.add_argument("--at", default=None, help="plan from this UTC time (default: the end of the log)")
 
 
@@ -34,6 +36,8 @@ def run(options: argparse.Namespace) -> int:
     configuration = configuration_of(options)
     plan = compute(configuration, options.bundle, options.at)
     print("\n".join(table(plan, configuration.zone)))
+    if options.explain:
+        print("\n".join(reasons(plan, configuration.zone)))
     return 0
 
 
@@ -57,7 +61,7 @@ def compute(configuration: Configuration, bundle: Path | None, at: str | None) -
         telemetry=read_telemetry(configuration.store_folder, now - settings.history.total_seconds(), now + 1.0),
         recipe=recipe_course(configuration.file.recipe, configuration.zone, start, step, steps),
         bundle=folder,
-        forecast=read_csv(forecast) if forecast and forecast.exists() else None,
+        forecast=read_forecast(forecast) if forecast and forecast.exists() else (),
         seed=settings.seed,
     )
     return make_plan(site, request)
@@ -86,3 +90,29 @@ def table(plan: Plan, zone: ZoneInfo) -> Iterator[str]:
         cells = [*(plan.setpoints[name][step] for name in names), *(plan.predicted[name][step] for name in predicted)]
         padded = (f"{cell:>{len(head)}.4g}" for cell, head in zip(cells, heads, strict=True))
         yield "  ".join([moment.strftime("%Y-%m-%d %H:%M"), *padded])
+
+
+def reasons(plan: Plan, zone: ZoneInfo) -> Iterator[str]:
+    """Yield what the plan is expected to bring, what each change is for and which limits bind."""
+    explained = plan.explanation
+    if explained is not None:
+        yield ""
+        yield f"{'EUR m-2':12s}" + "".join(f"{WORDS.get(name, name):>12s}" for name in explained.plan)
+        for head, amounts in (("plan", explained.plan), ("recipe", explained.recipe)):
+            yield f"{head:12s}" + "".join(f"{amount.mean:12.4f}" for amount in amounts.values())
+        low, high = explained.gain.interval
+        yield f"gain {explained.gain.mean:+.4f}, 95 % between {low:+.4f} and {high:+.4f} by the simulator's own doubt"
+        yield ""
+        yield "What each change is for, EUR m-2, if it alone were taken back:"
+        for change in explained.changes:
+            yield f"  {change.sentence(zone)}"
+        if not explained.changes:
+            yield "  nothing is changed: the plan is the recipe"
+    yield ""
+    yield "Limits of the crop that bind:"
+    bound = list(limits_in_force(plan.binding))
+    for setpoint, limit, first, last in bound:
+        begin, end = (datetime.fromtimestamp(plan.start + step * plan.step_seconds, zone) for step in (first, last + 1))
+        yield f"  {begin:%a %H:%M} to {end:%a %H:%M}: {setpoint} by {limit}"
+    if not bound:
+        yield "  none"

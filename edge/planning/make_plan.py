@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from igrow.core.agronomy import Place, remember
 from igrow.core.bundle import Bundle, read_bundle
 from igrow.core.errors import IgrowError
-from igrow.core.planner import Budget, PlanningState, Simulator, optimise
+from igrow.core.planner import Budget, PlanningState, PlanResult, Simulator, optimise
+from igrow.core.planner.explain import explain, limits_in_force
 from igrow.core.planner.onnx_generation import OnnxGeneration
 from igrow.core.planner.recent_use import (
     SCALED,
@@ -24,6 +25,7 @@ from igrow.core.planner.recent_use import (
     totals,
     used_in,
 )
+from igrow.core.planner.weather_ensemble import WeatherEnsemble
 from igrow.core.quantities import SETPOINTS
 from igrow.core.simulator.growth import GrowthBalance
 from igrow.core.simulator.plan import BundleSimulator
@@ -51,11 +53,9 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
     horizon = round(len(next(iter(request.recipe.values()))) * request.step_seconds)
     # The simulator knows whole days; the hours beyond the horizon are planned too, and not used.
     hours = 24 * math.ceil(horizon / (24 * HOUR))
-    forecast = (
-        persistence(request.telemetry, start, hours)
-        if request.forecast is None
-        else from_forecast(request.forecast, request.telemetry, start, hours)
-    )
+    courses = [from_forecast(one, request.telemetry, start, hours) for one in request.forecast]
+    courses = courses or [persistence(request.telemetry, start, hours)]
+    forecast = np.mean(courses, axis=0)
     state = PlanningState(
         time=np.datetime64(start, "s"),
         initial=present(request.telemetry, start),
@@ -64,8 +64,9 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
         memory=remember(Place.of(site), request.telemetry, start),
     )
     corrected = recently(simulator, simulator.growth, site, request.telemetry, start)
+    expected = corrected if len(courses) == 1 else WeatherEnsemble(corrected, courses)
     result = optimise(
-        corrected,
+        expected,
         site,
         state,
         forecast,
@@ -77,6 +78,7 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
     steps = round(horizon / request.step_seconds)
     hour_of_step = [int(step * request.step_seconds) // HOUR for step in range(steps)]
     outcome = result.outcome
+    binding = _by_step(result.binding, hour_of_step)
     return Plan(
         created=request.time,
         start=request.time,
@@ -91,8 +93,7 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
         expected_profit=result.expected_profit,
         recipe_profit=result.recipe_profit,
         leaves_range=result.leaves_range,
-        note="follows the recipe: nothing better was found" if result.follows_recipe else "",
-        growth="" if corrected.growth is None else corrected.growth.sentence,
+        note=_note(result, binding, corrected),
         predicted={
             name: tuple(float(values[:, 0, hour].mean()) for hour in hour_of_step)
             for name, values in (
@@ -101,8 +102,20 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
                 ("air_co2", outcome.air_co2),
             )
         },
-        binding=_by_step(result.binding, hour_of_step),
+        binding=binding,
+        explanation=explain(expected, site, state, forecast, result),
     )
+
+
+def _note(result: PlanResult, binding: Mapping[str, Sequence[Sequence[str]]], corrected: Corrected) -> str:
+    """Return what a grower must know of a plan beside its numbers."""
+    bound = dict.fromkeys(f"{limit} ({name})".replace("_", " ") for name, limit, *_ in limits_in_force(binding))
+    notes = [
+        "follows the recipe: nothing better was found" if result.follows_recipe else "",
+        f"limits of the crop that bind: {', '.join(bound)}" if bound else "",
+        "" if corrected.growth is None or corrected.growth.told else corrected.growth.sentence,
+    ]
+    return "; ".join(filter(None, notes))
 
 
 def _by_step(

@@ -77,6 +77,10 @@ class PlanResult:
     """The plan's balance and penalties, arrays (M, 1)."""
     recipe_valuation: Valuation
     """The recipe's."""
+    recipe: Setpoints
+    """The recipe within all limits, (H, 4)."""
+    template: Template
+    """By which candidates were decoded."""
     evaluations: int
     """Candidates simulated."""
     binding: tuple[Mapping[str, tuple[str, ...]], ...]
@@ -128,13 +132,13 @@ def optimise(
     objective = Objective(site, time, state.co2_before, worth)
     applied = np.array([state.applied.get(name, np.nan) for name in SETPOINTS])
     recipe_course = template.follow(recipe[None], applied, state.memory)
-    recipe = recipe_course.setpoints[0]
+    followed = recipe_course.setpoints[0]
 
     def simulate(setpoints: Setpoints) -> tuple[Outcome, Valuation]:
         outcome = simulator.simulate(dict(state.initial), forecast, setpoints, state.time)
         return outcome, objective.value(outcome)
 
-    recipe_outcome, recipe_valuation = simulate(recipe[None])
+    recipe_outcome, recipe_valuation = simulate(followed[None])
     # No plan may expect more damp hours than the crop bears, or than the recipe has too where that is more.
     damp = max(site.crop.agronomy.damp_hours, float(damp_hours(recipe_outcome, site)[0]))
 
@@ -149,7 +153,7 @@ def optimise(
 
     began = monotonic()
     settings = run.settings
-    offspring = _first_candidates(template, [recipe, *seeds], settings.offspring, rng)
+    offspring = _first_candidates(template, [followed, *seeds], settings.offspring, rng)
     parents = offspring[: settings.parents]
     parent_fitness = np.full(settings.parents, WORST, dtype=np.float32)
     history: list[float] = []
@@ -185,6 +189,8 @@ def optimise(
         outcome=outcome,
         valuation=valuation,
         recipe_valuation=recipe_valuation,
+        recipe=followed,
+        template=template,
         evaluations=evaluations + 1,
         binding=course.binding(),
     )

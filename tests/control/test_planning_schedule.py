@@ -155,11 +155,11 @@ async def test_a_forecast_is_read_when_it_is_there_and_a_broken_one_is_reported(
     path = tmp_path / "forecast.csv"
     schedule, planning = make(forecast=path)
     await schedule.tick(image(), BUNDLE)
-    assert planning.requests[0].forecast is None
+    assert planning.requests[0].forecast == ()
     seconds = (T0 + np.arange(48) * HOUR).astype(np.int64).astype("datetime64[s]")
     write_csv(path, Telemetry(seconds, {"wind_speed": np.full(48, 3.0)}))
     await schedule.tick(image(6.0), BUNDLE)
-    assert planning.requests[1].forecast is not None
+    assert len(planning.requests[1].forecast) == 1
     path.write_text("nonsense\n")
     assert not await schedule.tick(image(12.0), BUNDLE)
     assert "forecast.csv" in schedule.problem

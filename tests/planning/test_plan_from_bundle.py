@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import datetime
+import pickle
 from dataclasses import fields, replace
+from zoneinfo import ZoneInfo
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from igrow.core.planner import Outcome
 from igrow.core.quantities import SETPOINTS
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
+from igrow.edge.cli.plan import reasons
 from igrow.edge.planning.make_plan import co2_since_planting, hourly_recipe, make_plan, present, recently
 from igrow.edge.ports import PlanRequest
 
@@ -110,3 +113,16 @@ def test_the_co2_that_the_crop_has_had_follows_from_the_log_s_days_and_those_sin
     assert co2_since_planting(site, log(), START) == 0.0
     later = replace(site, crop=replace(site.crop, planting_date=datetime.date(2027, 1, 1)))
     assert co2_since_planting(later, dosed, START) == 0.0
+
+
+def test_a_plan_is_explained_and_names_the_limits_that_bind() -> None:
+    """A grower who never lets lamps rest is told what kept the plan from it, and that nobody counted growth."""
+    lit = replace(request(), recipe={**request().recipe, "lamp_on": (1.0,) * 24})
+    plan = make_plan(replace(SITE, planning=replace(SITE.planning, optimise=("heating_setpoint",))), lit)
+    assert any("dark_hours" in step for step in plan.binding["lamp_on"])
+    assert "dark hours (lamp on)" in plan.note
+    assert "the log counts no growth" in plan.note
+    told = "\n".join(reasons(plan, ZoneInfo("UTC")))
+    assert "lamp_on by dark_hours" in told
+    assert "95 % between" in told
+    assert pickle.loads(pickle.dumps(plan)) == plan

@@ -62,6 +62,15 @@ class Strategy:
             numbers["lamp_hours"] = numbers["lamp_hours"] * (day < genes[:, -1] * self.days)
         return numbers
 
+    def of_rule(self, rule: Strategy, genes: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the genes (G,) of a strategy that says what a rule (one date) of genes (R,) says."""
+        days = np.linspace(0.0, self.days - 1.0, self.knots)
+        numbers = [rule.numbers(genes[None], day) for day in days]
+        columns = [
+            [(float(one[name][0]) - low) / (high - low) for one in numbers] for name, (low, high) in RANGES.items()
+        ]
+        return np.array([share for column in columns for share in column] + [1.0] * self.ends, dtype=np.float32)
+
     def setpoints(
         self,
         genes: NDArray[np.float32],

@@ -1,0 +1,29 @@
+"""A simulator under several courses of weather at once, so that a plan holds against their spread."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow.core.planner.objective import Outcome, Simulator
+
+Values = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class WeatherEnsemble:
+    """Runs candidates under each of W courses of weather; its ensemble is that of the simulator under each, (W M)."""
+
+    simulator: Simulator
+    courses: Sequence[Values]
+    """Each (H, 6), hourly means."""
+
+    def simulate(self, initial: dict[str, float], weather: Values, setpoints: Values, start: np.datetime64) -> Outcome:
+        """Return what candidates do; see `objective.Simulator`. `weather` is not read: the courses stand for it."""
+        outcomes = [self.simulator.simulate(initial, course, setpoints, start) for course in self.courses]
+        return Outcome(
+            **{part.name: np.concatenate([getattr(one, part.name) for one in outcomes]) for part in fields(Outcome)}
+        )
