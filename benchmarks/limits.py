@@ -41,7 +41,7 @@ def random_site(rng: np.random.Generator) -> Site:
         dark_hours=float(rng.choice([0.0, 4.0, 6.0, 8.5, 12.0])),
         day_temperature=Band(float(day_low), float(highs[0])),
         night_temperature=Band(float(night_low), float(highs[1])),
-        mean_temperature=Band(float(mean_low), float(mean_low + rng.uniform(1.2, 6))),
+        mean_temperature=Band(float(mean_low), float(mean_low + rng.uniform(2.2, 6))),
         temperature_difference=float(rng.uniform(1, 10)),
         temperature_drift=float(rng.uniform(0.4, 4)),
         light_sum_high=float(rng.uniform(4, 40)),
