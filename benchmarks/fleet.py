@@ -24,7 +24,7 @@ from igrow.core.quantities import QUANTITIES
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.fleet.runner import run_tasks
 from igrow.trainer.fleet.tasks import Ending, Task
-from igrow.trainer.readers.open_log import open_log
+from igrow.trainer.data import read_log
 from igrow.trainer.service.archive import Archive
 from igrow.trainer.service.collecting import collect
 
@@ -155,7 +155,7 @@ def weekly_diagnosis(days: int) -> None:
         subprocess.run([*command, *generate, "--out", str(root / "log")], env=environment, check=True,
                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)  # fmt: skip
         archive = Archive(root / "state" / "archive")
-        archive.add_telemetry("house", open_log(root / "log").telemetry)
+        archive.add_telemetry("house", read_log(root / "log").telemetry)
         now = datetime(2026, 2, 1, tzinfo=UTC).timestamp() + days * DAY
         exchange = {"url": str(root / "exchange"), "base": str(root), "known_hosts": None, "identity": None}
         arguments = {"file": str(site), "state": str(root / "state"), "exchange": exchange, "keys": str(root / "keys"),

@@ -16,7 +16,7 @@ from igrow.core.greenhouse import GreenhouseParameters, simulate
 from igrow.core.greenhouse.disturbances import QUIET
 from igrow.core.greenhouse.sensors import EXACT
 from igrow.core.telemetry import Telemetry, to_grid
-from igrow.trainer.readers.open_log import open_log
+from igrow.trainer.data import read_log
 
 LAMP_CAPACITY = 142.5
 """Sodium lamps and diodes at full power, W m-2."""
@@ -28,7 +28,7 @@ SHOWN = ("air_temperature", "air_humidity", "air_co2", "vent_lee", "rail_pipe_te
 def table(data: Path) -> list[str]:
     """Return the lines of the report."""
     folder = data / "agc2019"
-    log = open_log(folder if folder.is_dir() else data, "Reference")
+    log = read_log(folder if folder.is_dir() else data, compartment="Reference")
     measured = log.telemetry
     lamp = np.nan_to_num(measured["lamp_power"]) / LAMP_CAPACITY
     setpoints = Telemetry(

@@ -21,7 +21,7 @@ from igrow.core.greenhouse.parameters import stack
 from igrow.core.greenhouse.plant import Plant
 from igrow.core.greenhouse.weather_table import WeatherTable
 from igrow.core.telemetry import Telemetry
-from igrow.trainer.readers.wur2020 import Seasons, read_seasons
+from igrow.trainer.data.public.wur2020 import Seasons, read_seasons
 
 Values = NDArray[np.float64]
 HOUR = 3600

@@ -33,13 +33,12 @@ from igrow.trainer.calibration.evaluation import Errors, errors_of, starts_withi
 from igrow.trainer.calibration.forecast import Predictor, remembering
 from igrow.trainer.calibration.posterior import prior
 from igrow.trainer.calibration.site_model import SiteModel, adapt, fit_site, from_few_days
-from igrow.trainer.calibration.split import weeks
 from igrow.trainer.calibration.totals import coverage, daily_totals
+from igrow.trainer.data import Log, read_log
+from igrow.trainer.data.public import challenge
+from igrow.trainer.data.splits import weeks
 from igrow.trainer.export.plan import RANGED
 from igrow.trainer.model import known_range
-from igrow.trainer.readers import challenge
-from igrow.trainer.readers.log import Log
-from igrow.trainer.readers.open_log import open_log
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -53,10 +52,8 @@ class Greenhouse:
     """A log, its record and setpoints."""
 
     def __init__(self, log: Log) -> None:
-        if log.site is None:
-            raise IgrowError(f"{log.name}: the log does not tell its site")
-        self.log, self.site = log, log.site
-        self.record: Record = site_record(log.telemetry, log.site, STEP)
+        self.log, self.site = log, log.greenhouse
+        self.record: Record = site_record(log.telemetry, log.greenhouse, STEP)
         self.setpoints, self.inferred = setpoint_columns(log.telemetry, self.record)
         self.week = weeks(self.record.time)
 
@@ -351,7 +348,7 @@ def main() -> int:
     given = parser.parse_args()
     try:
         names = given.compartments or challenge.compartments(given.data, "GreenhouseClimate", "Greenhouse_climate")
-        logs = [open_log(given.data, name) for name in names] or [open_log(given.data)]
+        logs = [read_log(given.data, compartment=name) for name in names] or [read_log(given.data)]
         result: dict[str, object] = {}
         if "metered" in given.tables:
             result["metered"] = {log.name: metered(log) for log in logs}

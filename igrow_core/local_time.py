@@ -24,6 +24,11 @@ def zone(name: str) -> ZoneInfo:
         raise IgrowError(f"time zone {name!r} is not known: a name such as Europe/Amsterdam is needed") from None
 
 
+def utc_datetime(time: np.datetime64) -> datetime.datetime:
+    """Return an instant in UTC as a `datetime` that knows its zone, to the second."""
+    return datetime.datetime.fromisoformat(str(time.astype("datetime64[s]"))).replace(tzinfo=datetime.UTC)
+
+
 def to_local(time: Times, time_zone: str) -> Times:
     """Return the wall time of UTC times, datetime64[s] of the same shape."""
     time = np.asarray(time, dtype="datetime64[s]")

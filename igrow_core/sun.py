@@ -82,6 +82,17 @@ def solar_hour(time: ArrayLike | np.datetime64, latitude: float, longitude: floa
     return np.asarray(position(np, unix_seconds(time), latitude, longitude)[2])
 
 
+def solar_day(time: ArrayLike | np.datetime64, longitude: float) -> NDArray[np.int64]:
+    """Return the number of the local mean solar day, counted from 1970; `time` UTC, any shape; the same shape back."""
+    day: NDArray[np.int64] = np.floor((unix_seconds(time) + 240.0 * longitude) / SECONDS_PER_DAY).astype(np.int64)
+    return day
+
+
+def weekday(day: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the weekday of a day counted from 1970, 0 for Monday (1 January 1970 was a Thursday)."""
+    return (day + 3) % 7
+
+
 def extraterrestrial_radiation(
     time: ArrayLike | np.datetime64, latitude: float, longitude: float
 ) -> NDArray[np.float64]:

@@ -16,6 +16,7 @@ import numpy as np
 from igrow.core.bundle import BUILT_IN, Span
 from igrow.core.greenhouse import Season, generate_weather, recipe, simulate_many
 from igrow.core.greenhouse.described import parameters_of
+from igrow.core.local_time import utc_datetime
 from igrow.core.quantities import SETPOINTS
 from igrow.core.simulator import holding
 from igrow.core.simulator.crop import CropStages
@@ -26,8 +27,8 @@ from igrow.trainer.calibration.actuation import fit_actuation, setpoint_columns
 from igrow.trainer.calibration.fit import calibrate
 from igrow.trainer.calibration.holding import fit_holding
 from igrow.trainer.calibration.posterior import Posterior, prior
-from igrow.trainer.diagnosis.deployed import from_site, learn_misfit
-from igrow.trainer.diagnosis.runner import open_record
+from igrow.trainer.data import prepare_log
+from igrow.trainer.diagnosis.deployed import learn_misfit
 from igrow.trainer.export.plan import RANGED
 from igrow.trainer.model import HybridModel, known_range
 from igrow.trainer.training.crop import fit_net_growth, train_networks
@@ -116,7 +117,7 @@ def default_model(site: Site, *, seed: int = 0, report: Report = print) -> Hybri
         actuation=rules,
         holding=held,
         crop=CropStages(growth, harvest, conversion, maintenance),
-        training_span=Span(_utc(START), _utc(end)),
+        training_span=Span(utc_datetime(START), utc_datetime(end)),
         training_range=known_range({name: concatenate_column(tables, name) for name in (*RANGED, *SETPOINTS)}),
         known_misfit=misfit,
     )
@@ -155,11 +156,8 @@ def concatenate_column(tables: Sequence[Telemetry], name: str) -> np.ndarray[tup
 
 def _fitted(site: Site, season: Season, report: Report) -> tuple[Posterior, dict[str, float]]:
     """Fit the physical parameters to one log; returns them and what they leave unexplained."""
-    record, _ = open_record(season.measured, site, from_site(site))
+    log = prepare_log(season.measured, site)
+    record = log.record(log.best_shift(nominal(site)))
     fitted = calibrate([(record, None)], prior(nominal(site)), {}, every_hours=8.0, progress=report)
     deviation = dict(zip(fitted.names, map(float, fitted.standard_deviation), strict=True))
     return fitted, learn_misfit(record, fitted.values, deviation, site.longitude)
-
-
-def _utc(time: np.datetime64) -> datetime:
-    return datetime.fromisoformat(str(time.astype("datetime64[s]"))).replace(tzinfo=UTC)

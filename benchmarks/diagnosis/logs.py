@@ -9,6 +9,7 @@ import numpy as np
 
 from benchmarks.diagnosis.cases import Case, hidden
 from benchmarks.diagnosis.houses import House
+from igrow.core import sun
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.effects import EFFECTS
 from igrow.core.greenhouse import Disturbances, recipe, simulate_many
@@ -18,10 +19,11 @@ from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.calibration import calibrate, prior
-from igrow.trainer.diagnosis import freerun, linearisation, split
-from igrow.trainer.diagnosis.deployed import Deployed, from_manifest, from_posterior, from_site, learn_misfit
+from igrow.trainer.data import prepare_log
+from igrow.trainer.data.splits import split_days
+from igrow.trainer.diagnosis import freerun, linearisation
+from igrow.trainer.diagnosis.deployed import Deployed, from_manifest, from_posterior, learn_misfit
 from igrow.trainer.diagnosis.linearisation import unit_fluxes
-from igrow.trainer.diagnosis.runner import open_record
 
 REFERENCE_DAYS = 56
 MISMATCH = 0.08
@@ -43,7 +45,9 @@ def reference(house: House) -> Reference:
     weather = house.weather(start, house.start, house.seed)
     (log,) = simulate_many(house.plant, weather, recipe, start, house.start, count=1, seed=house.seed)
     site = house.site
-    record, shift = open_record(log.measured, site, from_site(site))
+    seen = prepare_log(log.measured, site)
+    shift = seen.best_shift(nominal(site))
+    record = seen.record(shift)
     posterior = calibrate([(record, None)], prior(nominal(site)), {}, every_hours=8.0)
     misfit = learn_misfit(
         record, posterior.values, dict(zip(posterior.names, posterior.standard_deviation, strict=True)), site.longitude
@@ -59,13 +63,14 @@ def built_in(site: Site) -> Deployed:
 
 def enr_units(record: Record, site: Site, deployed: Deployed) -> dict[str, float]:
     """Return, for every cause, the amplitude at which ENR is one on a log without it."""
-    days = split.split_days(record, site.longitude)
+    days = split_days(record, site.longitude)
     runs = linearisation.day_runs(record, days.day)
     line = linearisation.linearise(record, runs, deployed.parameters, {})
     noise = [freerun.root_mean_square(np.where(w, e, np.nan)) for w, e in zip(runs.weight, line.errors, strict=True)]
     unit = {}
-    seconds = record.time.astype("datetime64[s]").astype(np.int64) + int(240.0 * site.longitude)
-    line = replace(line, drivers={**line.drivers, "weekday": 1.0 * ((seconds // 86_400 + 3) % 7)})
+    line = replace(
+        line, drivers={**line.drivers, "weekday": 1.0 * sun.weekday(sun.solar_day(record.time, site.longitude))}
+    )
     for name, effect in {**EFFECTS, **UNCATALOGUED}.items():
         small = 0.2 * effect.amplitude.typical
         shape = {one.name: one.typical for one in effect.shapes}

@@ -23,10 +23,9 @@ from igrow.core.errors import IgrowError
 from igrow.core.simulator.hybrid.nominal import nominal
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.core.site import Site
-from igrow.core.telemetry import Telemetry
 from igrow.trainer.calibration import calibrate, prior
-from igrow.trainer.diagnosis import Deployed, Diagnosis, alignment, diagnose, learn_misfit, runner, structure
-from igrow.trainer.readers.open_log import open_log
+from igrow.trainer.data import Log, read_log
+from igrow.trainer.diagnosis import Deployed, Diagnosis, diagnose, learn_misfit, structure
 
 COMPARTMENTS = (
     ("agc2019", "Reference"),
@@ -51,30 +50,27 @@ PLACEBO = ("wind_speed", "wind_direction", "rain")
 class Compartment:
     name: str
     site: Site
-    before: Telemetry
-    after: Telemetry
+    before: Log
+    after: Log
 
 
 def compartments(data: Path) -> Iterator[Compartment]:
     for folder, name in COMPARTMENTS:
         try:
-            log = open_log(data / folder, name)
+            log = read_log(data / folder, compartment=name)
         except IgrowError as error:
             print(f"{folder} {name}: {error}")
             continue
-        assert log.site is not None
         start = log.telemetry.time[0] + np.timedelta64(14, "D")
         middle = start + np.timedelta64(CALIBRATION_DAYS, "D")
         end = middle + np.timedelta64(DIAGNOSIS_DAYS, "D")
-        yield Compartment(
-            f"{folder} {name}", log.site, log.telemetry.select(start, middle), log.telemetry.select(middle, end)
-        )
+        yield Compartment(f"{folder} {name}", log.greenhouse, log.select(start, middle), log.select(middle, end))
 
 
-def deploy(log: Telemetry, site: Site) -> Deployed:
+def deploy(log: Log, site: Site) -> Deployed:
     """Calibrate on a log as a bundle would be."""
-    before = Deployed(nominal(site), {}, shift=alignment.best_shift(log, site, nominal(site)))
-    record, shift = runner.open_record(log, site, before)
+    shift = log.best_shift(nominal(site))
+    record = log.record(shift)
     posterior = calibrate([(record, None)], prior(nominal(site)), {}, every_hours=8.0)
     deviations = dict(zip(posterior.names, map(float, posterior.standard_deviation), strict=True))
     misfit = learn_misfit(record, posterior.values, deviations, site.longitude)
@@ -90,10 +86,6 @@ def say(title: str, diagnosis: Diagnosis) -> None:
             print(f"{'':44} {quantity:16} 24 h: {stages}")
 
 
-def without(log: Telemetry, name: str) -> Telemetry:
-    return Telemetry(log.time, {column: values for column, values in log.columns.items() if column != name})
-
-
 def lose(model: Deployed, parameter: str) -> Deployed:
     """Return the model with a term at the lowest value that its parameter may have."""
     own = structure.PARAMETER_PREFIX + parameter
@@ -106,10 +98,11 @@ def lose(model: Deployed, parameter: str) -> Deployed:
     )
 
 
-def placebo(log: Telemetry, other: Telemetry) -> Telemetry:
+def placebo(log: Log, other: Log) -> Log:
     """Return a log whose wind and rain come from another stretch of the season."""
     rows = np.arange(len(log)) % len(other)
-    return log.with_columns({name: other[name][rows] for name in PLACEBO if name in log and name in other})
+    given = other.telemetry
+    return log.with_columns({name: given[name][rows] for name in PLACEBO if name in log.telemetry and name in given})
 
 
 def main(data: Path | None) -> int:
@@ -129,8 +122,8 @@ def main(data: Path | None) -> int:
             told, _ = diagnose(one.after, one.site, lose(model, parameter))
             say(f"  model without {effect} ({parameter} was {model.parameters[parameter]:.3g})", told)
         for column in WITHHELD:
-            if column in one.after:
-                told, _ = diagnose(without(one.after, column), one.site, model)
+            if column in one.after.telemetry:
+                told, _ = diagnose(one.after.without(column), one.site, model)
                 say(f"  log without {column}", told)
         false, _ = diagnose(placebo(one.after, one.before), one.site, model)
         say("  wind and rain of other weeks", false)

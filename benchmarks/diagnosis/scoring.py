@@ -12,6 +12,7 @@ import numpy as np
 
 from benchmarks.diagnosis.cases import Case, hidden
 from benchmarks.diagnosis.logs import Reference
+from igrow.core import sun
 from igrow.core.effects import EFFECTS
 from igrow.core.greenhouse import HiddenEffect
 from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
@@ -140,8 +141,7 @@ def _perfect(evidence: Evidence, truth: Mapping[str, Any], site: Site) -> float:
             terms.append(ActiveTerm(name, float(one.size), shape, one.start))
             continue
         line = prepared.line
-        seconds = record.time.astype("datetime64[s]").astype(np.int64) + int(240.0 * site.longitude)
-        weekday = 1.0 * ((seconds // 86_400 + 3) % 7)
+        weekday = 1.0 * sun.weekday(sun.solar_day(record.time, site.longitude))
         line = replace(line, drivers={**line.drivers, "weekday": weekday})
         for channel, flux in linearisation.unit_fluxes(line, UNCATALOGUED[name], {}).items():
             added[channel] = added.get(channel, 0.0) + float(one.size) * flux

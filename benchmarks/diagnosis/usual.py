@@ -19,9 +19,10 @@ from igrow.core.greenhouse import Disturbances, recipe, simulate_many
 from igrow.core.greenhouse.described import parameters_of
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
-from igrow.trainer.diagnosis import Deployed, problem, runner, usual
+from igrow.trainer.data import prepare_log
+from igrow.trainer.data.splits import split_days
+from igrow.trainer.diagnosis import Deployed, problem, usual
 from igrow.trainer.diagnosis.problem import Problem
-from igrow.trainer.diagnosis.split import split_days
 
 HOUSES = 12
 """Drawn as those elsewhere are, beside the house of the cases in winter and spring and that of the default bundle."""
@@ -86,7 +87,8 @@ def simulate(family: Family, days: int) -> list[Telemetry]:
 def prepare(family: Family, log: Telemetry, directions: Directions = ()) -> Problem:
     """Return the prepared problem of a family's log."""
     site, deployed = family.house.site, family.deployed
-    record, _ = runner.open_record(log, site, deployed)
+    seen = prepare_log(log, site)
+    record = seen.record(seen.best_shift(deployed.parameters) if deployed.shift is None else deployed.shift)
     days = split_days(record, site.longitude)
     return problem.prepare(record, days, deployed.prior, {}, site.longitude, deployed.known_misfit, directions)
 

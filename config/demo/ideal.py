@@ -11,18 +11,18 @@ from igrow.core.effects import EFFECTS
 from igrow.core.greenhouse.described import parse_effect
 from igrow.core.simulator.hybrid.measurement import PREDICTED
 from igrow.core.site import load_site
+from igrow.trainer.data import read_log
 from igrow.trainer.diagnosis import freefit
 from igrow.trainer.diagnosis.activation import ActiveTerm, activate
 from igrow.trainer.diagnosis.deployed import from_manifest
 from igrow.trainer.diagnosis.diagnose import Stage, diagnose
-from igrow.trainer.readers.open_log import open_log
 
 
 def ideal_errors(out: Path, effect: str) -> dict[str, float]:
     """Return the mean absolute error of 24 h free runs by quantity, the parameters refitted beside the true effect."""
     site = load_site(out / "site.yaml")
     deployed = from_manifest(read_bundle(out / "first-bundle").manifest, site)
-    _, evidence = diagnose(open_log(out / "log").telemetry, site, deployed)
+    _, evidence = diagnose(read_log(out / "log", site), site, deployed)
     if evidence is None:
         return {}
     truth = parse_effect(effect)

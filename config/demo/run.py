@@ -25,7 +25,7 @@ import numpy as np
 
 from igrow.core.quantities import WEATHER
 from igrow.core.telemetry import write_csv
-from igrow.trainer.readers.open_log import open_log
+from igrow.trainer.data import read_log
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -228,7 +228,7 @@ def free_port() -> int:
 
 def measured_weather(source: Path, out: Path) -> Path:
     """Write the weather of a log as one telemetry file, and return its path."""
-    log = open_log(source, "Reference" if source.is_dir() else None).telemetry
+    log = read_log(source, compartment="Reference" if source.is_dir() else None).telemetry
     path = out / "weather.csv.gz"
     write_csv(path, log.only([name for name in WEATHER if name in log]))
     return path

@@ -15,7 +15,7 @@ from igrow.core.greenhouse.parameters import GreenhouseParameters
 from igrow.core.greenhouse.state import ACCUMULATED, PlantState
 from igrow.core.greenhouse.weather_table import WeatherRow
 from igrow.core.quantities import SETPOINTS
-from igrow.core.sun import position
+from igrow.core.sun import position, solar_day, weekday
 
 SENSOR_CHANNELS = frozenset(
     {"air_temperature", "air_humidity", "air_co2", "rail_pipe_temperature", "grow_pipe_temperature", "par"}
@@ -140,12 +140,11 @@ def drivers(
         values["wind_direction"] = like + wind_direction(weather)
     if wanted & _SUN_DRIVERS:
         elevation, azimuth, hour = position(xp, state.seconds, parameters.latitude, parameters.longitude)
-        # 1 January 1970 was a Thursday.
-        weekday = float((int(state.seconds + 240.0 * parameters.longitude) // 86_400 + 3) % 7)
+        day = solar_day(np.datetime64(int(state.seconds), "s"), parameters.longitude)
         values.update(
             sun_elevation=like + float(elevation),
             sun_azimuth=like + float(azimuth),
             hour=like + float(hour),
-            weekday=like + weekday,
+            weekday=like + float(weekday(day)),
         )
     return values

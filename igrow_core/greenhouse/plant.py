@@ -26,6 +26,7 @@ from igrow.core.greenhouse.sensors import Sensors
 from igrow.core.greenhouse.state import PlantState, add
 from igrow.core.greenhouse.tomato import Crop
 from igrow.core.greenhouse.weather_table import WeatherTable
+from igrow.core.sun import solar_day
 
 __all__ = ["SCAN", "SLOW", "TICK", "Plant", "PlantState"]
 
@@ -291,4 +292,4 @@ def _guided(state: Climate) -> tuple[Array, ...]:
 
 def _picking_day(seconds: float, longitude: float) -> int:
     """Return the number of the local solar day that begins at nine in the morning."""
-    return int((seconds + 240.0 * longitude - 9 * 3600.0) // 86_400.0)
+    return int(solar_day(np.datetime64(int(seconds), "s") - np.timedelta64(9, "h"), longitude))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from igrow.core import gaps
 from igrow.core.errors import IgrowError
 from igrow.core.greenhouse.climate_computer import ClimateComputer
 from igrow.core.greenhouse.disturbances import Disturbances, combined
@@ -156,11 +157,9 @@ def _held(table: Telemetry) -> Schedule:
 
 def _filled(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return values with each gap filled by the last value before it (the first one at the beginning)."""
-    present = ~np.isnan(values)
-    if not present.any():
+    if not np.isfinite(values).any():
         raise IgrowError("setpoints: a column without any value; leave it out instead")
-    last = np.maximum.accumulate(np.where(present, np.arange(len(values)), -1))
-    return values[np.where(last < 0, int(np.argmax(present)), last)]
+    return gaps.held(values)
 
 
 def _run(plant: Plant, schedule: Schedule, end: np.datetime64, step: int) -> list[Season]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from igrow.core import gaps
 from igrow.core.bundle import Bundle, BundleError, open_session
 from igrow.core.simulator.hybrid.measurement import PREDICTED
 from igrow.core.simulator.hybrid.record import Record, make_record
@@ -160,9 +161,4 @@ class HindcastPredictor:
 
 def _held(values: Floats, stand_in: float) -> Floats:
     """Fill gaps by the last value, leading ones by the first; without any value, `stand_in`."""
-    rows = np.flatnonzero(np.isfinite(values))
-    if len(rows) == 0:
-        return np.full(len(values), stand_in)
-    index = np.clip(np.searchsorted(rows, np.arange(len(values)), side="right") - 1, 0, None)
-    held: Floats = values[rows[index]]
-    return held
+    return gaps.held(values) if np.isfinite(values).any() else np.full(len(values), stand_in)

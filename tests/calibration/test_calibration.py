@@ -14,7 +14,7 @@ from igrow.trainer.calibration import calibrate, evaluate, prior, split_weeks
 from igrow.trainer.calibration.evaluation import starts_within
 from igrow.trainer.calibration.forecast import fit_combination
 from igrow.trainer.calibration.remainder import fit_remainder
-from igrow.trainer.calibration.split import alternate_weeks, weeks
+from igrow.trainer.data.splits import alternate_weeks, weeks
 
 TRUTH = {"transmissivity": 1.2, "leakage_wind": 1.3, "transpiration_deficit": 0.75, "assimilation_maximum": 1.25}
 """Factors of the virtual greenhouse's parameters."""

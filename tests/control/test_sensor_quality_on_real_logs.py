@@ -11,7 +11,7 @@ from igrow.edge.bus.plc import Reading
 from igrow.edge.image import Quality
 from igrow.edge.sensors import ImageBuilder, default_rule
 from igrow.edge.wiring import sun_elevation
-from igrow.trainer.readers.open_log import open_log
+from igrow.trainer.data.open_source import open_source
 
 DAYS = 40
 DOUBT = (Quality.FROZEN, Quality.IMPLAUSIBLE, Quality.OUT_OF_RANGE)
@@ -23,7 +23,7 @@ SENSORS = (
 
 @pytest.fixture(scope="module")
 def columns(data_folder):
-    log = open_log(data_folder / "agc2019", "Reference").telemetry
+    log = open_source(data_folder / "agc2019", "Reference").telemetry
     log = log.select(log.time[0], log.time[0] + np.timedelta64(DAYS, "D"))
     seconds = log.time.astype(np.int64).astype(float)
     return seconds, {name: np.array(log[name]) for name in SENSORS if name in log}

@@ -7,12 +7,13 @@ import pytest
 
 from igrow.core.effects import EFFECTS
 from igrow.core.telemetry import Telemetry
+from igrow.trainer.data import prepare_log
+from igrow.trainer.data.splits import split_days
 from igrow.trainer.diagnosis import (
     gram,
     likelihood,
     linearisation,
     problem,
-    runner,
     search,
     selection,
     structure,
@@ -21,7 +22,6 @@ from igrow.trainer.diagnosis import (
 from igrow.trainer.diagnosis.gram import RESIDUAL, DailyGrams, Term
 from igrow.trainer.diagnosis.linearisation import DivergenceError
 from igrow.trainer.diagnosis.problem import Problem
-from igrow.trainer.diagnosis.split import split_days
 from tests.diagnosis.conftest import deployed_model
 from tests.virtual_log import SITE
 
@@ -29,7 +29,7 @@ from tests.virtual_log import SITE
 @pytest.fixture(scope="module")
 def quiet(quiet_log: Telemetry) -> Problem:
     deployed = deployed_model()
-    record, _ = runner.open_record(quiet_log, SITE, deployed)
+    record = prepare_log(quiet_log, SITE).record()
     split = split_days(record, SITE.longitude)
     return problem.prepare(record, split, deployed.prior, {}, SITE.longitude, {})
 

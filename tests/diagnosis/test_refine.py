@@ -4,18 +4,19 @@ import numpy as np
 
 from igrow.core.effects import EFFECTS
 from igrow.core.telemetry import Telemetry
-from igrow.trainer.diagnosis import problem, refine, runner, search, structure
+from igrow.trainer.data import prepare_log
+from igrow.trainer.data.splits import split_days
+from igrow.trainer.diagnosis import problem, refine, search, structure
 from igrow.trainer.diagnosis.activation import ActiveTerm
 from igrow.trainer.diagnosis.gram import Term
 from igrow.trainer.diagnosis.refine import Refined
-from igrow.trainer.diagnosis.split import split_days
 from tests.diagnosis.conftest import DAYS, STEP, deployed_model, greenhouse_log
 from tests.virtual_log import SITE
 
 
 def test_a_term_at_its_bound_comes_back_from_there(quiet_log: Telemetry) -> None:
     deployed = deployed_model()
-    record, _ = runner.open_record(quiet_log, SITE, deployed)
+    record = prepare_log(quiet_log, SITE).record()
     split = split_days(record, SITE.longitude)
     ready = problem.prepare(record, split, deployed.prior, {}, SITE.longitude, {})
     column = next(
@@ -36,7 +37,7 @@ def test_two_ways_for_co2_to_leak_in_have_no_sizes_of_their_own() -> None:
     log = greenhouse_log(4, {"co2": np.full(count, 1.0 / 3.6e6)})
     log = log.with_columns({"air_temperature": log["air_temperature"] + 2.0})
     deployed = deployed_model()
-    record, _ = runner.open_record(log, SITE, deployed)
+    record = prepare_log(log, SITE).record()
     split = split_days(record, SITE.longitude)
     ready = problem.prepare(record, split, deployed.prior, {}, SITE.longitude, {})
 

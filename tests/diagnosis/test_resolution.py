@@ -5,16 +5,17 @@ import pytest
 from scipy.signal import lfilter
 
 from igrow.core.telemetry import Telemetry
-from igrow.trainer.diagnosis import problem, resolution, runner, selection
+from igrow.trainer.data import prepare_log
+from igrow.trainer.data.splits import split_days
+from igrow.trainer.diagnosis import problem, resolution, selection
 from igrow.trainer.diagnosis.problem import Problem
-from igrow.trainer.diagnosis.split import split_days
 from tests.diagnosis.conftest import deployed_model
 from tests.virtual_log import SITE
 
 
 def prepared(log: Telemetry, interval: float) -> Problem:
     deployed = deployed_model()
-    record, _ = runner.open_record(log, SITE, deployed)
+    record = prepare_log(log, SITE).record()
     split = split_days(record, SITE.longitude)
     return problem.prepare(record, split, deployed.prior, {}, SITE.longitude, {}, interval=interval)
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from igrow.trainer.readers.open_log import open_log
+from igrow.trainer.data.open_source import open_source
 
 ROOT = Path(__file__).resolve().parents[2]
 BIN = Path(sys.executable).parent
@@ -115,7 +115,7 @@ def test_a_published_bundle_is_shadowed_and_adopted_while_the_daemon_controls(si
     assert "the safe setpoints were written" in site.log("run")
 
     site.run("igrow-trainer", "collect", "demo", "--exchange", "exchange", "--state", "trainer")
-    day = open_log(site.folder / "trainer/archive/telemetry/site=demo").telemetry
+    day = open_source(site.folder / "trainer/archive/telemetry/site=demo").telemetry
     commanded = day["heating_setpoint"]
     assert commanded.min() >= 12.0
     assert commanded.max() <= 28.0

@@ -11,8 +11,8 @@ import pytest
 
 from igrow.core.errors import IgrowError
 from igrow.core.site import Prices
-from igrow.trainer.readers import automatoes2020, liaoyang2020
-from igrow.trainer.readers.wur2020 import FAULTY_DAYS, TrajectoryFileError, read_seasons
+from igrow.trainer.data.public import automatoes2020, liaoyang2020
+from igrow.trainer.data.public.wur2020 import FAULTY_DAYS, TrajectoryFileError, read_seasons
 from igrow.trainer.reproduce import evaluate, figure3, harvests, incremental, table1
 from igrow.trainer.reproduce.compartments import Compartment, read_2019
 from igrow.trainer.reproduce.scores import SCORED, r2, score

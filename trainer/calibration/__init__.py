@@ -3,7 +3,8 @@
 from igrow.trainer.calibration.evaluation import ErrorSummary, Evaluation, evaluate
 from igrow.trainer.calibration.fit import calibrate
 from igrow.trainer.calibration.posterior import Posterior, prior
-from igrow.trainer.calibration.split import Split, split_weeks
+from igrow.trainer.data.splits import WeekSplit as Split
+from igrow.trainer.data.splits import split_weeks
 
 __all__ = [
     "ErrorSummary",

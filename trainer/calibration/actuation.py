@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from igrow.core import gaps
 from igrow.core.quantities import SETPOINTS
 from igrow.core.simulator import actuation
 from igrow.core.simulator.actuation import RULES
@@ -52,7 +53,7 @@ def setpoint_columns(telemetry: Telemetry, record: Record) -> tuple[dict[str, Fl
     for name in SETPOINTS:
         values = grid.columns.get(name, np.full(len(record), np.nan))
         if np.isfinite(values).mean() > 0.5:
-            columns[name] = _hold(values)
+            columns[name] = gaps.held(values)
             continue
         inferred.append(name)
         if name == "lamp_on":
@@ -168,14 +169,6 @@ def _fit_rule(
         key=lambda solution: float(solution.cost),
     )
     return dict(zip(names, np.clip(best.x, low, high).tolist(), strict=True))
-
-
-def _hold(values: Floats) -> Floats:
-    """Fill gaps with the last value (the first ones with the first)."""
-    known = np.flatnonzero(np.isfinite(values))
-    rows = np.clip(np.searchsorted(known, np.arange(len(values)), side="right") - 1, 0, None)
-    held: Floats = values[known[rows]]
-    return held
 
 
 def _usual_course(measured: Floats, step: float) -> Floats:

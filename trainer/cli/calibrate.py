@@ -7,23 +7,21 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
-import numpy as np
-
 from igrow.core.bundle import HeldOutError, Span, default_bundle_folder, read_bundle
 from igrow.core.errors import IgrowError
+from igrow.core.local_time import utc_datetime
 from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator.hybrid.nominal import nominal, site_record
-from igrow.core.site import Site, load_site
 from igrow.trainer.calibration.actuation import setpoint_columns
 from igrow.trainer.calibration.evaluation import errors_of, evaluate, summarise
 from igrow.trainer.calibration.holding import fit_holding
 from igrow.trainer.calibration.posterior import prior
 from igrow.trainer.calibration.site_model import fit_site
-from igrow.trainer.calibration.split import alternate_weeks, split_weeks
+from igrow.trainer.data import read_log
+from igrow.trainer.data.splits import alternate_weeks, split_weeks
 from igrow.trainer.diagnosis.deployed import learn_misfit
 from igrow.trainer.export.bundle import read_hybrid_model, write_hybrid_bundle
 from igrow.trainer.model import known_range
-from igrow.trainer.readers.open_log import open_log
 
 EXAMPLE = "igrow-trainer calibrate DATA/agc2019 --compartment Reference --out out/reference"
 
@@ -46,8 +44,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Fit, test, write the bundle."""
     if arguments.out.exists():
         raise IgrowError(f"{arguments.out} exists already; name a new folder")
-    log = open_log(arguments.log[0] if len(arguments.log) == 1 else arguments.log, arguments.compartment)
-    site = _site(arguments.site, log.site)
+    place = arguments.log[0] if len(arguments.log) == 1 else arguments.log
+    log = read_log(place, arguments.site, compartment=arguments.compartment)
+    site = log.greenhouse
     for note in log.notes:
         print(f"note: {note}")
     model = read_hybrid_model(read_bundle(arguments.bundle or default_bundle_folder()), site)
@@ -88,7 +87,7 @@ def run(arguments: argparse.Namespace) -> int:
             )
             errors.append(HeldOutError(quantity, horizon, float(old), float(plain), unit))
     held = fit_holding(record, setpoints, fitted.posterior.values, model.holding)
-    span = Span(_utc(record.time[0]), _utc(record.time[-1]))
+    span = Span(utc_datetime(record.time[0]), utc_datetime(record.time[-1]))
     known = known_range({**record.measured, **record.inputs, **setpoints})
     corrected = model.corrected(fitted.posterior, ()).trained(span, known, tuple(errors)).controlled(fitted.rules, held)
     deviation = dict(zip(fitted.posterior.names, map(float, fitted.posterior.standard_deviation), strict=True))
@@ -97,15 +96,3 @@ def run(arguments: argparse.Namespace) -> int:
     bundle = write_hybrid_bundle(arguments.out, corrected, created=datetime.now(UTC))
     print(f"wrote {bundle.folder} ({bundle.label})")
     return 0
-
-
-def _site(path: Path | None, known: Site | None) -> Site:
-    if path is not None:
-        return load_site(path)
-    if known is None:
-        raise IgrowError("this log does not tell its greenhouse: give the site file with --site")
-    return known
-
-
-def _utc(time: np.datetime64) -> datetime:
-    return datetime.fromisoformat(str(time.astype("datetime64[s]"))).replace(tzinfo=UTC)

@@ -11,13 +11,13 @@ from pathlib import Path
 
 from igrow.core.bundle import Bundle, default_bundle_folder, read_bundle
 from igrow.core.errors import IgrowError
-from igrow.core.site import Site, load_site
+from igrow.core.site import Site
+from igrow.trainer.data import read_log
 from igrow.trainer.diagnosis.correction import corrected_model
 from igrow.trainer.diagnosis.deployed import Deployed, from_manifest
 from igrow.trainer.diagnosis.diagnose import Evidence, diagnose
 from igrow.trainer.diagnosis.result import Diagnosis
 from igrow.trainer.export.bundle import write_hybrid_bundle
-from igrow.trainer.readers.open_log import open_log
 
 EXAMPLE = "igrow-trainer diagnose logs/ --bundle bundle/ --site site.yaml --out diagnosis/"
 
@@ -39,14 +39,12 @@ def run(arguments: argparse.Namespace) -> int:
     Raises:
         IgrowError: a file cannot be read or the log cannot be diagnosed.
     """
-    log = open_log(arguments.log[0] if len(arguments.log) == 1 else arguments.log, arguments.compartment)
-    if arguments.site is None and log.site is None:
-        raise IgrowError("this log does not tell its greenhouse: give the site file with --site")
-    site = load_site(arguments.site) if arguments.site is not None else log.site
-    assert site is not None
+    place = arguments.log[0] if len(arguments.log) == 1 else arguments.log
+    log = read_log(place, arguments.site, compartment=arguments.compartment)
+    site = log.greenhouse
     bundle = read_bundle(arguments.bundle or default_bundle_folder())
     deployed = from_manifest(bundle.manifest, site)
-    diagnosis, evidence = diagnose(log.telemetry, site, deployed, without=arguments.without, seed=arguments.seed)
+    diagnosis, evidence = diagnose(log, site, deployed, without=arguments.without, seed=arguments.seed)
     write(arguments.out, diagnosis, evidence, deployed)
     if evidence is not None and diagnosis.findings:
         write_corrected(arguments.out / "bundle", bundle, site, diagnosis, evidence)

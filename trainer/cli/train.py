@@ -12,8 +12,8 @@ from igrow.core.errors import IgrowError
 from igrow.core.simulator.crop import CropStages
 from igrow.core.simulator.hybrid.nominal import site_record
 from igrow.core.site import load_site
+from igrow.trainer.data import read_log
 from igrow.trainer.export.bundle import read_hybrid_model, write_hybrid_bundle
-from igrow.trainer.readers.open_log import open_log
 from igrow.trainer.training.crop import fit_net_growth, train_networks
 
 EXAMPLE = "igrow-trainer train out/virtual/*.csv.gz --site config/site.yaml --out out/trained"
@@ -34,7 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise IgrowError(f"{arguments.out} exists already; name a new folder")
     site = load_site(arguments.site)
     model = read_hybrid_model(read_bundle(arguments.bundle or default_bundle_folder()), site)
-    seasons = [open_log(path).telemetry for path in arguments.seasons]
+    seasons = [read_log(path, site).telemetry for path in arguments.seasons]
     growth, harvest = train_networks(seasons, seed=arguments.seed, report=lambda line: print(line, flush=True))
     records = [site_record(season, site, max(300.0, season.step)) for season in seasons]
     conversion, maintenance = fit_net_growth(records, model.posterior.values, seasons)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from datetime import UTC, datetime
 
 import numpy as np
 
 from igrow.core.bundle import Bundle, EffectRecord, Estimate, HeldOutError, Onset, Span
+from igrow.core.local_time import utc_datetime
 from igrow.core.quantities import QUANTITIES
 from igrow.core.site import Site
 from igrow.trainer.calibration.posterior import Posterior
@@ -34,7 +34,7 @@ def corrected_model(bundle: Bundle, site: Site, diagnosis: Diagnosis, evidence: 
         for quantity, horizons in diagnosis.errors.items()
         for horizon, stages in horizons.items()
     )
-    span = Span(_utc(diagnosis.start), _utc(diagnosis.end))
+    span = Span(utc_datetime(diagnosis.start), utc_datetime(diagnosis.end))
     fitted = model.corrected(Posterior(names, mean, np.diag(deviation**2)), (*kept, *found))
     own = replace(fitted, calibrated_on=site.name, known_misfit=corrected.known_misfit)
     return own.trained(span, model.training_range, errors)
@@ -51,9 +51,5 @@ def effect_record(finding: Finding) -> EffectRecord:
             for name, one in finding.parameters.items()
         },
         finding.balances,
-        None if onset is None else Onset(_utc(onset.time), _utc(onset.low), _utc(onset.high)),
+        None if onset is None else Onset(utc_datetime(onset.time), utc_datetime(onset.low), utc_datetime(onset.high)),
     )
-
-
-def _utc(time: np.datetime64) -> datetime:
-    return datetime.fromisoformat(str(time.astype("datetime64[s]"))).replace(tzinfo=UTC)

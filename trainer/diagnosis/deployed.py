@@ -14,11 +14,11 @@ from igrow.core.simulator.hybrid.nominal import as_described, nominal
 from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
 from igrow.trainer.calibration import Posterior
+from igrow.trainer.data.splits import split_days
 from igrow.trainer.diagnosis import prior as priors
 from igrow.trainer.diagnosis import problem, structure
 from igrow.trainer.diagnosis.activation import ActiveTerm
 from igrow.trainer.diagnosis.prior import Prior
-from igrow.trainer.diagnosis.split import split_days
 from igrow.trainer.model import CALIBRATED_ON_KEY, MISFIT_KEY
 
 
@@ -101,7 +101,7 @@ def learn_misfit(
     """Return the misfit of a calibrated model on its own log, for `Deployed.known_misfit` and the manifest.
 
     Args:
-        record: of the calibration log (`linearisation.diagnosis_record`).
+        record: of the calibration log (`Log.record`).
         parameters: calibrated, by name.
         deviation: their standard deviations.
         longitude: degrees east.

@@ -12,6 +12,9 @@ from igrow.core.errors import IgrowError
 from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
+from igrow.trainer.data import Log, prepare_log
+from igrow.trainer.data.splits import DaySplit as Split
+from igrow.trainer.data.splits import split_days
 from igrow.trainer.diagnosis import (
     freefit,
     freerun,
@@ -19,8 +22,6 @@ from igrow.trainer.diagnosis import (
     problem,
     refine,
     resolution,
-    runner,
-    screening,
     selection,
     structure,
     usual,
@@ -37,9 +38,7 @@ from igrow.trainer.diagnosis.prior import Prior
 from igrow.trainer.diagnosis.problem import Problem
 from igrow.trainer.diagnosis.result import HORIZONS, Diagnosis, Finding, Interval, Verdict
 from igrow.trainer.diagnosis.selection import Selected
-from igrow.trainer.diagnosis.split import Split, split_days
 
-LEAST_DAYS = 7
 MOST_CAUSES = 3
 SMALLEST_ENR = 0.15
 """A cause that moves a 24 h forecast by less is not worth a name."""
@@ -111,7 +110,7 @@ class Evidence:
 
 
 def diagnose(
-    telemetry: Telemetry,
+    log: Log | Telemetry,
     site: Site,
     deployed: Deployed,
     *,
@@ -121,7 +120,7 @@ def diagnose(
     """Return the diagnosis of a log, and what supports it (None for a data fault).
 
     Args:
-        telemetry: of the site, 5 min to hourly; gaps and missing columns are allowed.
+        log: of the site, a row every minute to every hour; gaps and missing columns are allowed.
         site: its description.
         deployed: the model in force.
         without: effects that are not to be considered.
@@ -130,20 +129,15 @@ def diagnose(
     Raises:
         IgrowError: the log is shorter than a week, or lacks outdoor or air temperature.
     """
-    for name in screening.NEEDED:
-        if name not in telemetry or not np.isfinite(telemetry[name]).any():
-            raise IgrowError(f"the log has no {name}: a diagnosis needs it")
-    span = (telemetry.time[-1] - telemetry.time[0]).astype("timedelta64[s]").astype(float) / 86_400.0
-    if span < LEAST_DAYS:
-        raise IgrowError(f"the log spans {span:.1f} days: a diagnosis needs at least {LEAST_DAYS}")
+    log = prepare_log(log, site) if isinstance(log, Telemetry) else replace(log, site=site)
+    if log.faults:
+        return _data_fault(log), None
+    log.require("a diagnosis")
     for name in without:
         if name not in EFFECTS:
             raise IgrowError(f"no effect is called {name!r}; there are {', '.join(EFFECTS)}")
     rng = np.random.default_rng(seed)
-    screened = screening.screen(telemetry)
-    if screened.faults:
-        return _data_fault(site, telemetry, screened), None
-    record, _ = runner.open_record(screened.telemetry, site, deployed)
+    record = log.record(log.best_shift(deployed.parameters) if deployed.shift is None else deployed.shift)
     split = split_days(record, site.longitude)
     search = _search(record, split, site, deployed, frozenset(without), rng)
     prepared = search.problem
@@ -156,13 +150,13 @@ def diagnose(
     diagnosis = Diagnosis(
         site.name,
         verdict,
-        telemetry.time[0],
-        telemetry.time[-1],
+        log.telemetry.time[0],
+        log.telemetry.time[-1],
         int(split.fit.sum()),
         int((~split.fit).sum()),
         findings,
         errors,
-        screened.screened,
+        log.screened,
         prepared.untestable,
         record.unknown,
         () if deployed.known_misfit else (NOT_CALIBRATED,),
@@ -368,8 +362,9 @@ def _errors(record: Record, split: Split, stages: Mapping[str, Stage]) -> dict[s
     return table
 
 
-def _data_fault(site: Site, telemetry: Telemetry, screened: screening.Screening) -> Diagnosis:
+def _data_fault(log: Log) -> Diagnosis:
+    time = log.telemetry.time
     return Diagnosis(
-        site.name, "data_fault", telemetry.time[0], telemetry.time[-1], 0, 0, (), {}, screened.screened,
-        notes=screened.faults,
+        log.greenhouse.name, "data_fault", time[0], time[-1], 0, 0, (), {}, log.screened,
+        notes=tuple(map(str, log.faults)),
     )  # fmt: skip

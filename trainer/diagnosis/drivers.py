@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
+from igrow.core import sun
 from igrow.core.simulator.hybrid.record import SWITCHES, Record
 from igrow.trainer.diagnosis.linearisation import Floats, Linearisation, flux_columns
 
@@ -46,8 +47,7 @@ class Pattern:
 def patterns(record: Record, longitude: float) -> list[tuple[str, tuple[str, ...], Floats]]:
     """Return (when, drivers, course (n,)) of every pattern, without the channel."""
     hour = np.asarray(record.inputs["hour"])
-    seconds = record.time.astype("datetime64[s]").astype(np.int64) + int(240.0 * longitude)
-    weekday = (seconds // 86_400 + 3) % 7
+    weekday = sun.weekday(sun.solar_day(record.time, longitude))
     working: Floats = (weekday < 5).astype(np.float64)
     table: list[tuple[str, tuple[str, ...], Floats]] = []
 

@@ -12,10 +12,10 @@ import numpy as np
 
 from igrow.core.simulator.hybrid.climate import ActiveEffects
 from igrow.core.simulator.hybrid.record import Record
+from igrow.trainer.data.splits import DaySplit as Split
 from igrow.trainer.diagnosis import linearisation
 from igrow.trainer.diagnosis.linearisation import DayRuns, DivergenceError, Floats, Linearisation
 from igrow.trainer.diagnosis.prior import Prior
-from igrow.trainer.diagnosis.split import Split
 
 SPREADS = np.array([0.5, 3.0, 35.0])
 """Errors that weigh the quantities against each other: K, %, ppm."""

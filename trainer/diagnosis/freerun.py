@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from igrow.core.simulator.hybrid import measurement
 from igrow.core.simulator.hybrid.climate import ActiveEffects
 from igrow.core.simulator.hybrid.record import Record, complete_starts, free_run, observe
+from igrow.trainer.data.splits import DaySplit as Split
 from igrow.trainer.diagnosis.linearisation import Floats
-from igrow.trainer.diagnosis.split import Split
 
 HORIZONS: Mapping[str, float] = {"1_step": 0.0, "24_h": 86_400.0, "7_d": 604_800.0}
 """Seconds of each free run; 0 is one row."""

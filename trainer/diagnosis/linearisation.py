@@ -12,7 +12,7 @@ whitens it. Sensitivities to all parameters, effects and patterns come from batc
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,55 +22,19 @@ from igrow.core.effects.definition import Array
 from igrow.core.errors import IgrowError
 from igrow.core.simulator.hybrid import climate, measurement
 from igrow.core.simulator.hybrid.climate import ActiveEffects
-from igrow.core.simulator.hybrid.nominal import site_record
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.core.simulator.hybrid.record import SUBSTEP, Record, free_run, observe
-from igrow.core.site import Site
-from igrow.core.telemetry import Telemetry, to_grid
 
 Floats = NDArray[np.float64]
 
 BALANCES = ("heat", "vapour", "co2")
 """In the order of `measurement.PREDICTED`, which shows each of them first."""
-STEP = 900.0
-"""Seconds between rows of the record that is diagnosed; an hourly log keeps its hours."""
 _BATCH = 160
 """Variants run at once: more do not fit into the cache."""
-_WEATHER = ("outdoor_temperature", "outdoor_humidity", "global_radiation", "wind_speed", "sky_temperature", "rain")
 
 
 class DivergenceError(IgrowError):
     """The model runs out of all bounds on a log."""
-
-
-def diagnosis_record(telemetry: Telemetry, site: Site) -> Record:
-    """Return the record that is diagnosed: inputs as means over each step, measurements as at its first instant.
-
-    Where a house doses CO2 and the log does not tell how much, its CO2 tells nothing: it is left out, as in the
-    calibration (`igrow.trainer.calibration.fit`).
-    """
-    fine = telemetry.step
-    step = max(STEP, fine)
-    record = site_record(telemetry, site, step)
-    if "co2_dosing" in record.unknown:
-        telemetry = telemetry.with_columns({"air_co2": np.full(len(telemetry), np.nan)})
-        record = replace(record, measured={**record.measured, "air_co2": np.full(len(record), np.nan)})
-    if fine >= STEP:
-        return record
-    grid = to_grid(telemetry, int(step))
-    inputs = dict(record.inputs)
-    for name in _WEATHER:
-        if name in grid and np.isfinite(grid[name]).any():
-            inputs[name] = _filled(grid[name])
-    # The first reading of each cell, where it lies on the cell's edge.
-    position = np.searchsorted(telemetry.time, record.time)
-    inside = np.minimum(position, len(telemetry) - 1)
-    near = np.abs((telemetry.time[inside] - record.time).astype("timedelta64[s]").astype(np.float64)) < 0.5 * fine
-    measured = {
-        name: np.where(near, telemetry[name][inside], np.nan) if name in telemetry else values
-        for name, values in record.measured.items()
-    }
-    return replace(record, inputs=inputs, measured=measured)
 
 
 @dataclass(frozen=True)
@@ -303,11 +267,6 @@ def _rows_of(effects: ActiveEffects, rows: NDArray[np.int64], count: int) -> dic
         }
         for effect, values in effects.items()
     }
-
-
-def _filled(values: Floats) -> Floats:
-    known = np.isfinite(values)
-    return np.interp(np.arange(len(values)), np.flatnonzero(known), values[known])
 
 
 def is_measured(record: Record, effect: Effect) -> bool:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from igrow.core.simulator.hybrid.climate import ActiveEffects
 from igrow.core.simulator.hybrid.record import Record
+from igrow.trainer.data.splits import DaySplit as Split
 from igrow.trainer.diagnosis import candidates, drivers, gram, innovations, linearisation
 from igrow.trainer.diagnosis.candidates import Candidate
 from igrow.trainer.diagnosis.drivers import Pattern
@@ -17,7 +18,6 @@ from igrow.trainer.diagnosis.gram import DailyGrams
 from igrow.trainer.diagnosis.innovations import Whitening
 from igrow.trainer.diagnosis.linearisation import Floats, Linearisation
 from igrow.trainer.diagnosis.prior import Prior, drift
-from igrow.trainer.diagnosis.split import Split
 
 HOUR = 3600.0
 LONG_DAYS = 42

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from igrow.core.quantities import QUANTITIES
+from igrow.trainer.data.screening import Screened
 
 Verdict = Literal["nothing", "named", "ambiguous", "unexplained", "data_fault"]
 EXIT_CODES: Mapping[str, int] = {"nothing": 0, "named": 10, "ambiguous": 11, "unexplained": 12, "data_fault": 13}
@@ -56,16 +57,6 @@ class Finding:
     """RMS that it moves in a 24 h free run over the RMS that no model removes."""
     regimes: Mapping[str, Interval] = field(default_factory=dict)
     """The coefficient refitted by regime."""
-
-
-@dataclass(frozen=True)
-class Screened:
-    """A stretch of one quantity that was set aside."""
-
-    quantity: str
-    start: np.datetime64
-    end: np.datetime64
-    reason: str
 
 
 @dataclass(frozen=True)

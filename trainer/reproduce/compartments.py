@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from igrow.core import gaps
 from igrow.core.errors import IgrowError
-from igrow.trainer.readers import agc2018, excel_tables
-from igrow.trainer.readers.challenge import daily
+from igrow.trainer.data.public import agc2018, excel_tables
+from igrow.trainer.data.public.challenge import daily
 
 Values = NDArray[np.float64]
 
@@ -64,10 +65,9 @@ def _held(day: NDArray[np.datetime64], known_day: NDArray[np.datetime64], values
 
 
 def _filled(values: Values) -> Values:
-    rows, good = np.arange(values.size), np.isfinite(values)
-    if not good.any():
+    if not np.isfinite(values).any():
         raise IgrowError("a driver of the harvest has no value on any day")
-    return np.interp(rows, rows[good], values[good])
+    return gaps.interpolated(values)
 
 
 def _by_day(time: NDArray[np.datetime64], values: Values, day: NDArray[np.datetime64]) -> Values:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from igrow.trainer.readers.wur2020 import read_seasons
+from igrow.trainer.data.public.wur2020 import read_seasons
 from igrow.trainer.reproduce.scores import PUBLISHED_BASELINE, PUBLISHED_INCREMENTAL, SCORED, Score, score
 from igrow.trainer.reproduce.table1 import run_freely
 from igrow.trainer.training.checkpoint import load_simulator

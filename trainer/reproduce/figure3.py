@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from igrow.core.economics import co2_cost, product_price
 from igrow.core.errors import IgrowError
 from igrow.core.site import Prices
-from igrow.trainer.readers.automatoes2020 import Champion
-from igrow.trainer.readers.automatoes2020 import read as read_champion
+from igrow.trainer.data.public.automatoes2020 import Champion
+from igrow.trainer.data.public.automatoes2020 import read as read_champion
 from igrow.trainer.reproduce.compartments import Compartment, read_2019
 from igrow.trainer.reproduce.harvests import PREDICTORS
 

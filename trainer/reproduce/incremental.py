@@ -25,8 +25,8 @@ from igrow.core.local_time import to_local
 from igrow.core.simulator.network import NetworkSimulator, Stage
 from igrow.core.simulator.network_run import free_growth
 from igrow.core.telemetry import Telemetry, to_grid
-from igrow.trainer.readers import agc2019
-from igrow.trainer.readers.wur2020 import Seasons, read_seasons
+from igrow.trainer.data.public import agc2019
+from igrow.trainer.data.public.wur2020 import Seasons, read_seasons
 from igrow.trainer.reproduce.scores import SCORED, score
 from igrow.trainer.reproduce.table1 import run_freely, split_seasons
 from igrow.trainer.training.simulator import Layouts, derived, hourly_data, train_simulator

@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from igrow.core.errors import IgrowError
 from igrow.core.simulator.network import NetworkSimulator
 from igrow.core.simulator.network_run import free_run
+from igrow.trainer.data.public.wur2020 import Seasons, TrajectoryFileError, read_seasons
 from igrow.trainer.export.network import write_network_bundle
-from igrow.trainer.readers.wur2020 import Seasons, TrajectoryFileError, read_seasons
 from igrow.trainer.reproduce.scores import PUBLISHED_BASELINE, PUBLISHED_INCREMENTAL, SCORED, Score, score
 from igrow.trainer.training.checkpoint import BUNDLE_FOLDER
 from igrow.trainer.training.simulator import Layouts, train_simulator, with_setting_drivers

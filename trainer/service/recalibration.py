@@ -159,11 +159,12 @@ class Outcome:
 def _diagnose(site: Site, log: SiteLog, bundle: Bundle, target: Path) -> Outcome:
     """Diagnose a log against a bundle, and write diagnosis and report to `target`."""
     from igrow.trainer.cli.diagnose import write, write_corrected  # noqa: PLC0415  (torch and scipy are slow to import)
+    from igrow.trainer.data import prepare_log  # noqa: PLC0415
     from igrow.trainer.diagnosis.deployed import from_manifest  # noqa: PLC0415
     from igrow.trainer.diagnosis.diagnose import diagnose  # noqa: PLC0415
 
     deployed = from_manifest(bundle.manifest, site)
-    diagnosis, evidence = diagnose(log.telemetry, site, deployed)
+    diagnosis, evidence = diagnose(prepare_log(log.telemetry, site, name=site.name), site, deployed)
     write(target, diagnosis, evidence, deployed)
     write_bundle = None
     if evidence is not None:

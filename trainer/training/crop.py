@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+from igrow.core import gaps
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import GROWTH, QUANTITIES, YIELD
 from igrow.core.simulator.crop import GROWTH_DRIVERS, HARVEST_DRIVERS
@@ -118,12 +119,9 @@ def _stacked(tables: Sequence[Telemetry], names: Sequence[str]) -> Values:
 
 
 def _bridged(table: Telemetry, name: str) -> Values:
-    values = table[name]
-    good = np.flatnonzero(np.isfinite(values))
-    if len(good) == 0:
+    if not np.isfinite(table[name]).any():
         raise IgrowError(f"a season to train on has no {name}")
-    bridged: Values = np.interp(np.arange(len(values)), good, values[good])
-    return bridged
+    return gaps.interpolated(table[name])
 
 
 def _by_day(values: Values, days: int) -> Values:

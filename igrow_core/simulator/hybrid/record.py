@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow.core import sun
+from igrow.core import gaps, sun
 from igrow.core.effects import EFFECTS
 from igrow.core.effects.definition import Array, Values
 from igrow.core.simulator.hybrid import climate, measurement
@@ -294,16 +294,7 @@ def _present(table: Telemetry, name: str) -> bool:
 
 def _bridge(values: Floats, longest: int, *, smooth: bool) -> tuple[Floats, NDArray[np.bool_]]:
     """Fill gaps (linearly or by the last value) and tell which rows were measured or lay in a gap of <= longest."""
-    good = np.isfinite(values)
-    if not good.any():
-        return np.array(values), good
-    rows = np.arange(len(values))
-    known = rows[good]
-    before = np.clip(np.searchsorted(known, rows, side="right") - 1, 0, None)
-    after = np.clip(np.searchsorted(known, rows, side="left"), None, len(known) - 1)
-    short = (known[after] - known[before] - 1 <= longest) & (rows >= known[0]) & (rows <= known[-1])
-    filled = np.interp(rows, known, values[good]) if smooth else values[known[before]]
-    return filled, good | short
+    return (gaps.interpolated if smooth else gaps.held)(values), gaps.short_gaps(values, longest)
 
 
 def _run_mass(record: Record, state: Values, drivers: Values, parameters: Values) -> Floats:

@@ -55,3 +55,16 @@ def best_shift(telemetry: Telemetry, site: Site, parameters: Mapping[str, float]
         scatter.append(total)
     best = int(np.argmin(scatter))
     return SHIFTS[best] if scatter[best] < scatter[0] - _MARGIN else 0.0
+
+
+def read_ahead(telemetry: Telemetry, shift: float) -> Telemetry:
+    """Return the log with its actuators read `shift` rows (0, 0.5 or 1) ahead; before a gap they stay as they are."""
+    if shift == 0.0:
+        return telemetry
+    moved = {}
+    for name in ACTUATORS:
+        if name in telemetry:
+            values = telemetry[name]
+            ahead = np.append(values[1:], values[-1:])
+            moved[name] = np.where(np.isfinite(ahead), (1.0 - shift) * values + shift * ahead, values)
+    return telemetry.with_columns(moved)

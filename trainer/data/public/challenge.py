@@ -15,8 +15,8 @@ from igrow.core.errors import IgrowError
 from igrow.core.local_time import from_local
 from igrow.core.site import Site, load_site
 from igrow.core.telemetry import Telemetry, from_rows
-from igrow.trainer.readers import excel_tables, screening
-from igrow.trainer.readers.log import DailyTable
+from igrow.trainer.data.public import excel_tables, traps
+from igrow.trainer.data.source import DailyTable
 
 Floats = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ STEP = 300.0
 
 def site(name: str) -> Site:
     """Return the site description that comes with the reader of a challenge."""
-    with resources.as_file(resources.files("igrow.trainer.readers") / "sites" / f"{name}.yaml") as path:
+    with resources.as_file(resources.files("igrow.trainer.data.public") / "sites" / f"{name}.yaml") as path:
         return load_site(path)
 
 
@@ -63,7 +63,7 @@ def weather(frame: Any) -> dict[str, Floats]:
     for ours, theirs in names.items():
         values = excel_tables.column(frame, theirs)
         if values is not None:
-            columns[ours] = screening.without_spikes(ours, values)
+            columns[ours] = traps.without_spikes(ours, values)
     net = excel_tables.column(frame, "Pyrgeo")
     if net is not None and "outdoor_temperature" in columns:
         # A pyrgeometer shows the sky's radiation minus its own, which is that of a body at outdoor temperature.
@@ -85,7 +85,7 @@ def climate(frame: Any) -> dict[str, Floats]:
         values = excel_tables.column(frame, theirs)
         if values is None:
             raise IgrowError(f"the climate table has no column {theirs}")
-        columns[ours] = screening.without_spikes(ours, values)
+        columns[ours] = traps.without_spikes(ours, values)
     names = {
         "vent_lee": "VentLee",
         "vent_wind": "VentWind",
@@ -99,7 +99,7 @@ def climate(frame: Any) -> dict[str, Floats]:
     for ours, theirs in {"rail_pipe_temperature": "PipeLow", "grow_pipe_temperature": "PipeGrow"}.items():
         values = excel_tables.column(frame, theirs)
         if values is not None:
-            columns[ours] = screening.cooling_pipe(values, columns["air_temperature"], STEP)
+            columns[ours] = traps.cooling_pipe(values, columns["air_temperature"], STEP)
     return columns
 
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from igrow.core.errors import IgrowError
-from igrow.trainer.readers import challenge, excel_tables
-from igrow.trainer.readers.log import DailyTable, Log
+from igrow.trainer.data.public import challenge, excel_tables
+from igrow.trainer.data.source import DailyTable, Source
 
 Floats = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ def recognises(folder: Path) -> bool:
     return excel_tables.find(folder, "meteo") is not None
 
 
-def read(folder: Path, compartment: str | None = None) -> Log:
+def read(folder: Path, compartment: str | None = None) -> Source:
     """Return the log of one compartment; raises IgrowError where its files are not as they should be."""
     name = challenge.choose(folder, compartment, *_CLIMATE)
     weather_path = excel_tables.find(folder, "meteo")
@@ -55,7 +55,7 @@ def read(folder: Path, compartment: str | None = None) -> Log:
     empty = ~np.isfinite(table[["Tair", "VentLee", "EnScr"]].to_numpy(dtype=np.float64)).any(axis=1)
     telemetry = challenge.to_telemetry(local, columns, empty)
     site = replace(challenge.site("agc2018"), name=f"agc2018-{name.lower().replace('_', '-')}")
-    return Log(f"agc2018 {name}", telemetry, _harvests(folder / name), _resources(folder / name), site, tuple(notes))
+    return Source(f"agc2018 {name}", telemetry, _harvests(folder / name), _resources(folder / name), site, tuple(notes))
 
 
 def _setpoints(folder: Path, local: NDArray[np.datetime64], columns: dict[str, Floats]) -> list[str]:

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from igrow.core.errors import IgrowError
-from igrow.trainer.readers import challenge, excel_tables, screening
-from igrow.trainer.readers.log import DailyTable, Log
+from igrow.trainer.data.public import challenge, excel_tables, traps
+from igrow.trainer.data.source import DailyTable, Source
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ def recognises(folder: Path) -> bool:
     return excel_tables.find(folder / "Weather", "Weather") is not None
 
 
-def read(folder: Path, compartment: str | None = None) -> Log:
+def read(folder: Path, compartment: str | None = None) -> Source:
     """Return the log of one compartment; raises IgrowError where its files are not as they should be."""
     name = challenge.choose(folder, compartment, *_CLIMATE)
     weather_path = excel_tables.find(folder / "Weather", "Weather")
@@ -67,7 +67,7 @@ def read(folder: Path, compartment: str | None = None) -> Log:
         },
     )
     site = replace(challenge.site("agc2019"), name=f"agc2019-{name.lower()}")
-    return Log(f"agc2019 {name}", telemetry, harvests, resources, site, notes)
+    return Source(f"agc2019 {name}", telemetry, harvests, resources, site, notes)
 
 
 def _lamps_and_doses(table: Any, local: NDArray[np.datetime64]) -> dict[str, Floats]:
@@ -85,7 +85,7 @@ def _lamps_and_doses(table: Any, local: NDArray[np.datetime64]) -> dict[str, Flo
         columns["co2_dosing"] = np.clip(dose, 0.0, None)
     given = excel_tables.column(table, "Cum_irr")
     if given is not None:
-        columns["irrigation"] = screening.without_spikes("irrigation", _rate(given, local) * 3600.0 / challenge.STEP)
+        columns["irrigation"] = traps.without_spikes("irrigation", _rate(given, local) * 3600.0 / challenge.STEP)
     minutes = excel_tables.column(table, "water_sup")
     if minutes is not None:
         columns["irrigation_on"] = np.clip(_rate(minutes, local) * (60.0 / challenge.STEP), 0.0, 1.0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from igrow.core.quantities import QUANTITIES
 from igrow.core.telemetry import Telemetry
-from igrow.trainer.diagnosis.result import Screened
+from igrow.trainer.data.fault import DataFault
 
 Floats = NDArray[np.float64]
 
@@ -38,43 +38,94 @@ SENSED = ("air_temperature", "air_humidity", "air_co2")
 
 
 @dataclass(frozen=True)
+class Screened:
+    """A stretch of one quantity that was set aside."""
+
+    quantity: str
+    start: np.datetime64
+    end: np.datetime64
+    reason: str
+
+
+@dataclass(frozen=True)
 class Screening:
     """The log without what was set aside."""
 
     telemetry: Telemetry
     screened: tuple[Screened, ...]
-    faults: tuple[str, ...]
-    """Needed quantities of which too little is left, each with the reason, for people."""
+    faults: tuple[DataFault, ...]
+    """Needed quantities of which too little is left."""
+    notes: tuple[str, ...]
+    """What was set aside, a sentence for each quantity and reason."""
 
 
 def screen(telemetry: Telemetry) -> Screening:
-    """Set aside readings that are out of range, spikes, or stuck."""
-    columns = {}
+    """Set aside rows of an outage, and readings that are out of range, spikes, or stuck.
+
+    A sensor that lost more than half of its readings is set aside whole; where nothing can be said without it, the
+    log is at fault.
+    """
+    out = outage_rows(telemetry)
+    columns: dict[str, Floats] = {}
     found: list[Screened] = []
-    faults: list[str] = []
+    faults: list[DataFault] = []
+    notes: list[str] = []
     for name, raw in telemetry.columns.items():
-        values = np.array(raw)
+        values = np.where(out, np.nan, raw)
         quantity = QUANTITIES[name]
         with np.errstate(invalid="ignore"):
             wrong = (values < quantity.low) | (values > quantity.high)
         checks = [("out of range", wrong)]
+        if name in SENSED:
+            checks.insert(0, ("outage", out & np.isfinite(raw)))
         if name in SPIKE:
             checks.append(("spike", _spikes(np.where(wrong, np.nan, values), SPIKE[name])))
         if name in STUCK_HOURS:
             checks.append(
                 ("stuck", _stuck(telemetry.time, values, STUCK_HOURS[name], saturated=name.endswith("humidity")))
             )
-        before = int(np.isfinite(values).sum())
+        before = int(np.isfinite(raw).sum())
         for reason, rows in checks:
-            found += [
+            stretches = [
                 Screened(name, telemetry.time[first], telemetry.time[last], reason) for first, last in _stretches(rows)
             ]
+            if stretches and reason != "outage":
+                notes.append(_sentence(name, reason, int(rows.sum()), stretches))
+            found += stretches
             values[rows] = np.nan
-        columns[name] = values
         left = int(np.isfinite(values).sum())
         if name in (*NEEDED, *SENSED) and before and left < LARGEST_LOSS * before:
-            faults.append(f"{name}: {100 * (1 - left / before):.0f} % of its readings were set aside")
-    return Screening(Telemetry(telemetry.time, columns), tuple(found), tuple(faults))
+            lost = f"{name}: {100 * (1 - left / before):.0f} % of its readings were set aside"
+            if name in NEEDED:
+                faults.append(DataFault("sensor", name, lost, "look at the sensor, and at how its readings are logged"))
+            else:
+                values[:] = np.nan
+                notes.append(f"{lost}; nothing is said of it")
+        columns[name] = values
+    if out.any():
+        notes.insert(0, f"{int(out.sum())} rows in which all sensors read 0 were set aside whole: an outage")
+    return Screening(Telemetry(telemetry.time, columns), tuple(found), tuple(faults), tuple(notes))
+
+
+def outage_rows(telemetry: Telemetry) -> NDArray[np.bool_]:
+    """Tell in which rows every climate sensor that the log has reads exactly 0, at least two of them, (n,)."""
+    rows = np.ones(len(telemetry), dtype=bool)
+    zeros = np.zeros(len(telemetry), dtype=np.int64)
+    for name in SENSED:
+        if name in telemetry:
+            values = telemetry[name]
+            rows &= ~(np.abs(values) > 0.0)
+            zeros += values == 0.0
+    found: NDArray[np.bool_] = rows & (zeros >= 2)
+    return found
+
+
+def _sentence(name: str, reason: str, count: int, stretches: Sequence[Screened]) -> str:
+    first, last = (
+        str(one.astype("datetime64[m]")).replace("T", " ") for one in (stretches[0].start, stretches[-1].end)
+    )
+    when = f"at {first}" if first == last else f"between {first} and {last}"
+    return f"{name}: {count} reading{'s' * (count > 1)} {when} UTC set aside: {reason}"
 
 
 def _spikes(values: Floats, size: float) -> NDArray[np.bool_]:

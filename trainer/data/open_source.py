@@ -6,28 +6,33 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from igrow.core.errors import IgrowError
-from igrow.trainer.readers import agc2018, agc2019, telemetry_files
-from igrow.trainer.readers.log import Log
+from igrow.trainer.data import telemetry_files
+from igrow.trainer.data.public import agc2018, agc2019
+from igrow.trainer.data.source import Source
 
 
-def open_log(path: str | Path | Sequence[str | Path], compartment: str | None = None) -> Log:
-    """Return the log of one greenhouse.
+def open_source(
+    path: str | Path | Sequence[str | Path], compartment: str | None = None, mapping: str | Path | None = None
+) -> Source:
+    """Return the log of one greenhouse as it stands in its files.
 
     Args:
         path: a folder of the first or second Autonomous Greenhouse Challenge (or a compartment's folder in it), or
             telemetry: a file (CSV, gzip or not, Parquet), several, or a folder of them such as an exchange's. A
-            folder with a `mapping.yaml` holds a grower's own export (`igrow.trainer.readers.mapping`).
+            grower's own export comes with a mapping (`igrow.trainer.data.mapping`).
         compartment: its name, where the folder has several.
+        mapping: file that says what the export's columns are; else one that stands beside the files is taken.
 
     Raises:
         IgrowError: nothing readable is there, or a compartment must be named.
     """
+    translation = None if mapping is None else Path(mapping)
     if not isinstance(path, str | Path):
-        return telemetry_files.read([Path(part) for part in path])
+        return telemetry_files.read([Path(part) for part in path], translation)
     place = Path(path)
     if not place.exists():
         raise IgrowError(f"{place}: there is no such file or folder")
-    if place.is_dir():
+    if place.is_dir() and translation is None:
         for recognises, read in ((agc2019.recognises, agc2019.read), (agc2018.recognises, agc2018.read)):
             if recognises(place):
                 return read(place, compartment)
@@ -35,4 +40,4 @@ def open_log(path: str | Path | Sequence[str | Path], compartment: str | None = 
                 return read(place.resolve().parent, place.resolve().name)
     if compartment is not None and place.is_dir() and (place / compartment).is_dir():
         place = place / compartment
-    return telemetry_files.read([place])
+    return telemetry_files.read([place], translation)

@@ -2,11 +2,14 @@
 
     time: {column: Timestamp, format: "%d-%m-%Y %H:%M", time_zone: Europe/Amsterdam}
     delimiter: ";"
+    decimal: ","
     columns:
       air_temperature: {column: "Temp kas (C)"}
       energy_screen: {column: "Doek", scale: -1, offset: 100}   # the export's 100 is open
+      lamp_power: {column: "HPS", add: ["LED"], scale: 81}
 
-A value becomes value * scale + offset.
+A value becomes value * scale + offset. Where a quantity is spread over several columns, `add` names the further ones;
+they are added before the scale is applied.
 """
 
 from __future__ import annotations
@@ -24,7 +27,7 @@ from igrow.core import telemetry, yaml_schema
 from igrow.core.errors import IgrowError
 from igrow.core.local_time import from_local, zone
 from igrow.core.quantities import QUANTITIES
-from igrow.core.telemetry import Telemetry
+from igrow.core.telemetry import Telemetry, Values
 from igrow.core.yaml_schema import SettingError, setting
 
 
@@ -50,6 +53,7 @@ class ColumnMapping:
     column: str = setting(help="its name in the export")
     scale: float = setting(default=1.0, help="factor from the export's unit to the registry's")
     offset: float = setting(default=0.0, help="added after the factor, in the registry's unit")
+    add: tuple[str, ...] = setting(default=(), help="further columns, added to the first before the factor")
 
 
 @dataclass(frozen=True)
@@ -59,11 +63,14 @@ class ExportMapping:
     columns: Mapping[str, ColumnMapping] = setting(help="our name -> the export's column", keys=tuple(QUANTITIES))
     time: TimeColumn = setting(default_factory=TimeColumn, help="the time")
     delimiter: str = setting(default=",", help="between cells of a CSV")
+    decimal: str = setting(default=".", help="decimal sign of numbers")
     missing: tuple[str, ...] = setting(default=("", "NaN", "nan", "-", "#N/A"), help="texts that stand for no value")
 
     def __post_init__(self) -> None:
         if len(self.delimiter) != 1:
             raise SettingError(f"delimiter is {self.delimiter!r}: one character is needed", "delimiter")
+        if self.decimal not in {".", ","} or self.decimal == self.delimiter:
+            raise SettingError(f"decimal is {self.decimal!r}: . or , is needed, and not the delimiter", "decimal")
 
 
 def load(path: Path) -> ExportMapping:
@@ -85,16 +92,25 @@ def read(path: Path, export: ExportMapping) -> Telemetry:
     else:
         header, parts, lines = telemetry.read_cells(path, export.delimiter)
         cells = {name: list(part) for name, part in zip(header, parts, strict=True)}
-    for wanted in (export.time.column, *(entry.column for entry in export.columns.values())):
+    further = (name for entry in export.columns.values() for name in (entry.column, *entry.add))
+    for wanted in (export.time.column, *further):
         if wanted not in cells:
             raise IgrowError(f"{path}: no column {wanted!r}; it has {', '.join(header)}")
     time = _times(path, cells[export.time.column], lines, export.time)
     missing = frozenset(export.missing)
-    columns = {
-        ours: telemetry.parse_numbers(path, entry.column, cells[entry.column], lines, missing) * entry.scale
-        + entry.offset
-        for ours, entry in export.columns.items()
-    }
+
+    def numbers(name: str) -> Values:
+        texts = [cell.strip() for cell in cells[name]]
+        if export.decimal == ",":
+            texts = [text.replace(".", "").replace(",", ".") if "," in text else text for text in texts]
+        return telemetry.parse_numbers(path, name, texts, lines, missing)
+
+    columns = {}
+    for ours, entry in export.columns.items():
+        total = numbers(entry.column)
+        for name in entry.add:
+            total = total + numbers(name)
+        columns[ours] = total * entry.scale + entry.offset
     there = ~np.isnat(time)
     return telemetry.from_rows(time[there], {name: values[there] for name, values in columns.items()})
 

@@ -1,4 +1,4 @@
-"""What a reader returns: the telemetry of one greenhouse, and what was booked beside it."""
+"""What a reader returns: the telemetry of one greenhouse as it was read, and what was booked beside it."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class DailyTable:
 
 
 @dataclass(frozen=True)
-class Log:
-    """The log of one greenhouse compartment."""
+class Source:
+    """The log of one greenhouse compartment, nothing set aside yet."""
 
     name: str
     telemetry: Telemetry

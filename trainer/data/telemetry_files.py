@@ -12,30 +12,39 @@ from igrow.core import telemetry as core
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import QUANTITIES
 from igrow.core.telemetry import Telemetry
-from igrow.trainer.readers import mapping
-from igrow.trainer.readers.log import Log
+from igrow.trainer.data import mapping
+from igrow.trainer.data.source import Source
 
 _ENDINGS = (".csv", ".csv.gz", ".parquet")
 MAPPING_FILE = "mapping.yaml"
 
 
-def read(paths: Sequence[Path]) -> Log:
+def read(paths: Sequence[Path], translation: Path | None = None) -> Source:
     """Return the log of files and folders, joined in time; where rows overlap the later-named file counts.
+
+    Args:
+        paths: of files, or of folders with files.
+        translation: mapping of all of them; None: `mapping.yaml` in a file's folder, or `NAME.mapping.yaml` beside
+            the file NAME.csv, where there is one.
 
     Raises:
         IgrowError: a file breaks the format, or a folder holds no telemetry.
     """
     tables: list[Telemetry] = []
     for path in paths:
-        translation = path / MAPPING_FILE
-        if path.is_dir() and translation.is_file():
-            exported = mapping.load(translation)
-            tables += [mapping.read(part, exported) for part in _files(path)]
-        else:
-            tables += [read_file(part) for part in _files(path)]
+        for part in _files(path):
+            found = translation or mapping_beside(part, path)
+            tables.append(read_file(part) if found is None else mapping.read(part, mapping.load(found)))
     if not tables:
         raise IgrowError("no telemetry files were given")
-    return Log(paths[0].name, tables[0] if len(tables) == 1 else core.concatenate(tables))
+    return Source(paths[0].name, tables[0] if len(tables) == 1 else core.concatenate(tables))
+
+
+def mapping_beside(file: Path, given: Path) -> Path | None:
+    """Return the mapping of a file: its own, the one in its folder, or the one in the folder that was given."""
+    own = [file.with_name(f"{stem}.{MAPPING_FILE}") for stem in (file.name, file.name.split(".")[0])]
+    shared = [file.with_name(MAPPING_FILE), given / MAPPING_FILE]
+    return next((path for path in (*own, *shared) if path.is_file()), None)
 
 
 def read_file(path: Path) -> Telemetry:

@@ -1,0 +1,77 @@
+"""A grower's own export, read through its mapping."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from igrow.core.errors import IgrowError
+from igrow.core.telemetry import Telemetry
+from igrow.core.yaml_schema import SchemaError, parse
+from igrow.trainer.data.mapping import ExportMapping, load, read
+
+DUTCH = """
+delimiter: ";"
+decimal: ","
+missing: ["-"]
+time: {column: Datum, format: "%d-%m-%Y %H:%M", time_zone: Europe/Amsterdam}
+columns:
+  air_temperature: {column: Tkas}
+  lamp_power: {column: HPS, scale: 81, add: [LED]}
+"""
+
+
+def export(tmp_path: Path, text: str, mapping: str) -> Telemetry:
+    (tmp_path / "export.csv").write_text(text)
+    return read(tmp_path / "export.csv", parse(mapping, ExportMapping))
+
+
+def test_a_dutch_export_is_read_with_its_own_names_signs_and_zone(tmp_path: Path) -> None:
+    text = "Datum;Tkas;HPS;LED;Rest\n15-01-2020 12:00;21,5;1;0,5;x\n15-07-2020 12:00;-;0;0;y\n"
+    telemetry = export(tmp_path, text, DUTCH)
+    np.testing.assert_array_equal(telemetry.time, np.array(["2020-01-15T11:00", "2020-07-15T10:00"], "datetime64[s]"))
+    np.testing.assert_array_equal(telemetry["air_temperature"], [21.5, np.nan])
+    np.testing.assert_array_equal(telemetry["lamp_power"], [121.5, 0.0])
+
+
+def test_dots_between_thousands_are_no_decimals_where_commas_are(tmp_path: Path) -> None:
+    telemetry = export(tmp_path, "Datum;Tkas;HPS;LED\n15-01-2020 12:00;20;1.000,5;1\n", DUTCH)
+    np.testing.assert_array_equal(telemetry["lamp_power"], [81.0 * 1001.5])
+
+
+def test_serial_days_are_rounded_to_the_second(tmp_path: Path) -> None:
+    mapping = "time: {column: t, format: excel}\ncolumns: {air_co2: {column: CO2}}\n"
+    telemetry = export(tmp_path, "t,CO2\n43816.0000000001,500\n43816.00347222,600\n", mapping)
+    np.testing.assert_array_equal(telemetry.time, np.array(["2019-12-17T00:00", "2019-12-17T00:05"], "datetime64[s]"))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("Datum;Tkass;HPS;LED\n", "no column 'Tkas'; it has Datum, Tkass"),
+        ("Datum;Tkas;HPS\n", "no column 'LED'"),
+        ("Datum;Tkas;HPS;LED\n2020-01-15;1;1;1\n", ":2: '2020-01-15' is no time of the form %d-%m-%Y"),
+        ("Datum;Tkas;HPS;LED\n15-01-2020 12:00;warm;1;1\n", ":2: Tkas is 'warm'"),
+    ],
+)
+def test_an_export_that_does_not_fit_its_mapping_is_refused(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(IgrowError) as caught:
+        export(tmp_path, text, DUTCH)
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("time: {column: t}\ncolumns:\n  air_temprature: {column: T}\n", r"mapping.yaml:3:3: .*air_temperature"),
+        ('decimal: "x"\ncolumns: {}\n', "decimal is 'x'"),
+        ('decimal: ","\ndelimiter: ","\ncolumns: {}\n', "not the delimiter"),
+    ],
+)
+def test_a_mapping_that_means_nothing_is_refused_with_its_place(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "mapping.yaml"
+    path.write_text(text)
+    with pytest.raises(SchemaError, match=message):
+        load(path)

@@ -1,0 +1,89 @@
+"""From any source to a `Log`: read, screened, put on the grid; the one way in for every command and benchmark."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from igrow.core.errors import IgrowError
+from igrow.core.site import Site, load_site
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.data.fault import DataFault
+from igrow.trainer.data.grid import HOUR, on_grid, own_step
+from igrow.trainer.data.log import Log
+from igrow.trainer.data.open_source import open_source
+from igrow.trainer.data.screening import screen
+from igrow.trainer.data.source import Source
+
+
+def read_log(
+    path: str | Path | Sequence[str | Path],
+    site: Site | str | Path | None = None,
+    *,
+    compartment: str | None = None,
+    mapping: str | Path | None = None,
+) -> Log:
+    """Return the log of one greenhouse from whatever holds it.
+
+        log = read_log("export.csv", "site.yaml")
+
+    Args:
+        path: telemetry files (CSV, gzip or not, Parquet), a folder of them, an exchange's folder, a grower's export
+            with its mapping, or a folder of a known public data set.
+        site: the greenhouse, or its YAML file; None: the one that a public data set brings, else unknown.
+        compartment: its name, where a folder has several.
+        mapping: file that says what an export's columns are; None: one that stands beside the export.
+
+    Raises:
+        IgrowError: with file and line, where something cannot be read.
+    """
+    source = open_source(path, compartment, mapping)
+    place = [path] if isinstance(path, str | Path) else list(path)
+    given = load_site(site) if isinstance(site, str | Path) else site
+    return _prepared(source, given or source.site, ", ".join(map(str, place)))
+
+
+def prepare_log(telemetry: Telemetry, site: Site | None = None, *, name: str = "log") -> Log:
+    """Return the log of a table in memory, screened and put on the grid as `read_log` does it."""
+    return _prepared(Source(name, telemetry), site, "memory")
+
+
+def _prepared(source: Source, site: Site | None, place: str) -> Log:
+    telemetry = source.telemetry
+    if len(telemetry) == 0:
+        raise IgrowError(f"{source.name}: the log has no rows")
+    step = own_step(telemetry.time)
+    if not step <= HOUR:
+        return Log(source.name, telemetry, site, source.notes, faults=(_sparse(step),), source=place)
+    screened = screen(telemetry)
+    table = on_grid(screened.telemetry)
+    notes = [*source.notes, *screened.notes, *_grid_notes(telemetry, table)]
+    return Log(
+        source.name,
+        table,
+        site,
+        tuple(notes),
+        screened.screened,
+        screened.faults,
+        place,
+        source.harvests,
+        source.resources,
+    )
+
+
+def _sparse(step: float) -> DataFault:
+    pace = f"a row every {step / HOUR:.3g} h" if step > 0.0 else "a single row"
+    return DataFault(
+        "sparse", "", f"{pace} is too sparse for any model", "export one an hour or more, best every 5 min"
+    )
+
+
+def _grid_notes(telemetry: Telemetry, table: Telemetry) -> list[str]:
+    """Say what the grid changed."""
+    off = int((~np.isin(telemetry.time, table.time)).sum())
+    minutes = f"{table.step / 60.0:g} min"
+    return (
+        [f"{off} of {len(telemetry)} rows lay between the times of the grid of {minutes}: snapped to it"] if off else []
+    )

@@ -1,0 +1,90 @@
+"""Rows for fitting, and rows that no step sees: by days within a log, by weeks along it.
+
+Days: whole local days, in blocks of two among every eight. A period of eight days lets the held-out days run through
+all weekdays; a block of two lets 24 h free runs start at every hour of its first day.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow.core import sun
+from igrow.core.errors import IgrowError
+from igrow.core.simulator.hybrid.record import Record
+
+Mask = NDArray[np.bool_]
+
+PERIOD, HELD_OUT = 8, 2
+_FIRST = 3
+"""Day of the period with which the held-out block begins: a log's first days are for fitting."""
+
+
+@dataclass(frozen=True)
+class DaySplit:
+    """Days of a record."""
+
+    day: NDArray[np.int64]
+    """Index of the local solar day of each row, from 0, (n,)."""
+    fit: NDArray[np.bool_]
+    """Days for fitting, (days,)."""
+
+    @property
+    def days(self) -> int:
+        """Number of days touched."""
+        return len(self.fit)
+
+    @property
+    def fit_rows(self) -> NDArray[np.bool_]:
+        """Rows that may be fitted, (n,)."""
+        rows: NDArray[np.bool_] = self.fit[self.day]
+        return rows
+
+
+def split_days(record: Record, longitude: float) -> DaySplit:
+    """Split a record by local solar days; a log of less than eight days is all for fitting."""
+    day = sun.solar_day(record.time, longitude)
+    day -= day[0]
+    days = int(day[-1]) + 1
+    phase = np.arange(days) % PERIOD
+    held = (phase >= _FIRST) & (phase < _FIRST + HELD_OUT)
+    if days < PERIOD:
+        held[:] = False
+    return DaySplit(day, ~held)
+
+
+@dataclass(frozen=True)
+class WeekSplit:
+    """Rows of a record by what they may be used for, (n,) each; no row is in two."""
+
+    fit: Mask
+    selection: Mask
+    held_out: Mask
+
+
+def weeks(time: NDArray[np.datetime64]) -> NDArray[np.int64]:
+    """Return the week of each row counted from the first row, (n,)."""
+    number: NDArray[np.int64] = (time - time[0]).astype("timedelta64[s]").astype(np.int64) // 604_800
+    return number
+
+
+def split_weeks(time: NDArray[np.datetime64], fit: int, selection: int) -> WeekSplit:
+    """Return the first `fit` weeks, the next `selection` weeks, and all later ones.
+
+    Raises:
+        IgrowError: nothing would be left to test on.
+    """
+    week = weeks(time)
+    if fit < 1 or week[-1] < fit + selection:
+        raise IgrowError(f"the log has {week[-1] + 1} weeks: {fit} to fit and {selection} to select leave none to test")
+    return WeekSplit(week < fit, (week >= fit) & (week < fit + selection), week >= fit + selection)
+
+
+def alternate_weeks(time: NDArray[np.datetime64], held_out_every: int = 4) -> WeekSplit:
+    """Return every `held_out_every`-th week held out and the one before it for selection, for logs of few weeks."""
+    week = weeks(time)
+    held_out = week % held_out_every == held_out_every - 1
+    selection = week % held_out_every == held_out_every - 2
+    return WeekSplit(~held_out & ~selection, selection, held_out)
