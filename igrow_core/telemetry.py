@@ -1,13 +1,14 @@
 """The telemetry format: a table with a time and any of the registry's quantities, in memory and as CSV.
 
-A file is CSV, gzip where its name ends in `.gz`. Its header is `time` and names of quantities; times are UTC
-in ISO 8601 (`2020-01-31T12:05:00Z`), an empty cell is a missing value. Rows may stand in any order. Where
+A file is CSV, gzip where its name ends in `.gz`. Its header is `time` and names of quantities; times are ISO 8601
+with their zone (`2020-01-31T12:05:00Z`), an empty cell is a missing value. Rows may stand in any order. Where
 several rows share one time they become one row, in which a later row's value counts before an earlier one's.
 """
 
 from __future__ import annotations
 
 import csv
+import datetime
 import difflib
 import gzip
 import io
@@ -166,6 +167,14 @@ def to_grid(telemetry: Telemetry, step_seconds: int) -> Telemetry:
 
 def read_csv(path: str | os.PathLike[str]) -> Telemetry:
     """Read a telemetry file; raises TelemetryError that says the file, the line and what would be right."""
+    return from_rows(*read_rows(path))
+
+
+def read_rows(path: str | os.PathLike[str]) -> tuple[Times, dict[str, Values]]:
+    """Read a telemetry file's rows in their own order: UTC times (n,), and columns by name, (n,) each.
+
+    Raises TelemetryError as `read_csv` does.
+    """
     path = Path(path)
     header, cells, lines = read_cells(path)
     if not header or header[0] != "time":
@@ -174,10 +183,8 @@ def read_csv(path: str | os.PathLike[str]) -> Telemetry:
         if name not in QUANTITIES:
             raise TelemetryError(f"{path}:1: column {name} is no known quantity{_nearest(name, QUANTITIES)}")
     time = parse_times(path, cells[0], lines)
-    return from_rows(
-        time,
-        {name: parse_numbers(path, name, column, lines) for name, column in zip(header[1:], cells[1:], strict=True)},
-    )
+    numbers = zip(header[1:], cells[1:], strict=True)
+    return time, {name: parse_numbers(path, name, column, lines) for name, column in numbers}
 
 
 def write_csv(path: str | os.PathLike[str], telemetry: Telemetry) -> None:
@@ -274,24 +281,27 @@ def parse_numbers(
 
 
 def parse_times(path: str | Path, cells: Sequence[str], lines: Sequence[int]) -> Times:
-    """Return a column of times; raises TelemetryError with the line of one that is none."""
-    form = "a time needs the form 2020-01-31T12:05:00Z"
-    for cell, line in zip(cells, lines, strict=True):
-        if not cell.endswith("Z"):
-            raise TelemetryError(f"{path}:{line}: time is {cell!r}: {form}")
+    """Return a column of times, UTC, of texts in ISO 8601 with a zone; raises TelemetryError with the line of one that is none.
+
+    The form that `write_csv` writes is read at once.
+    """
     try:
-        time = np.array([cell[:-1] for cell in cells], dtype="datetime64[s]")
-        if not np.isnat(time).any():
-            return time
+        if all(cell.endswith("Z") for cell in cells):
+            time = np.array([cell[:-1] for cell in cells], dtype="datetime64[s]")
+            if not np.isnat(time).any():
+                return time
     except ValueError:
         pass
-    for cell, line in zip(cells, lines, strict=True):
+    seconds = np.empty(len(cells), dtype=np.int64)
+    for position, (cell, line) in enumerate(zip(cells, lines, strict=True)):
         try:
-            if np.isnat(np.datetime64(cell[:-1], "s")):
-                raise ValueError
+            moment = datetime.datetime.fromisoformat(cell.strip())
         except ValueError:
-            raise TelemetryError(f"{path}:{line}: time is {cell!r}: {form}") from None
-    raise AssertionError("one of the cells was refused above")
+            moment = None
+        if moment is None or moment.tzinfo is None:
+            raise TelemetryError(f"{path}:{line}: time is {cell!r}: a time needs the form 2020-01-31T12:05:00Z")
+        seconds[position] = math.floor(moment.timestamp())
+    return seconds.astype("datetime64[s]")
 
 
 def _nearest(name: str, known: Iterable[str]) -> str:

@@ -10,7 +10,8 @@ import pytest
 from igrow.core.errors import IgrowError
 from igrow.core.telemetry import Telemetry
 from igrow.core.yaml_schema import SchemaError, parse
-from igrow.trainer.data.mapping import ExportMapping, load, read
+from igrow.trainer.data.export import read
+from igrow.trainer.data.mapping import ExportMapping, load
 
 DUTCH = """
 delimiter: ";"
@@ -25,7 +26,7 @@ columns:
 
 def export(tmp_path: Path, text: str, mapping: str) -> Telemetry:
     (tmp_path / "export.csv").write_text(text)
-    return read(tmp_path / "export.csv", parse(mapping, ExportMapping))
+    return read(tmp_path / "export.csv", parse(mapping, ExportMapping)).telemetry
 
 
 def test_a_dutch_export_is_read_with_its_own_names_signs_and_zone(tmp_path: Path) -> None:

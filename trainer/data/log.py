@@ -94,7 +94,8 @@ class Log:
             raise IgrowError(f"{self.name}: " + "; ".join(map(str, self.faults)))
         for name in NEEDED:
             if name not in self.telemetry or not np.isfinite(self.telemetry[name]).any():
-                raise IgrowError(f"{self.name}: the log has no {name}: {purpose} needs it")
+                hint = "`igrow-trainer import` tells which columns of an export are which"
+                raise IgrowError(f"{self.name}: the log has no {name}: {purpose} needs it ({hint})")
         if self.days < days:
             raise IgrowError(f"{self.name}: the log spans {self.days:.1f} days: {purpose} needs at least {days:g}")
 

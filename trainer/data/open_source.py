@@ -28,7 +28,7 @@ def open_source(
     """
     translation = None if mapping is None else Path(mapping)
     if not isinstance(path, str | Path):
-        return telemetry_files.read([Path(part) for part in path], translation)
+        return _read_files([Path(part) for part in path], translation)
     place = Path(path)
     if not place.exists():
         raise IgrowError(f"{place}: there is no such file or folder")
@@ -40,4 +40,14 @@ def open_source(
                 return read(place.resolve().parent, place.resolve().name)
     if compartment is not None and place.is_dir() and (place / compartment).is_dir():
         place = place / compartment
-    return telemetry_files.read([place], translation)
+    return _read_files([place], translation)
+
+
+def _read_files(paths: Sequence[Path], translation: Path | None) -> Source:
+    """Read telemetry or exports; an error names the command that finds out how a file is to be read."""
+    try:
+        return telemetry_files.read(paths, translation)
+    except IgrowError as error:
+        place = next((path for path in paths if path.exists()), None)
+        hint = "" if place is None else f" (`igrow-trainer import {place}` finds out how it is to be read)"
+        raise IgrowError(f"{error}{hint}") from None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +10,10 @@ import numpy as np
 from igrow.core.errors import IgrowError
 from igrow.core.site import Site, load_site
 from igrow.core.telemetry import Telemetry
-from igrow.trainer.data.fault import DataFault
 from igrow.trainer.data.grid import HOUR, on_grid, own_step
 from igrow.trainer.data.log import Log
 from igrow.trainer.data.open_source import open_source
+from igrow.trainer.data.plausibility import find_faults
 from igrow.trainer.data.screening import screen
 from igrow.trainer.data.source import Source
 
@@ -24,6 +24,7 @@ def read_log(
     *,
     compartment: str | None = None,
     mapping: str | Path | None = None,
+    accept: Collection[str] = (),
 ) -> Log:
     """Return the log of one greenhouse from whatever holds it.
 
@@ -35,14 +36,15 @@ def read_log(
         site: the greenhouse, or its YAML file; None: the one that a public data set brings, else unknown.
         compartment: its name, where a folder has several.
         mapping: file that says what an export's columns are; None: one that stands beside the export.
+        accept: kinds of data faults that are known not to be any, such as ``clock`` in a valley without morning sun.
 
     Raises:
         IgrowError: with file and line, where something cannot be read.
     """
-    source = open_source(path, compartment, mapping)
     place = [path] if isinstance(path, str | Path) else list(path)
     given = load_site(site) if isinstance(site, str | Path) else site
-    return _prepared(source, given or source.site, ", ".join(map(str, place)))
+    source = open_source(path, compartment, mapping)
+    return _prepared(source, given or source.site, ", ".join(map(str, place)), accept)
 
 
 def prepare_log(telemetry: Telemetry, site: Site | None = None, *, name: str = "log") -> Log:
@@ -50,33 +52,31 @@ def prepare_log(telemetry: Telemetry, site: Site | None = None, *, name: str = "
     return _prepared(Source(name, telemetry), site, "memory")
 
 
-def _prepared(source: Source, site: Site | None, place: str) -> Log:
+def _prepared(source: Source, site: Site | None, place: str, accept: Collection[str] = ()) -> Log:
     telemetry = source.telemetry
     if len(telemetry) == 0:
         raise IgrowError(f"{source.name}: the log has no rows")
-    step = own_step(telemetry.time)
-    if not step <= HOUR:
-        return Log(source.name, telemetry, site, source.notes, faults=(_sparse(step),), source=place)
+    found = (*source.faults, *find_faults(telemetry, site))
+    accepted = tuple(f"accepted although {fault.sentence}" for fault in found if fault.kind in accept)
+    faults = [fault for fault in found if fault.kind not in accept]
+    if not own_step(telemetry.time) <= HOUR:
+        return Log(source.name, telemetry, site, source.notes, faults=tuple(faults), source=place)
     screened = screen(telemetry)
     table = on_grid(screened.telemetry)
-    notes = [*source.notes, *screened.notes, *_grid_notes(telemetry, table)]
+    # What a wrong unit pushes out of range is no sensor's fault.
+    wrong = {name for fault in faults for name in fault.quantity.split(", ")}
+    faults += [fault for fault in screened.faults if fault.quantity not in wrong]
+    notes = [*source.notes, *accepted, *screened.notes, *_grid_notes(telemetry, table)]
     return Log(
         source.name,
         table,
         site,
         tuple(notes),
         screened.screened,
-        screened.faults,
+        tuple(faults),
         place,
         source.harvests,
         source.resources,
-    )
-
-
-def _sparse(step: float) -> DataFault:
-    pace = f"a row every {step / HOUR:.3g} h" if step > 0.0 else "a single row"
-    return DataFault(
-        "sparse", "", f"{pace} is too sparse for any model", "export one an hour or more, best every 5 min"
     )
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
+from igrow.trainer.data.fault import DataFault
 
 Floats = NDArray[np.float64]
 
@@ -49,3 +50,5 @@ class Source:
     """What is known of the greenhouse, where the kind of log tells it."""
     notes: tuple[str, ...] = field(default=())
     """What the reader set aside or inferred, in words."""
+    faults: tuple[DataFault, ...] = field(default=())
+    """What rows in time cannot show any more, such as rows that contradict each other."""

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import gzip
+import zlib
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from igrow.core import telemetry as core
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import QUANTITIES
-from igrow.core.telemetry import Telemetry
-from igrow.trainer.data import mapping
+from igrow.trainer.data import export, mapping
+from igrow.trainer.data.cells import ENDINGS, EXCEL
+from igrow.trainer.data.rows import Merged, merge
 from igrow.trainer.data.source import Source
 
-_ENDINGS = (".csv", ".csv.gz", ".parquet")
 MAPPING_FILE = "mapping.yaml"
 
 
@@ -24,44 +25,60 @@ def read(paths: Sequence[Path], translation: Path | None = None) -> Source:
 
     Args:
         paths: of files, or of folders with files.
-        translation: mapping of all of them; None: `mapping.yaml` in a file's folder, or `NAME.mapping.yaml` beside
-            the file NAME.csv, where there is one.
+        translation: mapping of all of them; None: `NAME.mapping.yaml` beside the file NAME.csv, else `mapping.yaml` in
+            its folder (for files that are not telemetry already).
 
     Raises:
         IgrowError: a file breaks the format, or a folder holds no telemetry.
     """
-    tables: list[Telemetry] = []
-    for path in paths:
-        for part in _files(path):
-            found = translation or mapping_beside(part, path)
-            tables.append(read_file(part) if found is None else mapping.read(part, mapping.load(found)))
+    tables = [read_file(part, translation or mapping_beside(part, path)) for path in paths for part in files_in(path)]
     if not tables:
         raise IgrowError("no telemetry files were given")
-    return Source(paths[0].name, tables[0] if len(tables) == 1 else core.concatenate(tables))
+    telemetry = tables[0].telemetry if len(tables) == 1 else core.concatenate([one.telemetry for one in tables])
+    notes = dict.fromkeys(note for one in tables for note in one.notes)
+    faults = dict.fromkeys(fault for one in tables for fault in one.faults)
+    return Source(paths[0].name, telemetry, notes=tuple(notes), faults=tuple(faults))
+
+
+def read_file(path: Path, translation: Path | None = None) -> Merged:
+    """Return one file: an export by its mapping, or telemetry in CSV (gzip or not) or Parquet."""
+    if translation is not None:
+        return export.read(path, mapping.load(translation))
+    if path.name.lower().endswith(EXCEL):
+        raise IgrowError(f"{path}: a workbook needs a mapping")
+    return read_parquet(path) if path.suffix.lower() == ".parquet" else merge(*core.read_rows(path))
 
 
 def mapping_beside(file: Path, given: Path) -> Path | None:
-    """Return the mapping of a file: its own, the one in its folder, or the one in the folder that was given."""
-    own = [file.with_name(f"{stem}.{MAPPING_FILE}") for stem in (file.name, file.name.split(".")[0])]
-    shared = [file.with_name(MAPPING_FILE), given / MAPPING_FILE]
-    return next((path for path in (*own, *shared) if path.is_file()), None)
+    """Return the mapping of a file: its own, else for an export the one in its folder or in the folder given."""
+    own = own_mapping(file)
+    if own.is_file():
+        return own
+    shared = next((path for path in (file.with_name(MAPPING_FILE), given / MAPPING_FILE) if path.is_file()), None)
+    return shared if shared is not None and not _is_telemetry(file) else None
 
 
-def read_file(path: Path) -> Telemetry:
-    """Return one telemetry file, CSV (gzip or not) or Parquet."""
-    return read_parquet(path) if path.suffix == ".parquet" else core.read_csv(path)
+def own_mapping(file: Path) -> Path:
+    """Return where the mapping of one file stands: `export.mapping.yaml` for `export.csv`."""
+    name = file.name
+    ending = next((one for one in sorted(ENDINGS, key=len, reverse=True) if name.lower().endswith(one)), "")
+    return file.with_name(f"{name[: len(name) - len(ending)] if ending else name}.{MAPPING_FILE}")
 
 
-def read_parquet(path: Path) -> Telemetry:
+def read_parquet(path: Path) -> Merged:
     """Return a Parquet file with a `time` column (UTC, or with a time zone) and columns of the registry.
 
     Raises:
         IgrowError: it cannot be read, has no time, or has a column that is no quantity.
     """
+    import pandas as pd  # noqa: PLC0415  (slow to import)
+
     try:
         frame = pd.read_parquet(path)
     except (OSError, ValueError) as error:
         raise IgrowError(f"{path}: cannot be read as Parquet: {str(error).splitlines()[0]}") from None
+    if "time" not in frame.columns and isinstance(frame.index, pd.DatetimeIndex):
+        frame = frame.reset_index(names="time")
     if "time" not in frame.columns:
         raise IgrowError(f"{path}: no column time; one with UTC times is needed")
     unknown = [name for name in frame.columns if name != "time" and name not in QUANTITIES]
@@ -76,13 +93,29 @@ def read_parquet(path: Path) -> Telemetry:
         for name in frame.columns
         if name != "time"
     }
-    return core.from_rows(seconds, columns)
+    return merge(seconds, columns)
 
 
-def _files(path: Path) -> list[Path]:
+def files_in(path: Path) -> list[Path]:
+    """Return the tables of a folder, or the file itself; raises IgrowError where there is none."""
     if path.is_file():
         return [path]
-    found = [part for part in sorted(path.rglob("*")) if part.is_file() and part.name.lower().endswith(_ENDINGS)]
+    if not path.exists():
+        raise IgrowError(f"{path}: there is no such file or folder")
+    found = [part for part in sorted(path.rglob("*")) if part.is_file() and part.name.lower().endswith(ENDINGS)]
     if not found:
-        raise IgrowError(f"{path}: no telemetry in it: CSV, CSV.gz or Parquet files are needed")
+        raise IgrowError(f"{path}: no telemetry in it: CSV, Excel or Parquet files are needed")
     return found
+
+
+def _is_telemetry(path: Path) -> bool:
+    """Tell whether a text file's first line is `time` and names of the registry."""
+    if path.name.lower().endswith((".parquet", *EXCEL)):
+        return False
+    try:
+        with gzip.open(path, "rb") if path.suffix == ".gz" else path.open("rb") as file:
+            first = file.readline().decode("utf-8-sig", errors="replace")
+    except (OSError, EOFError, zlib.error):
+        return False
+    names = [name.strip() for name in first.strip().split(",")]
+    return len(names) > 1 and names[0] == "time" and all(name in QUANTITIES for name in names[1:])

@@ -1,0 +1,147 @@
+"""Tables as cells of text, from whatever a greenhouse computer writes: CSV, tab-separated text, Excel, Parquet."""
+
+from __future__ import annotations
+
+import csv
+import datetime
+import gzip
+import io
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from igrow.core.errors import IgrowError
+
+EXCEL = (".xlsx", ".xls", ".xlsm", ".xlsb", ".ods")
+TEXT = (".csv", ".csv.gz", ".txt", ".tsv", ".dat", ".txt.gz", ".tsv.gz")
+ENDINGS = (*TEXT, ".parquet", *EXCEL)
+"""Endings of files that hold a table."""
+
+
+@dataclass(frozen=True)
+class Cells:
+    """The rows of a file, each a list of texts as long as it happens to be."""
+
+    path: Path
+    rows: Sequence[list[str]]
+    lines: Sequence[int]
+    """Line (or row of the sheet) of each, from 1."""
+
+    @property
+    def width(self) -> int:
+        """Cells of the longest row."""
+        return max((len(row) for row in self.rows), default=0)
+
+
+def is_text(path: Path) -> bool:
+    """Tell whether a file is read as text."""
+    return not path.name.lower().endswith((".parquet", *EXCEL))
+
+
+def read_bytes(path: Path) -> bytes:
+    """Return a file's content, unpacked where it is gzip; raises IgrowError where it cannot be read."""
+    try:
+        data = path.read_bytes()
+        return gzip.decompress(data) if data[:2] == b"\x1f\x8b" else data
+    except OSError as error:
+        raise IgrowError(f"{path}: cannot be read: {error.strerror or 'not a whole gzip file'}") from None
+    except (EOFError, zlib.error):
+        raise IgrowError(f"{path}: the gzip file ends too early or is damaged") from None
+
+
+def read_text(path: Path, encoding: str) -> str:
+    """Return a text file; raises IgrowError where it is not of that encoding."""
+    data = read_bytes(path)
+    try:
+        # A byte order mark is no part of the text.
+        return data.decode("utf-8-sig" if encoding.lower() in {"utf-8", "utf8"} else encoding).removeprefix("\ufeff")
+    except LookupError:
+        raise IgrowError(f"{path}: encoding {encoding!r} is not known: one such as utf-8 or cp1252 is needed") from None
+    except UnicodeDecodeError:
+        raise IgrowError(f"{path}: is not {encoding} text") from None
+
+
+def read_cells(path: Path, *, delimiter: str = ",", encoding: str = "utf-8", sheet: str | None = None) -> Cells:
+    """Return the cells of a file; rows without any text are left out.
+
+    Args:
+        path: of a text file (gzip or not), a workbook, or Parquet.
+        delimiter: between the cells of a text file.
+        encoding: of a text file.
+        sheet: of a workbook; None: the first.
+
+    Raises:
+        IgrowError: the file cannot be read, or has no such sheet.
+    """
+    if path.name.lower().endswith(EXCEL):
+        table = _workbook(path, sheet)
+    elif path.name.lower().endswith(".parquet"):
+        table = _parquet(path)
+    else:
+        reader = csv.reader(io.StringIO(read_text(path, encoding), newline=""), delimiter=delimiter)
+        try:
+            table = [(row, reader.line_num) for row in reader]
+        except csv.Error as error:
+            raise IgrowError(f"{path}:{reader.line_num}: cannot be read as a table: {error}") from None
+    kept = [([cell.strip() for cell in row], line) for row, line in table if any(cell.strip() for cell in row)]
+    return Cells(path, [row for row, _ in kept], [line for _, line in kept])
+
+
+def sheets(path: Path) -> list[str]:
+    """Return the names of a workbook's sheets."""
+    return list(_open_workbook(path).sheet_names)
+
+
+def _open_workbook(path: Path) -> Any:
+    import python_calamine  # noqa: PLC0415  (only workbooks need it)
+
+    try:
+        return python_calamine.CalamineWorkbook.from_path(str(path))
+    except (OSError, python_calamine.CalamineError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise IgrowError(f"{path}: cannot be read as a workbook: {reason}") from None
+
+
+def _workbook(path: Path, sheet: str | None) -> list[tuple[list[str], int]]:
+    book = _open_workbook(path)
+    names = list(book.sheet_names)
+    if sheet is not None and sheet not in names:
+        raise IgrowError(f"{path}: no sheet {sheet!r}; it has {', '.join(names)}")
+    if not names:
+        raise IgrowError(f"{path}: the workbook has no sheet")
+    rows = book.get_sheet_by_name(sheet or names[0]).to_python(skip_empty_area=False)
+    return [([_text(cell) for cell in row], line) for line, row in enumerate(rows, 1)]
+
+
+def _parquet(path: Path) -> list[tuple[list[str], int]]:
+    import pandas as pd  # noqa: PLC0415  (slow to import)
+
+    try:
+        frame = pd.read_parquet(path)
+    except (OSError, ValueError) as error:
+        raise IgrowError(f"{path}: cannot be read as Parquet: {str(error).splitlines()[0]}") from None
+    if isinstance(frame.index, pd.DatetimeIndex):
+        frame = frame.reset_index(names=frame.index.name or "time")
+    columns = [[_text(cell) for cell in frame[name].tolist()] for name in frame.columns]
+    head = [str(name) for name in frame.columns]
+    return [(head, 1), *((list(row), line) for line, row in enumerate(zip(*columns, strict=True), 2))]
+
+
+def _text(cell: object) -> str:
+    """Return a typed cell as text: times in ISO 8601, numbers plain, nothing as nothing."""
+    if cell is None or cell != cell:  # noqa: PLR0124 - NaN and NaT
+        return ""
+    if isinstance(cell, datetime.datetime):
+        return cell.isoformat(sep=" ")
+    if isinstance(cell, (datetime.date, datetime.time)):
+        return cell.isoformat()
+    if isinstance(cell, datetime.timedelta):
+        # A workbook's time of day that is no more than a length of time.
+        return (datetime.datetime(1900, 1, 1) + cell).time().isoformat()
+    if isinstance(cell, bool):
+        return "1" if cell else "0"
+    if isinstance(cell, float):
+        return f"{cell:.15g}"
+    return str(cell)

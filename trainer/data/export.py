@@ -1,0 +1,191 @@
+"""Reads a grower's export by its mapping."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from igrow.core.errors import IgrowError
+from igrow.core.local_time import to_local
+from igrow.core.telemetry import Times, Values
+from igrow.trainer.data.cells import Cells, read_cells
+from igrow.trainer.data.mapping import ColumnMapping, ExportMapping
+from igrow.trainer.data.rows import Merged, merge
+from igrow.trainer.data.timestamps import to_utc
+
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+_WITH_UNIT = re.compile(r"([-+]?[\d.,'\u00a0\u202f ]*\d)\s*([^\d\s].*)?")
+LONGEST_INTERVAL = 7200.0
+"""Seconds; what fell in a longer one is no rate."""
+
+
+@dataclass(frozen=True)
+class ExportTable:
+    """An export's columns as texts."""
+
+    path: Path
+    columns: Mapping[str, Sequence[str]]
+    """By name, (n,)."""
+    lines: Sequence[int]
+
+    def __getitem__(self, name: str) -> Sequence[str]:
+        """Return one column; raises IgrowError where the export lacks it."""
+        if name not in self.columns:
+            raise IgrowError(f"{self.path}: no column {name!r}; it has {', '.join(self.columns)}")
+        return self.columns[name]
+
+
+def read(path: Path, mapping: ExportMapping) -> Merged:
+    """Return the telemetry of one exported file.
+
+    Raises:
+        IgrowError: a column is not there, or a cell is no number or no time.
+    """
+    cells = read_cells(path, delimiter=mapping.delimiter, encoding=mapping.encoding, sheet=mapping.sheet)
+    table = chosen_rows(as_table(cells, mapping.header, mapping.first_row), mapping.only)
+    if mapping.long is not None:
+        return _read_long(table, mapping)
+    time = times(table, mapping)
+    return merge(time, {name: quantity(table, rule, mapping, time) for name, rule in mapping.columns.items()})
+
+
+def as_table(cells: Cells, header: Sequence[int] = (1,), first_row: int | None = None) -> ExportTable:
+    """Return the columns of cells by the names that the header lines give them.
+
+    Names over several lines are joined by a blank; a name that stands twice gets a number.
+    """
+    heads = [row for row, line in zip(cells.rows, cells.lines, strict=True) if line in set(header)]
+    if not heads:
+        raise IgrowError(f"{cells.path}: line {header[0]} with the columns' names is empty or not there")
+    start = max(header) + 1 if first_row is None else first_row
+    body = [(row, line) for row, line in zip(cells.rows, cells.lines, strict=True) if line >= start]
+    width = max((len(row) for row in heads), default=0)
+    names: list[str] = []
+    for position in range(width):
+        parts = [" ".join(row[position].split()) for row in heads if position < len(row) and row[position]]
+        name = " ".join(parts)
+        seen = sum(other == name or re.fullmatch(re.escape(name) + r" \(\d+\)", other) is not None for other in names)
+        names.append(f"{name} ({seen + 1})" if seen and name else name)
+    columns: dict[str, Sequence[str]] = {}
+    for position, name in enumerate(names):
+        texts = [row[position] if position < len(row) else "" for row, _ in body]
+        if name or any(texts):
+            columns[name or f"column {position + 1}"] = texts
+    return ExportTable(cells.path, columns, [line for _, line in body])
+
+
+def chosen_rows(table: ExportTable, only: Mapping[str, str]) -> ExportTable:
+    """Return the rows in which columns have given texts; raises IgrowError where there is none."""
+    for name, text in only.items():
+        kept = [row for row, cell in enumerate(table[name]) if cell == text]
+        if not kept:
+            there = ", ".join(sorted(set(table[name]))[:9])
+            raise IgrowError(f"{table.path}: no row has {text!r} in column {name!r}; it has {there}")
+        columns = {key: [texts[row] for row in kept] for key, texts in table.columns.items()}
+        table = ExportTable(table.path, columns, [table.lines[row] for row in kept])
+    return table
+
+
+def times(table: ExportTable, mapping: ExportMapping) -> Times:
+    """Return the UTC times of an export's rows; raises IgrowError with the line of the first that cannot be read."""
+    rule = mapping.time
+    texts = table[rule.column]
+    if rule.time_of_day is not None:
+        texts = [f"{day} {hour}".strip() for day, hour in zip(texts, table[rule.time_of_day], strict=True)]
+    empty = np.array([not text for text in texts], dtype=bool)
+    written = [text for text in texts if text]
+    found, wrong = to_utc(written, rule.format, rule.time_zone)
+    if wrong is not None:
+        line = table.lines[int(np.flatnonzero(~empty)[wrong])]
+        raise IgrowError(f"{table.path}:{line}: {written[wrong]!r} is no time of the form {rule.format}")
+    result = np.full(len(texts), np.datetime64("NaT"), dtype="datetime64[s]")
+    result[~empty] = found
+    return result
+
+
+def numbers(table: ExportTable, name: str, mapping: ExportMapping, words: Mapping[str, float] | None = None) -> Values:
+    """Return one column as numbers, NaN where it says that there is none; raises IgrowError with the line."""
+    missing, words = frozenset(mapping.missing), words or {}
+    known: dict[str, float] = {}
+    values = np.empty(len(table.lines))
+    for position, text in enumerate(table[name]):
+        if text not in known:
+            number = float("nan") if text in missing else words.get(text, _number(text, mapping.decimal))
+            if number is None:
+                where = f"{table.path}:{table.lines[position]}"
+                raise IgrowError(f"{where}: {name} is {text!r}: a number or an empty cell is needed")
+            known[text] = number
+        values[position] = known[text]
+    return values
+
+
+def _number(text: str, decimal: str) -> float | None:
+    """Return the number that a text begins with (a unit may follow), or None."""
+    found = _WITH_UNIT.fullmatch(text)
+    if found is None:
+        return float(text) if _NUMBER.fullmatch(text) else None
+    digits, unit = re.sub(r"['\u00a0\u202f ]", "", found[1]), found[2] or ""
+    if unit and _NUMBER.fullmatch(text):
+        return float(text)
+    group = "." if decimal == "," else ","
+    if decimal in digits or re.fullmatch(rf"[-+]?\d{{1,3}}(\{group}\d{{3}})+", digits):
+        digits = digits.replace(group, "")
+    digits = digits.replace(",", ".")
+    return float(digits) if _NUMBER.fullmatch(digits) else None
+
+
+def quantity(table: ExportTable, rule: ColumnMapping, mapping: ExportMapping, time: Times) -> Values:
+    """Return one of our quantities from the columns that a rule names, in the registry's unit."""
+    total = numbers(table, rule.column, mapping, rule.words)
+    for further in rule.add:
+        total = total + numbers(table, further, mapping, rule.words)
+    if rule.amount != "rate":
+        total = _rates(total, rule.amount, time, mapping.time.time_zone)
+    return total * rule.scale + rule.offset
+
+
+def _rates(amounts: Values, kind: str, time: Times, time_zone: str) -> Values:
+    """Return amounts per second over the interval that ends at each row, in the rows' own order."""
+    rates = np.full(len(amounts), np.nan)
+    order = np.argsort(time, kind="stable")
+    order = order[~np.isnat(time[order])]
+    if len(order) < 2:
+        return rates
+    when, values = time[order], amounts[order]
+    length = np.diff(when.astype(np.int64).astype(np.float64))
+    length = np.concatenate([[np.median(length)], length])
+    if kind != "interval":
+        change = np.diff(values, prepend=np.nan)
+        day = to_local(when, time_zone).astype("datetime64[D]")
+        anew = np.concatenate([[False], day[1:] != day[:-1]]) if kind == "day" else change < 0.0
+        values = np.where(anew, values, change)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        rates[order] = np.where((length > 0.0) & (length <= LONGEST_INTERVAL), np.maximum(values, 0.0) / length, np.nan)
+    return rates
+
+
+def _read_long(table: ExportTable, mapping: ExportMapping) -> Merged:
+    """Return the telemetry of an export with one reading a row."""
+    assert mapping.long is not None
+    names, values = np.array(table[mapping.long.name]), table[mapping.long.value]
+    when = times(table, mapping)
+    time = np.unique(when[~np.isnat(when)])
+    columns: dict[str, Values] = {}
+    for ours, rule in mapping.columns.items():
+        total = np.zeros(len(time))
+        for name in (rule.column, *rule.add):
+            rows = [int(row) for row in np.flatnonzero((names == name) & ~np.isnat(when))]
+            if len(rows) == 0:
+                there = ", ".join(sorted(set(names.tolist()))[:20])
+                raise IgrowError(f"{table.path}: no row is called {name!r}; there are {there}")
+            part = ExportTable(table.path, {name: [values[row] for row in rows]}, [table.lines[row] for row in rows])
+            column = np.full(len(time), np.nan)
+            own = ColumnMapping(name, amount=rule.amount, words=rule.words)
+            column[np.searchsorted(time, when[rows])] = quantity(part, own, mapping, when[rows])
+            total = total + column
+        columns[ours] = total * rule.scale + rule.offset
+    return merge(time, columns)

@@ -1,0 +1,132 @@
+"""Which column of an export is which quantity, by the words of its name and by its unit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from igrow.core.errors import IgrowError
+from igrow.core.quantities import QUANTITIES
+from igrow.core.yaml_schema import nearest
+from igrow.trainer.data import vocabulary
+from igrow.trainer.data.vocabulary import Unit
+
+OUTSIDE = ("outdoor_temperature", "outdoor_humidity", "outdoor_co2", "global_radiation", "sky_temperature")
+WEATHER = (*OUTSIDE, "wind_speed", "wind_direction", "rain")
+"""Quantities that all compartments share."""
+_CERTAIN = 1000
+
+
+@dataclass(frozen=True)
+class Match:
+    """A column that may be a quantity."""
+
+    quantity: str
+    column: str
+    score: int
+    unit: Unit | None
+    """As the column's name or the line of units tells it; None: it does not."""
+    compartment: str
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """What each quantity is read from."""
+
+    chosen: Mapping[str, Match]
+    rivals: Mapping[str, tuple[str, ...]]
+    """Further columns that would do as well, by quantity."""
+
+
+def find_matches(columns: Iterable[str], unit_line: Mapping[str, str]) -> list[Match]:
+    """Return every quantity that each column may be.
+
+    Args:
+        columns: names.
+        unit_line: column -> its unit, where units have a line of their own.
+    """
+    found = []
+    for column in columns:
+        written = [vocabulary.compact(unit_line[column])] if unit_line.get(column) else []
+        units = vocabulary.find_units([*written, *vocabulary.unit_texts(column)])
+        # A unit that is known, of a quantity that is not: grams per m3 are no per cent.
+        foreign = bool(written) and not vocabulary.find_units(written)
+        plain = vocabulary.folded(column).replace(" ", "_").strip("_")
+        exact = plain if plain in QUANTITIES else vocabulary.exact_names().get(vocabulary.compact(column))
+        words, compartment = vocabulary.words_in(column), vocabulary.compartment(column)
+        if exact is not None:
+            found.append(Match(exact, column, _CERTAIN, units.get(dimension(exact)), compartment))
+            continue
+        for quantity, rule in vocabulary.rules().items():
+            needed = max((len(one) for one in rule.needed if words.issuperset(one)), default=0)
+            if not needed or words & rule.excluded or foreign or (units and rule.dimension not in units):
+                continue
+            more = sum(word in words for word in rule.likelier)
+            score = 10 * needed + 3 * more + 4 * bool(units) - ("other" in words) * 12
+            found.append(Match(quantity, column, score, units.get(rule.dimension), compartment))
+    return found
+
+
+def dimension(quantity: str) -> str:
+    """Return the dimension of a quantity's units; empty where it has none to choose from."""
+    rule = vocabulary.rules().get(quantity)
+    return "" if rule is None else rule.dimension
+
+
+def compartments(matches: Sequence[Match]) -> list[str]:
+    """Return the compartments that have an air temperature of their own, in the order of the columns."""
+    return list(
+        dict.fromkeys(one.compartment for one in matches if one.quantity == "air_temperature" and one.compartment)
+    )
+
+
+def assign(matches: Sequence[Match], compartment: str, given: Mapping[str, str]) -> Assignment:
+    """Return the likeliest column of each quantity; no column stands for two, but for lamps.
+
+    Args:
+        matches: from `find_matches`.
+        compartment: the one to read; empty where there is one alone.
+        given: quantity -> column, as the user says.
+    """
+    fitting = [
+        one for one in matches if one.quantity in WEATHER or not compartment or one.compartment in ("", compartment)
+    ]
+    chosen: dict[str, Match] = {}
+    rivals: dict[str, tuple[str, ...]] = {}
+    for quantity, column in given.items():
+        known = next((one for one in matches if one.quantity == quantity and one.column == column), None)
+        chosen[quantity] = known or Match(quantity, column, _CERTAIN, _unit_of(column, quantity), "")
+    taken = set(given.values())
+    # A compartment's own column comes before one that tells none.
+    ranked = sorted(fitting, key=lambda one: (-one.score, one.compartment != compartment))
+    for one in ranked:
+        if one.quantity in given or one.column in taken or _spoken_for(one, ranked):
+            continue
+        best = chosen.get(one.quantity)
+        if best is None:
+            chosen[one.quantity] = one
+            taken.add(one.column)
+        elif best.score == one.score and best.compartment == one.compartment:
+            rivals[one.quantity] = (*rivals.get(one.quantity, ()), one.column)
+    return Assignment(chosen, rivals)
+
+
+def _spoken_for(one: Match, ranked: Sequence[Match]) -> bool:
+    """Tell whether a column is likelier another quantity."""
+    return any(other.column == one.column and other.score > one.score for other in ranked)
+
+
+def _unit_of(column: str, quantity: str) -> Unit | None:
+    return vocabulary.find_units(vocabulary.unit_texts(column)).get(dimension(quantity))
+
+
+def unit_called(quantity: str, text: str) -> Unit:
+    """Return the unit of a quantity that a user names; raises IgrowError with those that are known."""
+    table = vocabulary.units().get(dimension(quantity), {})
+    unit = table.get(vocabulary.compact(text))
+    if unit is None:
+        known = dict.fromkeys(one.name for one in table.values())
+        raise IgrowError(
+            f"{quantity} is never in {text!r}: {nearest(text, known) if known else 'it has no other unit'}"
+        )
+    return unit

@@ -1,0 +1,160 @@
+"""The layout of a file: encoding, delimiter, decimal sign, lines with names, line with units, first reading."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import charset_normalizer
+
+from igrow.core.errors import IgrowError
+from igrow.trainer.data import vocabulary
+from igrow.trainer.data.cells import EXCEL, Cells, is_text, read_bytes, read_cells, sheets
+from igrow.trainer.data.importing.time_format import looks_like_time
+from igrow.trainer.data.mapping import MISSING
+
+DELIMITERS = (";", "\t", "|", ",")
+"""In the order in which they are believed: a comma may be a decimal sign."""
+_ENCODINGS = ("utf_8", "utf_16", "utf_16_le", "utf_16_be", "cp1252", "gb18030", "big5", "cp1250", "cp1251")
+_SAMPLE = 400
+"""Rows that are looked at."""
+_NUMERIC = re.compile(r"[-+]?\d[\d.,'\u00a0 ]*([eE][-+]?\d+)?\s*(%|°?[CF]|ppm|W/m²|W/m2|m/s)?")
+_COMMA, _POINT = re.compile(r"[-+]?\d+,\d+"), re.compile(r"[-+]?\d+\.\d+")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where things stand in a file."""
+
+    encoding: str
+    delimiter: str
+    decimal: str
+    sheet: str | None
+    header: tuple[int, ...]
+    units: int | None
+    """Line with the units, where it has its own."""
+    first_row: int
+
+
+def find_layout(path: Path, sheet: str | None = None) -> tuple[Layout, Cells]:
+    """Return the layout of a file, and its cells.
+
+    Raises:
+        IgrowError: it cannot be read, or no row of it has a time and numbers.
+    """
+    encoding, delimiter = "utf-8", ","
+    if is_text(path):
+        encoding = find_encoding(read_bytes(path))
+        delimiter = find_delimiter(read_bytes(path).decode(encoding, errors="replace").removeprefix("\ufeff"))
+    elif path.name.lower().endswith(EXCEL) and sheet is None:
+        sheet = _fullest_sheet(path)
+    cells = read_cells(path, delimiter=delimiter, encoding=encoding, sheet=sheet)
+    first = _first_reading(cells)
+    head, units = _header(cells, first)
+    body = [cell for row in cells.rows[first : first + _SAMPLE] for cell in row]
+    return Layout(
+        encoding,
+        delimiter,
+        find_decimal(body, delimiter),
+        sheet,
+        tuple(cells.lines[row] for row in head),
+        None if units is None else cells.lines[units],
+        cells.lines[first],
+    ), cells
+
+
+def find_encoding(data: bytes) -> str:
+    """Return the encoding of a text file."""
+    for mark, name in ((b"\xef\xbb\xbf", "utf-8"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16")):
+        if data.startswith(mark):
+            return name
+    try:
+        data.decode("utf-8")
+    except UnicodeDecodeError:
+        best = charset_normalizer.from_bytes(data[:100_000], cp_isolation=list(_ENCODINGS)).best()
+        return "cp1252" if best is None else best.encoding.replace("_", "-")
+    return "utf-8"
+
+
+def find_delimiter(text: str) -> str:
+    """Return the sign between the cells of a text file: the one that gives most rows the same number of cells."""
+    lines = [line for line in text.splitlines() if line.strip()][:_SAMPLE]
+    if lines and (hint := re.fullmatch(r"sep=(.)", lines[0].strip())):
+        return hint[1]
+    best, found = 0.0, ","
+    for delimiter in DELIMITERS:
+        try:
+            widths = [len(row) for row in csv.reader(io.StringIO("\n".join(lines)), delimiter=delimiter)]
+        except csv.Error:
+            continue
+        width, count = Counter(widths).most_common(1)[0] if widths else (1, 0)
+        share = count / max(len(widths), 1)
+        if width > 1 and share > best + 0.05:
+            best, found = share, delimiter
+    return found
+
+
+def find_decimal(cells: Sequence[str], delimiter: str) -> str:
+    """Return the decimal sign of numbers."""
+    if delimiter == ",":
+        # Quoted numbers may still have a comma.
+        return "," if any(_COMMA.fullmatch(cell) for cell in cells) else "."
+    commas = sum(_COMMA.fullmatch(cell) is not None for cell in cells)
+    points = sum(_POINT.fullmatch(cell) is not None for cell in cells)
+    return "," if commas > points else "."
+
+
+def _fullest_sheet(path: Path) -> str | None:
+    """Return the sheet with most cells, None where there is one alone."""
+    names = sheets(path)
+    if len(names) < 2:
+        return None
+    return max(names, key=lambda name: sum(len(row) for row in read_cells(path, sheet=name).rows))
+
+
+def _is_value(cell: str) -> bool:
+    return _NUMERIC.fullmatch(cell) is not None or cell in MISSING or cell.lower() in vocabulary.switch_words()
+
+
+def _first_reading(cells: Cells) -> int:
+    """Return the index of the first row of readings: a time, and values in most of its other cells."""
+    usual = Counter(len(row) for row in cells.rows[-_SAMPLE:]).most_common(1)
+    for index, row in enumerate(cells.rows[:_SAMPLE]):
+        filled = [cell for cell in row if cell]
+        times = [cell for cell in filled if looks_like_time(cell)]
+        values = [cell for cell in filled if _is_value(cell)]
+        wide = not usual or len(row) >= 0.5 * usual[0][0]
+        if wide and times and len(values) + len(times) >= 0.6 * len(filled) and len(values) >= 1:
+            return index
+    needed = "export the log as a table with a row for each time and a column for each sensor"
+    raise IgrowError(f"{cells.path}: no row has a time and numbers: {needed}")
+
+
+def _header(cells: Cells, first: int) -> tuple[list[int], int | None]:
+    """Return the rows that name the columns, and the row of units (None: it has none of its own)."""
+    width = len(cells.rows[first])
+    above = [
+        row
+        for row in range(first)
+        if sum(bool(cell) for cell in cells.rows[row]) >= max(2, 0.3 * width)
+        and sum(_is_value(cell) for cell in cells.rows[row] if cell) < 0.5 * sum(bool(cell) for cell in cells.rows[row])
+    ]
+    # Lines of names stand together, right above the readings.
+    above = [row for row in above if row >= first - 4]
+    units = next((row for row in reversed(above) if _is_unit_row(cells.rows[row])), None)
+    names = [row for row in above if row != units]
+    if not names:
+        raise IgrowError(f"{cells.path}: no line names the columns: put one above the first reading")
+    return names, units
+
+
+def _is_unit_row(row: Sequence[str]) -> bool:
+    """Tell whether most cells of a row are units."""
+    filled = [cell for cell in row if cell]
+    known = [cell for cell in filled if vocabulary.find_units([vocabulary.compact(cell)])]
+    return len(known) >= 0.5 * len(filled) and len(known) >= 2

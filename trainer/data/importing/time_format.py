@@ -1,0 +1,217 @@
+"""Which column is the time, and how it is written."""
+
+from __future__ import annotations
+
+import datetime
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from igrow.trainer.data import vocabulary
+from igrow.trainer.data.timestamps import EXCEL, ISO, UNIX, UNIX_MS, parser
+
+_SAMPLE = 1500
+_LEAST_READ = 0.98
+"""Share of a column's texts that a form must read."""
+_CLOCK = re.compile(r"\d{1,2}[:.]\d{2}([:.]\d{2})?([.,]\d+)?(\s?[ap]\.?\s?m\.?)?", re.IGNORECASE)
+_DATE = re.compile(
+    r"(\d{1,4}[-/.年]\s?\d{1,2}[-/.月]\s?\d{1,4}日?|\d{8}|\d{1,2}[-\s.]+[^\W\d_]{3,}\.?[-\s]+\d{2,4})(\D.*)?"
+)
+_TOKEN = re.compile(r"\d+|[^\W\d_]+|[^\w]+|_")
+
+
+@dataclass(frozen=True)
+class TimeForm:
+    """How times are written."""
+
+    column: str
+    time_of_day: str | None
+    form: str
+    alternatives: tuple[str, ...] = ()
+    """Other forms that read all texts as well, and make no worse times of them."""
+
+
+def looks_like_time(text: str) -> bool:
+    """Tell whether a cell may be a date, or a date and a time."""
+    if _DATE.fullmatch(text.strip()) and not re.fullmatch(r"\d{8}", text.strip()):
+        return True
+    if re.fullmatch(r"\d{8}", text) and not 1900 <= int(text[:4]) <= 2100:
+        return False
+    try:
+        moment = datetime.datetime.fromisoformat(text.strip())
+    except ValueError:
+        number = re.fullmatch(r"\d+([.,]\d+)?", text)
+        return number is not None and _serial(float(text.replace(",", "."))) is not None
+    return 1990 <= moment.year <= 2100
+
+
+def find_time(columns: dict[str, Sequence[str]]) -> TimeForm | None:
+    """Return the time of a table's columns (name -> texts), or None where no column is one."""
+    found: list[tuple[float, TimeForm]] = []
+    names = list(columns)
+    for position, name in enumerate(names):
+        texts = _sample(columns[name])
+        if len(texts) < 2 or not looks_like_time(texts[0]):
+            continue
+        forms = _forms(texts)
+        if not forms:
+            continue
+        likely = 1.0 + _named(name, "date_and_time") - 0.02 * position
+        if all(_midnight(texts, form) for form in forms):
+            clock = _clock_column(columns, names, name)
+            if clock is not None:
+                joined = [
+                    f"{day} {hour}" for day, hour in zip(columns[name], columns[clock], strict=True) if day and hour
+                ]
+                both = _forms(_sample(joined))
+                if both:
+                    found.append((likely + 0.5 + _named(name, "date"), _best(name, clock, both, _sample(joined))))
+                    continue
+        found.append((likely, _best(name, None, forms, texts)))
+    return max(found, key=lambda one: one[0])[1] if found else None
+
+
+def _sample(texts: Sequence[str]) -> list[str]:
+    """Return texts from the beginning, in their order (so that midnight is passed), and some from all along."""
+    kept = [text for text in texts if text]
+    return kept if len(kept) <= 2 * _SAMPLE else kept[:_SAMPLE] + kept[_SAMPLE :: max(1, len(kept) // _SAMPLE)]
+
+
+def _named(name: str, kind: str) -> float:
+    text = vocabulary.folded(name)
+    alone = set(re.split(r"\W+", text))
+    return float(any(word in alone if single else word in text for word, single in vocabulary.time_words(kind)))
+
+
+def _clock_column(columns: dict[str, Sequence[str]], names: Sequence[str], date: str) -> str | None:
+    """Return the column of the time of day that goes with a column of dates."""
+    clocks = [
+        name
+        for name in names
+        if name != date and (texts := _sample(columns[name])) and all(_CLOCK.fullmatch(text) for text in texts[:50])
+    ]
+    return min(
+        clocks,
+        key=lambda name: (-_named(name, "time_of_day"), abs(names.index(name) - names.index(date))),
+        default=None,
+    )
+
+
+def _forms(texts: Sequence[str]) -> list[str]:
+    """Return the forms that read (nearly) all texts."""
+    if all(re.fullmatch(r"\d+([.,]\d+)?", text) for text in texts[:50]) and not all(
+        len(text) == 8 for text in texts[:50]
+    ):
+        kinds = {_serial(float(text.replace(",", "."))) for text in texts[:50]}
+        form = kinds.pop() if len(kinds) == 1 else None
+        return [form] if form is not None else []
+    return [form for form in dict.fromkeys((ISO, *_written_forms(texts))) if _reads(texts, form)]
+
+
+def _serial(number: float) -> str | None:
+    """Return what kind of count a number is: days since 1899, seconds or milliseconds since 1970."""
+    if 32_000.0 < number < 74_000.0:
+        return EXCEL
+    if 6e8 < number < 4.2e9:
+        return UNIX
+    return UNIX_MS if 6e11 < number < 4.2e12 else None
+
+
+def _reads(texts: Sequence[str], form: str) -> bool:
+    read, wrong = parser(form), 0
+    allowed = (1.0 - _LEAST_READ) * len(texts)
+    for text in texts:
+        try:
+            moment = read(text)
+            wrong += not 1980 <= moment.year <= 2110
+        except (ValueError, OverflowError):
+            wrong += 1
+        if wrong > allowed:
+            return False
+    return True
+
+
+def _written_forms(texts: Sequence[str]) -> list[str]:
+    """Return the strptime forms that the first text may have, by the order of day, month and year."""
+    tokens = _TOKEN.findall(texts[0])
+    numbers = [position for position, token in enumerate(tokens) if token.isdigit()]
+    months = [p for p, token in enumerate(tokens) if vocabulary.folded(token) in vocabulary.month_names()]
+    if numbers and len(tokens[numbers[0]]) == 8:
+        return [form for form in (_clock_after(tokens, numbers[0] + 1, "%Y%m%d"),) if form is not None]
+    date = sorted([*numbers, *months[:1]])[:3]
+    if len(date) < 3:
+        return []
+    if months:
+        orders = [("%d", "%b", "Y"), ("%b", "%d", "Y"), ("Y", "%b", "%d")]
+    else:
+        orders = [("%d", "%m", "Y"), ("%m", "%d", "Y"), ("Y", "%m", "%d"), ("Y", "%d", "%m")]
+    forms = []
+    for order in orders:
+        parts = list(tokens[: date[2] + 1])
+        fits = True
+        for position, sign in zip(date, order, strict=True):
+            long = len(tokens[position]) == 4
+            fits &= (sign == "Y" or not long) and ((sign == "%b") == (position in months))
+            parts[position] = ("%Y" if long else "%y") if sign == "Y" else sign
+        form = _clock_after(tokens, date[2] + 1, "".join(parts)) if fits else None
+        if form is not None:
+            forms.append(form)
+    return forms
+
+
+def _clock_after(tokens: Sequence[str], start: int, form: str) -> str | None:
+    """Return a form with the time of day that follows the date, or None for what is no time of day."""
+    signs = iter(("%H", "%M", "%S", "%f"))
+    half = any(re.fullmatch(r"[ap]\.?m?\.?", token, re.IGNORECASE) for token in tokens[start:])
+    compact = [token for token in tokens[start:] if token.isdigit()]
+    if len(compact) == 1 and len(compact[0]) in (4, 6):
+        signs = iter(("%H%M" if len(compact[0]) == 4 else "%H%M%S",))
+    for token in tokens[start:]:
+        if token.isdigit():
+            sign = next(signs, None)
+            if sign is None:
+                return None
+            form += "%I" if half and sign == "%H" else sign
+        elif re.fullmatch(r"[ap]m?|m", token, re.IGNORECASE):
+            form += "%p" if not form.endswith("%p") else ""
+        else:
+            form += token
+    return re.sub(r"%p\.?\s?\.?", "%p", form)
+
+
+def _midnight(texts: Sequence[str], form: str) -> bool:
+    """Tell whether all texts are dates without a time of day."""
+    read = parser(form)
+    try:
+        return all(read(text).time() == datetime.time() for text in texts[:200])
+    except ValueError:
+        return False
+
+
+def _best(column: str, clock: str | None, forms: Sequence[str], texts: Sequence[str]) -> TimeForm:
+    """Return the form under which the rows follow each other most evenly."""
+    evenness = {form: _evenness(texts, form) for form in forms}
+    ranked = sorted(forms, key=lambda form: -evenness[form])
+    rivals = tuple(form for form in ranked[1:] if evenness[form] > evenness[ranked[0]] - 0.01)
+    return TimeForm(column, clock, ranked[0], rivals if ranked[0] != ISO else ())
+
+
+def _evenness(texts: Sequence[str], form: str) -> float:
+    """Return the share of steps between rows that are the usual one."""
+    read = parser(form)
+    seconds = []
+    for text in texts[:_SAMPLE]:
+        try:
+            moment = read(text)
+        except (ValueError, OverflowError):
+            continue
+        zone = moment.tzinfo or datetime.UTC
+        seconds.append(moment.replace(tzinfo=zone).timestamp())
+    steps = np.array([abs(later - earlier) for earlier, later in pairwise(seconds)])
+    if len(steps) == 0:
+        return 0.0
+    usual = float(np.median(steps))
+    return float(np.mean(np.abs(steps - usual) <= 0.5 * max(usual, 1.0)))

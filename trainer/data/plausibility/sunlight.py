@@ -1,0 +1,254 @@
+"""Radiation against the sun over the site: the clock, the unit, and sums that were taken for rates.
+
+The sun keeps the best clock of all. The mean solar hour of the radiation, weighted by the radiation, is noon to within
+a quarter of an hour over a fortnight, whatever the weather; and what reaches the ground is 0.5 to 0.8 of what would
+without air, whenever the sky is clear.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow.core import sun
+from igrow.core.local_time import from_local, to_local
+from igrow.core.site import Site
+from igrow.core.telemetry import Telemetry, Times
+from igrow.trainer.data.fault import DataFault, Remedy
+from igrow.trainer.data.grid import own_step
+from igrow.trainer.data.plausibility.sums import running_sum
+
+Floats = NDArray[np.float64]
+
+CLOCK = ("clock", "local_time", "no_daylight")
+"""Faults after which nothing can be said of day and night."""
+LARGEST_OFFSET = 0.4
+"""Hours between the radiation's noon and the sun's that mornings of fog, mountains and chimneys explain; half a step
+more, since a row may stand for what was before it or after, and"""
+ERRORS = 3.0
+"""so many standard errors over days: what clouds explain."""
+LEAST_DAYS = 5
+JUMP = (0.6, 1.4)
+"""Hours by which noon jumps where clocks change."""
+LEAST_LENGTH = 0.6
+"""Of the mean vector of the radiation's hours, over that of the sun's, below which it is no daylight."""
+DARKEST, BRIGHTEST = 0.38, 1.25
+"""Clearness that a clear sky exceeds, and never exceeds."""
+CLEAR = 0.8
+"""Usual clearness of a clear sky."""
+_WINDOW = 12
+"""Days on either side of a change of clocks."""
+_ZONES = ("Europe/Amsterdam", "America/New_York", "Australia/Sydney", "America/Santiago")
+"""Whose changes of clocks are looked for where a site does not tell its zone."""
+
+
+@dataclass(frozen=True)
+class _Daylight:
+    """Radiation by complete days."""
+
+    day: NDArray[np.int64]
+    """Local mean solar day, from 1970, (d,)."""
+    vector: NDArray[np.complex128]
+    """Sum of the radiation, each row at the angle of its solar hour, (d,)."""
+    total: Floats
+    """Sum of the radiation, (d,)."""
+    length: Floats
+    """Of the mean vector of what would come without air, (d,)."""
+
+    def offset(self, chosen: NDArray[np.bool_] | None = None) -> float:
+        """Return the hours by which noon comes late by the log's clock, -12 to 12."""
+        vector = self.vector if chosen is None else self.vector[chosen]
+        return float(np.angle(-vector.sum()) * 12.0 / np.pi)
+
+    def error(self, chosen: NDArray[np.bool_] | None = None) -> float:
+        """Return the standard error of the offset over days, weighted as the offset is."""
+        vector = self.vector if chosen is None else self.vector[chosen]
+        whole = vector.sum()
+        across = np.angle(vector / (whole / abs(whole))) * 12.0 / np.pi
+        weight = np.abs(vector) / np.abs(vector).sum()
+        return float(np.sqrt((weight**2 * across**2).sum()))
+
+
+def against_the_sun(telemetry: Telemetry, site: Site) -> list[DataFault]:
+    """Return what the radiation says of the clock, and the sun of the radiation's unit."""
+    if "global_radiation" not in telemetry:
+        return []
+    values = telemetry["global_radiation"]
+    if np.isfinite(values).sum() < 48 or np.nanmax(values) <= 0.0:
+        return []
+    summed = running_sum(telemetry.time, values)
+    if summed is not None:
+        return [_summed(telemetry, site, summed)]
+    daylight = _daylight(telemetry.time, values, site)
+    if len(daylight.day) < LEAST_DAYS:
+        return []
+    clock = _clock(telemetry, daylight, site)
+    if clock:
+        return clock
+    unit = _unit(telemetry, site)
+    return [unit] if unit is not None else []
+
+
+def _daylight(time: Times, values: Floats, site: Site) -> _Daylight:
+    """Sum the radiation of the days of which nine tenths were read."""
+    step = own_step(time)
+    hour = sun.solar_hour(time, site.latitude, site.longitude)
+    day = sun.solar_day(time, site.longitude)
+    above = sun.extraterrestrial_radiation(time, site.latitude, site.longitude)
+    first = int(day.min())
+    index, count = day - first, int(day.max()) - first + 1
+    known = np.isfinite(values)
+    light = np.where(known, np.maximum(values, 0.0), 0.0)
+    angle = np.exp(2j * np.pi * hour / 24.0)
+    total = np.bincount(index, weights=light, minlength=count).astype(np.float64)
+    vector = _complex_sum(index, light * angle, count)
+    sky, sky_vector = np.bincount(index, weights=above, minlength=count), _complex_sum(index, above * angle, count)
+    whole = np.bincount(index[known], minlength=count) >= 0.9 * 86_400.0 / step
+    whole &= (total > 0.0) & (sky > 0.0)
+    length = np.abs(sky_vector[whole]) / sky[whole]
+    return _Daylight(first + np.flatnonzero(whole), vector[whole], total[whole], length)
+
+
+def _complex_sum(index: NDArray[np.int64], values: NDArray[np.complex128], count: int) -> NDArray[np.complex128]:
+    return np.asarray(
+        np.bincount(index, weights=values.real, minlength=count)
+        + 1j * np.bincount(index, weights=values.imag, minlength=count)
+    )
+
+
+def _clock(telemetry: Telemetry, daylight: _Daylight, site: Site) -> list[DataFault]:
+    length = abs(daylight.vector.sum()) / daylight.total.sum()
+    if length < LEAST_LENGTH * float(np.average(daylight.length, weights=daylight.total)):
+        seen = "global_radiation does not follow the sun: as much of it comes by night as by day"
+        mend = "its column is another quantity, or day and month of the dates are exchanged"
+        return [DataFault("no_daylight", "global_radiation", seen, mend)]
+    jump = _change_of_clocks(telemetry, daylight, site)
+    if jump is not None:
+        return [jump]
+    offset = daylight.offset()
+    if abs(offset) <= LARGEST_OFFSET + own_step(telemetry.time) / 7200.0 + ERRORS * daylight.error():
+        return []
+    hours = f"{abs(offset):.1f} h {'late' if offset > 0.0 else 'early'}"
+    seen = f"noon comes {hours} by the log's clock: the sun over {site.latitude:g}, {site.longitude:g} says so"
+    if _fits_as_wall_time(telemetry, site):
+        return [DataFault("local_time", "", seen, _name_zone(site.time_zone))]
+    mend = "give the time zone of the export (`time_zone` in the mapping), or set right the longitude of the site"
+    return [DataFault("clock", "", seen, mend)]
+
+
+def _name_zone(zone: str) -> str:
+    return (
+        f"these are wall times of {zone}: say so in the mapping (time: {{time_zone: {zone}}}), "
+        f"as `igrow-trainer import --time-zone {zone}` does"
+    )
+
+
+def _fits_as_wall_time(telemetry: Telemetry, site: Site) -> bool:
+    """Tell whether the sun agrees where the times are read as wall times of the site's zone."""
+    if site.time_zone == "UTC":
+        return False
+    time = from_local(telemetry.time, site.time_zone)
+    known = ~np.isnat(time)
+    daylight = _daylight(time[known], telemetry["global_radiation"][known], site)
+    limit = LARGEST_OFFSET + own_step(telemetry.time) / 7200.0
+    return len(daylight.day) >= LEAST_DAYS and abs(daylight.offset()) < limit
+
+
+def _change_of_clocks(telemetry: Telemetry, daylight: _Daylight, site: Site) -> DataFault | None:
+    """Return the fault of a log whose noon jumps by an hour on the day on which clocks change."""
+    for zone in (site.time_zone,) if site.time_zone != "UTC" else _ZONES:
+        for day in _changes(telemetry.time, zone):
+            before = (daylight.day >= day - _WINDOW) & (daylight.day < day)
+            after = (daylight.day > day) & (daylight.day <= day + _WINDOW)
+            if min(before.sum(), after.sum()) < LEAST_DAYS:
+                continue
+            jump = daylight.offset(after) - daylight.offset(before)
+            doubt = ERRORS * float(np.hypot(daylight.error(after), daylight.error(before)))
+            if max(JUMP[0], doubt) <= abs(jump) <= JUMP[1]:
+                date = np.datetime64(int(day), "D")
+                seen = f"noon jumps by {jump:+.1f} h on {date}, when clocks change in {zone}"
+                return DataFault("local_time", "", seen, _name_zone(zone))
+    return None
+
+
+def _changes(time: Times, zone: str) -> list[int]:
+    """Return the days, from 1970, on which clocks change in a zone within a log."""
+    first, last = (int(edge.astype("datetime64[D]").astype(np.int64)) for edge in (time[0], time[-1]))
+    days = np.arange(first, last + 1)
+    noon: Times = (days * 86_400 + 43_200).astype("datetime64[s]")
+    offset = (to_local(noon, zone) - noon).astype(np.int64)
+    return [int(day) for day in days[1:][np.diff(offset) != 0]]
+
+
+def _clearness(telemetry: Telemetry, site: Site) -> float | None:
+    """Return the clearness of the clearest moments (98 % quantile), or None where the sun is never high enough."""
+    time, values = telemetry.time, telemetry["global_radiation"]
+    half = np.timedelta64(int(own_step(time) / 2.0), "s")
+    # A row may stand for the interval before it or after: the brighter sky of both is the one not exceeded.
+    above = np.max(
+        [sun.extraterrestrial_radiation(time + shift, site.latitude, site.longitude) for shift in (-half, half)], axis=0
+    )
+    high = (above > 200.0) & np.isfinite(values)
+    if high.sum() < 100:
+        return None
+    return float(np.quantile(values[high] / above[high], 0.98))
+
+
+def _unit(telemetry: Telemetry, site: Site) -> DataFault | None:
+    clearness = _clearness(telemetry, site)
+    if clearness is None or DARKEST <= clearness <= BRIGHTEST or clearness <= 0.0:
+        return None
+    step = own_step(telemetry.time)
+    smaller = {
+        f"J cm-2 a row ({step / 60.0:g} min)": Remedy(1e4, amount="interval"),
+        "klux": Remedy(1000.0 / 115.0),
+        "kW m-2": Remedy(1000.0),
+        "J cm-2 an hour": Remedy(1e4 / 3600.0),
+    }
+    larger = {
+        "umol m-2 s-1 of PAR": Remedy(1.0 / 2.05),
+        "kJ m-2 an hour": Remedy(1.0 / 3.6),
+        "lux": Remedy(1.0 / 115.0),
+    }
+    possible = {
+        name: remedy
+        for name, remedy in (smaller if clearness < DARKEST else larger).items()
+        if 0.55 * CLEAR <= clearness * remedy.scale / (step if remedy.amount == "interval" else 1.0) <= 1.5 * CLEAR
+    }
+    part = "never more than" if clearness < DARKEST else "up to"
+    seen = f"global_radiation is {part} {clearness:.2g} of what comes from the sun, where a clear sky lets 0.8 through"
+    if not possible:
+        return DataFault(
+            "radiation_unit", "global_radiation", seen, "it is not in W m-2: give its scale in the mapping"
+        )
+    mend = " or ".join(
+        f"in {name}, then {{amount: {remedy.amount}, scale: {remedy.scale:.6g}}}" for name, remedy in possible.items()
+    )
+    only = next(iter(possible.values())) if len(possible) == 1 else None
+    return DataFault("radiation_unit", "global_radiation", seen, f"it is {mend} in the mapping", only)
+
+
+def _summed(telemetry: Telemetry, site: Site, kind: str) -> DataFault:
+    """Return the fault of a radiation that is a running sum, with the unit of the sum by its size."""
+    time, values = telemetry.time, telemetry["global_radiation"]
+    day = sun.solar_day(time, site.longitude)
+    above = sun.extraterrestrial_radiation(time, site.latitude, site.longitude) * own_step(time)
+    first, count = int(day.min()), int(day.max()) - int(day.min()) + 1
+    gain = np.concatenate([[0.0], np.maximum(np.diff(np.nan_to_num(values)), 0.0)])
+    came = np.bincount(day - first, weights=gain, minlength=count)
+    sky = np.bincount(day - first, weights=above, minlength=count)
+    whole = (np.bincount(day - first, minlength=count) >= 0.9 * 86_400.0 / own_step(time)) & (sky > 0.0)
+    seen = "global_radiation only grows " + ("from midnight on" if kind == "day" else "all along") + ": it is a sum"
+    mend = "in the mapping: global_radiation: {column: ..., amount: " + kind + ", scale: "
+    if whole.any():
+        clearest = float(np.quantile(came[whole] / sky[whole], 0.9))
+        units = {"J cm-2": 1e4, "Wh m-2": 3600.0, "MJ m-2": 1e6, "kJ m-2": 1e3}
+        name = min(units, key=lambda one: abs(np.log(max(clearest, 1e-12) * units[one] / 0.6)))
+        if 0.25 < clearest * units[name] < 0.9:
+            return DataFault(
+                "radiation_sum", "global_radiation", f"{seen}, by its size in {name}", f"{mend}{units[name]:g}}}",
+                Remedy(units[name], amount=kind),
+            )  # fmt: skip
+    return DataFault("radiation_sum", "global_radiation", seen, f"{mend}...}} with the joules m-2 of its unit")

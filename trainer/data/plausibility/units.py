@@ -1,0 +1,133 @@
+"""Units that a column cannot have, by the size of its values alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.data.fault import DataFault, Remedy
+
+Floats = NDArray[np.float64]
+
+TEMPERATURES = ("air_temperature", "outdoor_temperature", "sky_temperature", "heating_setpoint")
+PIPES = ("rail_pipe_temperature", "grow_pipe_temperature")
+SHARES = ("air_humidity", "outdoor_humidity")
+POSITIONS = ("vent_lee", "vent_wind", "energy_screen", "blackout_screen")
+CARBON = ("air_co2", "co2_setpoint", "outdoor_co2")
+
+HOTTEST_MEDIAN = 42.0
+"""degC: no greenhouse and no place on earth has a higher median."""
+LEAST_VALUES = 24
+
+_FAHRENHEIT = Remedy(5.0 / 9.0, -160.0 / 9.0)
+_KELVIN = Remedy(1.0, -273.15)
+
+
+def wrong_units(telemetry: Telemetry) -> list[DataFault]:
+    """Return the columns whose values are of another unit than the registry's."""
+    checks: Mapping[tuple[str, ...], Callable[[str, Floats], DataFault | None]] = {
+        TEMPERATURES: _temperature,
+        PIPES: _pipe,
+        SHARES: _humidity,
+        POSITIONS: _position,
+        CARBON: _carbon_dioxide,
+        ("wind_speed",): _wind,
+        ("lamp_on", "irrigation_on", "rain"): _switch,
+    }
+    found = []
+    for names, check in checks.items():
+        for name in names:
+            if name in telemetry:
+                values = telemetry[name][np.isfinite(telemetry[name])]
+                fault = check(name, values) if len(values) >= LEAST_VALUES else None
+                if fault is not None:
+                    found.append(fault)
+    return found
+
+
+def _changed(name: str, remedy: Remedy) -> str:
+    return f"in the mapping: {name}: {{column: ..., scale: {remedy.scale:.7g}, offset: {remedy.offset:.7g}}}"
+
+
+def _temperature(name: str, values: Floats) -> DataFault | None:
+    low, middle, high = (float(one) for one in np.quantile(values, (0.05, 0.5, 0.95)))
+    seen = f"{name} has a median of {middle:.4g}"
+    if low > 233.0 and high < 333.0 and high - low < 70.0:
+        return DataFault("kelvin", name, f"{seen}, so it is in kelvin", _changed(name, _KELVIN), _KELVIN)
+    if middle <= HOTTEST_MEDIAN:
+        return None
+    if high < 140.0:
+        return DataFault("fahrenheit", name, f"{seen}, so it is in degF", _changed(name, _FAHRENHEIT), _FAHRENHEIT)
+    if high < 600.0:
+        tenths = Remedy(0.1)
+        return DataFault("tenths", name, f"{seen}, so it is in tenths of degC", _changed(name, tenths), tenths)
+    return DataFault("no_temperature", name, f"{seen} and is no temperature", "name its column anew (--column)")
+
+
+def _pipe(name: str, values: Floats) -> DataFault | None:
+    warm = values[values > 1.0]
+    if len(warm) < LEAST_VALUES:
+        return None
+    low, high = (float(one) for one in np.quantile(warm, (0.02, 0.98)))
+    if low > 270.0 and high < 383.0:
+        return DataFault(
+            "kelvin", name, f"{name} lies above {low:.0f}, so it is in kelvin", _changed(name, _KELVIN), _KELVIN
+        )
+    # A pipe at rest is as warm as its greenhouse: never below 50 in degF, hardly above 40 in degC.
+    if low > 48.0 and 100.0 < high < 240.0:
+        seen = f"{name} lies between {low:.0f} and {high:.0f}, so it is in degF"
+        return DataFault("fahrenheit", name, seen, _changed(name, _FAHRENHEIT), _FAHRENHEIT)
+    return None
+
+
+def _humidity(name: str, values: Floats) -> DataFault | None:
+    middle, high = (float(one) for one in np.quantile(values, (0.5, 0.995)))
+    if high <= 1.05 and middle > 0.1:
+        percent = Remedy(100.0)
+        seen = f"{name} lies between 0 and 1 (median {middle:.2f}), so it is a fraction"
+        return DataFault("fraction", name, seen, _changed(name, percent), percent)
+    if name == "air_humidity" and middle < 25.0 and high < 45.0:
+        seen = f"{name} has a median of {middle:.3g} and hardly exceeds {high:.3g}: no greenhouse is so dry"
+        return DataFault("absolute_humidity", name, seen, "take the column of relative humidity in %, not g m-3 or kPa")
+    return None
+
+
+def _position(name: str, values: Floats) -> DataFault | None:
+    top = float(values.max())
+    between = np.unique(np.round(values[(values > 0.02) & (values < 0.98)], 4))
+    # Percentages below 1 all along, in steps finer than any actuator has.
+    if 0.3 < top <= 1.001 and (len(between) >= 15 or (values > 0.9).mean() > 0.05):
+        percent = Remedy(100.0)
+        seen = f"{name} never exceeds {top:.2g}, so it is a fraction"
+        return DataFault("fraction", name, seen, _changed(name, percent), percent)
+    return None
+
+
+def _carbon_dioxide(name: str, values: Floats) -> DataFault | None:
+    middle = float(np.median(values))
+    if 0.02 < middle < 0.6:
+        parts = Remedy(10_000.0)
+        return DataFault(
+            "percent", name, f"{name} has a median of {middle:.3g}, so it is in %", _changed(name, parts), parts
+        )
+    return None
+
+
+def _wind(name: str, values: Floats) -> DataFault | None:
+    middle, high = (float(one) for one in np.quantile(values, (0.5, 0.99)))
+    if middle > 14.0 or high > 27.0:
+        metres = Remedy(1.0 / 3.6)
+        seen = f"{name} has a median of {middle:.3g} and a highest of {high:.3g}, so it is in km/h (or mph)"
+        return DataFault("kilometres_per_hour", name, seen, _changed(name, metres), metres)
+    return None
+
+
+def _switch(name: str, values: Floats) -> DataFault | None:
+    top = float(values.max())
+    if 1.5 < top <= 100.5 and (values > 1.5).mean() > 0.01:
+        share = Remedy(0.01)
+        return DataFault("percent", name, f"{name} reaches {top:.3g}, so it is in %", _changed(name, share), share)
+    return None

@@ -1,0 +1,96 @@
+"""Rows as they stand in a file, to rows in time: what is sorted, what stands twice, and what contradicts itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow.core.telemetry import Telemetry, Times, Values, from_rows
+from igrow.trainer.data.fault import DataFault
+
+COMPARED = ("air_temperature", "outdoor_temperature", "air_humidity", "air_co2", "global_radiation")
+LARGEST_RATIO = 3.0
+"""How much further than the next row a repeated row may lie, in medians of each, before it contradicts the first."""
+LEAST_REPEATED = 12
+"""Rows that stand twice from which on a contradiction is judged."""
+
+
+@dataclass(frozen=True)
+class Merged:
+    """The table of one file."""
+
+    telemetry: Telemetry
+    notes: tuple[str, ...] = ()
+    faults: tuple[DataFault, ...] = ()
+
+
+def merge(time: Times, columns: Mapping[str, Values]) -> Merged:
+    """Return rows in any order as a table in time, with what had to be done for it.
+
+    Of rows with one time a later one wins, as in the telemetry format; several columns' readings in rows of their own
+    (a log in which each sensor writes a row) are no contradiction.
+
+    Args:
+        time: (n,), NaT for rows that are to be left out.
+        columns: by quantity, (n,).
+    """
+    known = ~np.isnat(time)
+    time, columns = time[known], {name: values[known] for name, values in columns.items()}
+    table = from_rows(time, columns)
+    notes: list[str] = []
+    back = np.diff(time.astype(np.int64)) < 0
+    if len(time) > 1 and back.all():
+        notes.append("the rows stand in the order of time from the newest to the oldest: turned round")
+    elif back.any() and back.mean() > 0.01:
+        notes.append(f"{int(back.sum())} rows stand before an earlier one: put in the order of time")
+    repeated = len(time) - len(table)
+    faults = []
+    if repeated:
+        sentence = _contradiction(time, columns, table) if repeated >= LEAST_REPEATED else None
+        if sentence is None:
+            notes.append(f"{repeated} rows have the time of another row: the later one of them counts")
+        else:
+            mend = (
+                "export one compartment alone, or name its rows with `only` in the mapping; "
+                "where it is the hour when clocks go back, name the time zone of the export"
+            )
+            seen = f"{repeated} rows have the time of another row, and {sentence}"
+            faults.append(DataFault("repeated_times", "", seen, mend))
+    return Merged(table, tuple(notes), tuple(faults))
+
+
+def _contradiction(time: Times, columns: Mapping[str, Values], table: Telemetry) -> str | None:
+    """Return how rows of one time differ, where they do so by far more than a row does from the next."""
+    order = np.argsort(time, kind="stable")
+    same = np.flatnonzero(np.diff(time[order].astype(np.int64)) == 0)
+    for name in COMPARED:
+        if name not in columns:
+            continue
+        values = columns[name][order]
+        apart = np.abs(values[same + 1] - values[same])
+        apart = apart[np.isfinite(apart)]
+        usual = _median_step(table[name])
+        if len(apart) >= LEAST_REPEATED and usual is not None:
+            middle = float(np.median(apart))
+            if middle > LARGEST_RATIO * max(usual, _RESOLUTION[name]):
+                return f"their {name} differs by {middle:.3g}, where a row differs from the next by {usual:.3g}"
+    return None
+
+
+_RESOLUTION = {
+    "air_temperature": 0.1,
+    "outdoor_temperature": 0.1,
+    "air_humidity": 0.5,
+    "air_co2": 5.0,
+    "global_radiation": 10.0,
+}
+"""Differences below are nothing, whatever the pace of the log."""
+
+
+def _median_step(values: NDArray[np.float64]) -> float | None:
+    steps = np.abs(np.diff(values))
+    steps = steps[np.isfinite(steps)]
+    return float(np.median(steps)) if len(steps) else None

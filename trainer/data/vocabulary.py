@@ -1,0 +1,161 @@
+"""What greenhouse computers call things: reads `vocabulary.yaml`, its table of names, units and words."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from typing import Any
+
+import yaml
+
+_FOLDED = str.maketrans({"æ": "ae", "ø": "o", "œ": "oe", "−": "-", "–": "-", "’": "'"})
+_BRACKETS = re.compile(r"[(\[{]([^()\[\]{}]*)[)\]}]")
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit that a column may be in, and the way to the registry's: a value becomes value * scale + offset."""
+
+    name: str
+    dimension: str
+    scale: float = 1.0
+    offset: float = 0.0
+    amount: str = "rate"
+
+
+@dataclass(frozen=True)
+class Rule:
+    """How the name of a quantity's column is made up of words."""
+
+    needed: tuple[tuple[str, ...], ...]
+    """Sets of words, of which one must be there whole."""
+    excluded: frozenset[str]
+    likelier: tuple[str, ...]
+    dimension: str
+
+
+@cache
+def _table() -> Mapping[str, Any]:
+    text = resources.files("igrow.trainer.data").joinpath("vocabulary.yaml").read_text(encoding="utf-8")
+    # Everything is text: YAML itself would read "on" and "no" as truth values.
+    table: Mapping[str, Any] = yaml.load(text, Loader=yaml.BaseLoader)
+    return table
+
+
+def folded(text: str) -> str:
+    """Return a text in small letters, without accents, superscripts and underscores."""
+    plain = unicodedata.normalize("NFKD", text.translate(_FOLDED).casefold().translate(_FOLDED))
+    return "".join(" " if letter == "_" else letter for letter in plain if not unicodedata.combining(letter))
+
+
+@cache
+def month_names() -> Mapping[str, str]:
+    """Return the English abbreviation of each name of a month, in small letters and folded."""
+    english = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
+    return {name: english[int(number) - 1] for number, names in _table()["months"].items() for name in names}
+
+
+@cache
+def switch_words() -> Mapping[str, float]:
+    """Return 1 or 0 for each word that says on or off, in small letters."""
+    return {word: float(value) for value, words in _table()["switched"].items() for word in words}
+
+
+@cache
+def _words() -> Mapping[str, Sequence[tuple[str, bool]]]:
+    """Return each word's spellings, folded, and whether one must stand alone."""
+    return {
+        word: [(folded(spelling.removeprefix("=")), spelling.startswith("=")) for spelling in spellings]
+        for word, spellings in _table()["words"].items()
+    }
+
+
+@cache
+def rules() -> Mapping[str, Rule]:
+    """Return the rule of each quantity."""
+    return {
+        name: Rule(
+            tuple(tuple(rule[key]) for key in ("all", "or") if key in rule),
+            frozenset(rule["none"]),
+            tuple(rule.get("more", ())),
+            _table()["unit_of"].get(name, ""),
+        )
+        for name, rule in _table()["quantities"].items()
+    }
+
+
+@cache
+def units() -> Mapping[str, Mapping[str, Unit]]:
+    """Return dimension -> spelling (compact) -> unit."""
+    found: dict[str, dict[str, Unit]] = {}
+    for dimension, table in _table()["units"].items():
+        for name, unit in table.items():
+            one = Unit(
+                name, dimension, float(unit.get("scale", 1)), float(unit.get("offset", 0)), unit.get("amount", "rate")
+            )
+            for spelling in (name, *unit["spelt"]):
+                found.setdefault(dimension, {})[compact(spelling)] = one
+    return found
+
+
+def exact_names() -> Mapping[str, str]:
+    """Return names without any word in them -> quantity."""
+    names: Mapping[str, str] = _table()["exact"]
+    return names
+
+
+def time_words(kind: str) -> Sequence[tuple[str, bool]]:
+    """Return the spellings of a kind of time column (``date_and_time``, ``date``, ``time_of_day``)."""
+    return [(folded(word.removeprefix("=")), word.startswith("=")) for word in _table()["time"][kind]]
+
+
+def compact(text: str) -> str:
+    """Return a unit's text without blanks, dots, carets and brackets."""
+    return re.sub(r"[\s.^*·()\[\]{}]", "", folded(text))
+
+
+def words_in(name: str) -> frozenset[str]:
+    """Return the words that a column's name is made of."""
+    split = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
+    texts = (folded(name), folded(split))
+    alone = {token for text in texts for token in re.split(r"[^\w%]+|_", text)}
+    return frozenset(
+        word
+        for word, spellings in _words().items()
+        if any(text in alone if single else any(text in one for one in texts) for text, single in spellings)
+    )
+
+
+def unit_texts(name: str) -> list[str]:
+    """Return the parts of a column's name that may be a unit, compact: in brackets, after a comma or a dash."""
+    parts = _BRACKETS.findall(name)
+    rest = _BRACKETS.sub(" | ", name)
+    parts += re.split(r"[,;|]|\s-\s|\s/\s", rest)
+    parts += rest.split()
+    return [text for part in parts if (text := compact(part))]
+
+
+def find_units(texts: Sequence[str]) -> dict[str, Unit]:
+    """Return the unit of each dimension that one of some compact texts may be."""
+    found: dict[str, Unit] = {}
+    for text in texts:
+        for dimension, table in units().items():
+            if text in table:
+                found.setdefault(dimension, table[text])
+    return found
+
+
+@cache
+def _compartment_pattern() -> re.Pattern[str]:
+    alone = "|".join(re.escape(folded(word.removeprefix("="))) for word in _table()["compartments"])
+    return re.compile(rf"(?:^|[^a-z])({alone})[\s.:#-]*(\d+[a-z]?)(?![\d])")
+
+
+def compartment(name: str) -> str:
+    """Return the compartment that a column's name tells, such as ``afd 4``; empty where it tells none."""
+    found = _compartment_pattern().search(folded(name))
+    return f"{found[1]} {found[2]}" if found else ""
