@@ -8,6 +8,7 @@ from igrow.core.command_line import run_command
 
 COMMANDS = {
     "generate": ("igrow.trainer.cli.generate", "simulate a greenhouse and write its log"),
+    "import": ("igrow.trainer.cli.import_", "find out how a greenhouse computer's export is to be read"),
     "train": ("igrow.trainer.cli.train", "train the growth and yield stages on logs"),
     "calibrate": ("igrow.trainer.cli.calibrate", "fit the simulator to a log; print the errors before and after"),
     "diagnose": ("igrow.trainer.cli.diagnose", "find what the simulator lacks, and why; write the corrected bundle"),

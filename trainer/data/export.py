@@ -14,11 +14,11 @@ from igrow.core.local_time import to_local
 from igrow.core.telemetry import Times, Values
 from igrow.trainer.data.cells import Cells, read_cells
 from igrow.trainer.data.mapping import ColumnMapping, ExportMapping
+from igrow.trainer.data.number_texts import number
 from igrow.trainer.data.rows import Merged, merge
 from igrow.trainer.data.timestamps import to_utc
+from igrow.trainer.data.vocabulary import switch_words
 
-_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
-_WITH_UNIT = re.compile(r"([-+]?[\d.,'\u00a0\u202f ]*\d)\s*([^\d\s].*)?")
 LONGEST_INTERVAL = 7200.0
 """Seconds; what fell in a longer one is no rate."""
 
@@ -56,14 +56,16 @@ def read(path: Path, mapping: ExportMapping) -> Merged:
 def as_table(cells: Cells, header: Sequence[int] = (1,), first_row: int | None = None) -> ExportTable:
     """Return the columns of cells by the names that the header lines give them.
 
-    Names over several lines are joined by a blank; a name that stands twice gets a number.
+    Names over several lines are joined by a blank; an upper line's cell stands for the empty ones after it (the merged
+    cells of a workbook). A name that stands twice gets a number.
     """
     heads = [row for row, line in zip(cells.rows, cells.lines, strict=True) if line in set(header)]
     if not heads:
         raise IgrowError(f"{cells.path}: line {header[0]} with the columns' names is empty or not there")
     start = max(header) + 1 if first_row is None else first_row
     body = [(row, line) for row, line in zip(cells.rows, cells.lines, strict=True) if line >= start]
-    width = max((len(row) for row in heads), default=0)
+    width = max(len(row) for row in heads)
+    heads = [*(_spread(row, width) for row in heads[:-1]), heads[-1]]
     names: list[str] = []
     for position in range(width):
         parts = [" ".join(row[position].split()) for row in heads if position < len(row) and row[position]]
@@ -76,6 +78,14 @@ def as_table(cells: Cells, header: Sequence[int] = (1,), first_row: int | None =
         if name or any(texts):
             columns[name or f"column {position + 1}"] = texts
     return ExportTable(cells.path, columns, [line for _, line in body])
+
+
+def _spread(row: Sequence[str], width: int) -> list[str]:
+    """Return a row whose empty cells have the text of the cell before them."""
+    texts: list[str] = []
+    for cell in [*row, *[""] * (width - len(row))]:
+        texts.append(cell or (texts[-1] if texts else ""))
+    return texts
 
 
 def chosen_rows(table: ExportTable, only: Mapping[str, str]) -> ExportTable:
@@ -109,33 +119,21 @@ def times(table: ExportTable, mapping: ExportMapping) -> Times:
 
 def numbers(table: ExportTable, name: str, mapping: ExportMapping, words: Mapping[str, float] | None = None) -> Values:
     """Return one column as numbers, NaN where it says that there is none; raises IgrowError with the line."""
-    missing, words = frozenset(mapping.missing), words or {}
-    known: dict[str, float] = {}
+    missing = frozenset(mapping.missing)
+    # A word of the other language or state may come later than the file that the mapping was made from.
+    known: dict[str, float] = {**dict.fromkeys(missing, float("nan")), **(words or {})}
     values = np.empty(len(table.lines))
     for position, text in enumerate(table[name]):
         if text not in known:
-            number = float("nan") if text in missing else words.get(text, _number(text, mapping.decimal))
-            if number is None:
+            value = number(text, mapping.decimal)
+            if value is None and words:
+                value = switch_words().get(text.lower())
+            if value is None:
                 where = f"{table.path}:{table.lines[position]}"
                 raise IgrowError(f"{where}: {name} is {text!r}: a number or an empty cell is needed")
-            known[text] = number
+            known[text] = value
         values[position] = known[text]
     return values
-
-
-def _number(text: str, decimal: str) -> float | None:
-    """Return the number that a text begins with (a unit may follow), or None."""
-    found = _WITH_UNIT.fullmatch(text)
-    if found is None:
-        return float(text) if _NUMBER.fullmatch(text) else None
-    digits, unit = re.sub(r"['\u00a0\u202f ]", "", found[1]), found[2] or ""
-    if unit and _NUMBER.fullmatch(text):
-        return float(text)
-    group = "." if decimal == "," else ","
-    if decimal in digits or re.fullmatch(rf"[-+]?\d{{1,3}}(\{group}\d{{3}})+", digits):
-        digits = digits.replace(group, "")
-    digits = digits.replace(",", ".")
-    return float(digits) if _NUMBER.fullmatch(digits) else None
 
 
 def quantity(table: ExportTable, rule: ColumnMapping, mapping: ExportMapping, time: Times) -> Values:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from igrow.trainer.data.mapping import Amount
+
 
 @dataclass(frozen=True)
 class Remedy:
@@ -11,8 +13,7 @@ class Remedy:
 
     scale: float = 1.0
     offset: float = 0.0
-    amount: str = "rate"
-    """As in a mapping: what a number is."""
+    amount: Amount = "rate"
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,8 @@ from igrow.core.local_time import zone
 from igrow.core.quantities import QUANTITIES
 from igrow.core.yaml_schema import SettingError, setting
 
+Amount = Literal["rate", "interval", "day", "total"]
+"""What a number is: a rate or a state, an amount since the row before, since midnight, or since the start."""
 MISSING = ("", "NaN", "nan", "-", "--", "---", "#N/A", "#N/B", "#NV", "#DIV/0!", "N/A", "n/a", "NULL", "null")
 
 
@@ -58,7 +60,7 @@ class ColumnMapping:
     scale: float = setting(default=1.0, help="factor from the export's unit to the registry's")
     offset: float = setting(default=0.0, help="added after the factor, in the registry's unit")
     add: tuple[str, ...] = setting(default=(), help="further columns, added to the first before the factor")
-    amount: Literal["rate", "interval", "day", "total"] = setting(
+    amount: Amount = setting(
         default="rate",
         help="what a number is: a rate or a state; an amount since the row before; since midnight; or since the start. "
         "Amounts become rates per second before the factor",

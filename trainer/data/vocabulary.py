@@ -8,9 +8,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
-from typing import Any
+from typing import Any, cast
 
 import yaml
+
+from igrow.trainer.data.mapping import Amount
 
 _FOLDED = str.maketrans({"æ": "ae", "ø": "o", "œ": "oe", "−": "-", "–": "-", "’": "'"})
 _BRACKETS = re.compile(r"[(\[{]([^()\[\]{}]*)[)\]}]")
@@ -24,7 +26,7 @@ class Unit:
     dimension: str
     scale: float = 1.0
     offset: float = 0.0
-    amount: str = "rate"
+    amount: Amount = "rate"
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,11 @@ def units() -> Mapping[str, Mapping[str, Unit]]:
     for dimension, table in _table()["units"].items():
         for name, unit in table.items():
             one = Unit(
-                name, dimension, float(unit.get("scale", 1)), float(unit.get("offset", 0)), unit.get("amount", "rate")
+                name,
+                dimension,
+                float(unit.get("scale", 1)),
+                float(unit.get("offset", 0)),
+                cast("Amount", unit.get("amount", "rate")),
             )
             for spelling in (name, *unit["spelt"]):
                 found.setdefault(dimension, {})[compact(spelling)] = one
@@ -159,3 +165,11 @@ def compartment(name: str) -> str:
     """Return the compartment that a column's name tells, such as ``afd 4``; empty where it tells none."""
     found = _compartment_pattern().search(folded(name))
     return f"{found[1]} {found[2]}" if found else ""
+
+
+def is_compartment(name: str) -> bool:
+    """Tell whether a column's name is a word for a compartment."""
+    text = folded(name)
+    alone = set(re.split(r"\W+", text))
+    spelt = [(folded(word.removeprefix("=")), word.startswith("=")) for word in _table()["compartments"]]
+    return any(word in alone if single else word in text for word, single in spelt)

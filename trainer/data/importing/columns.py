@@ -62,7 +62,7 @@ def find_matches(columns: Iterable[str], unit_line: Mapping[str, str]) -> list[M
             if not needed or words & rule.excluded or foreign or (units and rule.dimension not in units):
                 continue
             more = sum(word in words for word in rule.likelier)
-            score = 10 * needed + 3 * more + 4 * bool(units) - ("other" in words) * 12
+            score = 10 * needed + 3 * more + 4 * bool(units) - 12 * ("other" in words) - 2 * ("sum" in words)
             found.append(Match(quantity, column, score, units.get(rule.dimension), compartment))
     return found
 

@@ -20,7 +20,7 @@ from igrow.trainer.data.mapping import MISSING
 
 DELIMITERS = (";", "\t", "|", ",")
 """In the order in which they are believed: a comma may be a decimal sign."""
-_ENCODINGS = ("utf_8", "utf_16", "utf_16_le", "utf_16_be", "cp1252", "gb18030", "big5", "cp1250", "cp1251")
+_ENCODINGS = ("utf_8", "utf_16", "gb18030", "big5", "cp1252")
 _SAMPLE = 400
 """Rows that are looked at."""
 _NUMERIC = re.compile(r"[-+]?\d[\d.,'\u00a0 ]*([eE][-+]?\d+)?\s*(%|°?[CF]|ppm|W/m²|W/m2|m/s)?")
@@ -122,14 +122,14 @@ def _is_value(cell: str) -> bool:
 
 
 def _first_reading(cells: Cells) -> int:
-    """Return the index of the first row of readings: a time, and values in most of its other cells."""
+    """Return the index of the first row of readings: it has a time and a value."""
     usual = Counter(len(row) for row in cells.rows[-_SAMPLE:]).most_common(1)
     for index, row in enumerate(cells.rows[:_SAMPLE]):
         filled = [cell for cell in row if cell]
         times = [cell for cell in filled if looks_like_time(cell)]
         values = [cell for cell in filled if _is_value(cell)]
         wide = not usual or len(row) >= 0.5 * usual[0][0]
-        if wide and times and len(values) + len(times) >= 0.6 * len(filled) and len(values) >= 1:
+        if wide and times and values:
             return index
     needed = "export the log as a table with a row for each time and a column for each sensor"
     raise IgrowError(f"{cells.path}: no row has a time and numbers: {needed}")

@@ -17,8 +17,9 @@ Floats = NDArray[np.float64]
 SWAPPED_ALIKE = 3.0
 """K by which the nights outside are warmer than those inside, in columns that stand in each other's place."""
 _LEAST_NIGHTS = 5
-SCREEN_CLOSED_BY_DAY, SCREEN_OPEN_AT_NIGHT = 75.0, 40.0
-"""% closed: a screen more than the first in bright light and less than the second in the dark is read the wrong way."""
+CLOSED_IN_LIGHT, CLOSED_BY_DAY, OPEN_AT_NIGHT = 90.0, 75.0, 40.0
+"""% closed. A screen that is more than the first in bright light is read the wrong way, and so is one that is more than
+the second there and less than the third in the dark."""
 BRIGHT = 200.0
 """W m-2."""
 WARM_NIGHT = 14.0
@@ -97,9 +98,8 @@ def screens_reversed(telemetry: Telemetry, site: Site) -> list[DataFault]:
         if min(len(by_day), len(at_night)) < 48:
             continue
         day, night = float(by_day.mean()), float(at_night.mean())
-        always = day > 95.0 and night > 95.0
-        if day > SCREEN_CLOSED_BY_DAY and (night < SCREEN_OPEN_AT_NIGHT or always):
-            what = "day and night" if always else f"in bright light and {night:.0f} % at night"
+        if day > CLOSED_IN_LIGHT or (day > CLOSED_BY_DAY and night < OPEN_AT_NIGHT):
+            what = f"in bright light, {night:.0f} % at night"
             reverse = Remedy(-1.0, 100.0)
             mend = f"its 100 means open; in the mapping: {name}: {{column: ..., scale: -1, offset: 100}}"
             found.append(DataFault("screen_reversed", name, f"{name} is {day:.0f} % closed {what}", mend, reverse))

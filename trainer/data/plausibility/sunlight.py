@@ -8,6 +8,7 @@ without air, whenever the sky is clear.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -230,7 +231,7 @@ def _unit(telemetry: Telemetry, site: Site) -> DataFault | None:
     return DataFault("radiation_unit", "global_radiation", seen, f"it is {mend} in the mapping", only)
 
 
-def _summed(telemetry: Telemetry, site: Site, kind: str) -> DataFault:
+def _summed(telemetry: Telemetry, site: Site, kind: Literal["day", "total"]) -> DataFault:
     """Return the fault of a radiation that is a running sum, with the unit of the sum by its size."""
     time, values = telemetry.time, telemetry["global_radiation"]
     day = sun.solar_day(time, site.longitude)

@@ -1,0 +1,110 @@
+"""A proposed mapping, read and held against what is plausible: what is certain is set right, the rest is said."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from igrow.core.local_time import to_local
+from igrow.core.site import Site
+from igrow.trainer.data import export
+from igrow.trainer.data.fault import DataFault
+from igrow.trainer.data.importing.proposal import Proposal
+from igrow.trainer.data.importing.zone import fixed
+from igrow.trainer.data.mapping import ColumnMapping, ExportMapping
+from igrow.trainer.data.plausibility import find_faults
+from igrow.trainer.data.plausibility.sunlight import CLOCK
+from igrow.trainer.data.rows import Merged
+
+_ROUNDS = 4
+"""A remedy may uncover the next fault: a sum that is in another unit as well."""
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A mapping with what was set right in it, and the log that it gives."""
+
+    mapping: ExportMapping
+    merged: Merged
+    mended: tuple[str, ...]
+    faults: tuple[DataFault, ...]
+    """What is still wrong."""
+
+
+def check(proposal: Proposal, site: Site | None) -> Checked:
+    """Read the file by its proposed mapping, and set right what is certain.
+
+    Raises:
+        IgrowError: a cell is no number or no time.
+    """
+    mapping = proposal.mapping
+    mended: list[str] = []
+    for _ in range(_ROUNDS):
+        merged = export.read(proposal.path, mapping)
+        faults = (*merged.faults, *find_faults(merged.telemetry, site))
+        better = _on_another_clock(proposal, mapping, faults, site, mended) or _remedied(mapping, faults, mended)
+        if better is None:
+            break
+        mapping = better
+    return Checked(mapping, merged, tuple(mended), faults)
+
+
+def _on_another_clock(
+    proposal: Proposal, mapping: ExportMapping, faults: Iterable[DataFault], site: Site | None, mended: list[str]
+) -> ExportMapping | None:
+    """Return the mapping with the time zone under which the sun agrees; a zone that the user gave stays."""
+    asked = any(question.about == "time_zone" for question in proposal.questions)
+    if site is None or not (asked or mapping.time.time_zone == site.time_zone):
+        return None
+    wrong = [fault for fault in faults if fault.kind in CLOCK]
+    if not wrong:
+        return None
+    for zone in _candidates(site, export.read(proposal.path, mapping)):
+        if zone == mapping.time.time_zone:
+            continue
+        moved = replace(mapping, time=replace(mapping.time, time_zone=zone))
+        merged = export.read(proposal.path, moved)
+        if not any(fault.kind in CLOCK for fault in find_faults(merged.telemetry, site)):
+            mended.append(f"times are {zone}: {wrong[0].sentence} where they are taken for {mapping.time.time_zone}")
+            return moved
+    return None
+
+
+def _candidates(site: Site, merged: Merged) -> list[str]:
+    """Return the zones that the times of a site's log may be in."""
+    time = merged.telemetry.time[:1]
+    zones = [site.time_zone, "UTC"]
+    if len(time):
+        # Standard time all the year, as many climate computers keep it.
+        january = np.array(
+            [f"{str(time[0])[:4]}-01-15T12:00:00", f"{str(time[0])[:4]}-07-15T12:00:00"], "datetime64[s]"
+        )
+        offsets = (to_local(january, site.time_zone) - january).astype(np.int64)
+        zones += [fixed(int(offset) // 3600) for offset in offsets if offset % 3600 == 0]
+    solar = round(site.longitude / 15.0)
+    return list(dict.fromkeys([*zones, fixed(solar)]))
+
+
+def _remedied(mapping: ExportMapping, faults: Iterable[DataFault], mended: list[str]) -> ExportMapping | None:
+    """Return the mapping with every certain remedy in it, or None where there is none."""
+    columns: Mapping[str, ColumnMapping] = mapping.columns
+    changed = dict(columns)
+    for fault in faults:
+        if fault.kind == "swapped_columns":
+            one, other = fault.quantity.split(", ")
+            changed[one], changed[other] = changed[other], changed[one]
+        elif fault.remedy is not None and fault.quantity in changed:
+            rule = changed[fault.quantity]
+            amount = rule.amount if fault.remedy.amount == "rate" else fault.remedy.amount
+            changed[fault.quantity] = replace(
+                rule,
+                scale=rule.scale * fault.remedy.scale,
+                offset=rule.offset * fault.remedy.scale + fault.remedy.offset,
+                amount=amount,
+            )
+        else:
+            continue
+        mended.append(fault.sentence)
+    return replace(mapping, columns=changed) if changed != dict(columns) else None

@@ -1,0 +1,290 @@
+"""From a file to its mapping: laid out so, these columns are these quantities, and this only the user knows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from igrow.core.errors import IgrowError
+from igrow.core.quantities import QUANTITIES
+from igrow.core.site import Site
+from igrow.core.yaml_schema import nearest
+from igrow.trainer.data import vocabulary
+from igrow.trainer.data.export import ExportTable, as_table, chosen_rows
+from igrow.trainer.data.importing import columns as names
+from igrow.trainer.data.importing.layout import Layout, find_layout
+from igrow.trainer.data.importing.question import Answers, Question
+from igrow.trainer.data.importing.texts import ColumnTexts, column_texts
+from igrow.trainer.data.importing.time_format import TimeForm, find_time
+from igrow.trainer.data.importing.zone import find_zone
+from igrow.trainer.data.mapping import MISSING, ColumnMapping, ExportMapping, LongTable, TimeColumn
+
+ORDERS = {"dmy": ("%d", "%m"), "mdy": ("%m", "%d"), "ymd": ("%Y", "%m")}
+_MOST_COMPARTMENTS = 60
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """What was understood of a file."""
+
+    path: Path
+    layout: Layout
+    mapping: ExportMapping
+    table: ExportTable
+    units: Mapping[str, str]
+    """Quantity -> name of the unit that its column is taken to be in; empty where nothing tells it."""
+    unused: tuple[str, ...]
+    notes: tuple[str, ...]
+    questions: tuple[Question, ...]
+
+
+@dataclass(frozen=True)
+class _Body:
+    """The readings of a file."""
+
+    table: ExportTable
+    long: LongTable | None
+    decimal: str
+
+    def texts(self, label: str) -> ColumnTexts:
+        """Return what the readings under a label are."""
+        if self.long is None:
+            return column_texts(self.table[label], self.decimal)
+        names, values = self.table[self.long.name], self.table[self.long.value]
+        return column_texts([value for name, value in zip(names, values, strict=True) if name == label], self.decimal)
+
+
+@dataclass
+class _Draft:
+    """What is gathered on the way."""
+
+    notes: list[str] = field(default_factory=list)
+    questions: list[Question] = field(default_factory=list)
+
+
+def propose(path: Path, site: Site | None = None, answers: Answers | None = None) -> Proposal:
+    """Return the mapping of an export as far as the file tells it, and what only the user knows.
+
+    Raises:
+        IgrowError: the file is no table of readings over time.
+    """
+    answers = answers or Answers()
+    draft = _Draft()
+    layout, cells = find_layout(path, answers.sheet)
+    table = as_table(cells, layout.header, layout.first_row)
+    unit_line = _unit_line(cells.rows, cells.lines, layout, table)
+    time = find_time(dict(table.columns))
+    if time is None:
+        raise IgrowError(f"{path}: no column is a time; it has {', '.join(table.columns)}")
+    time = _ordered(time, answers, draft)
+    long = _long(table, time, layout)
+    only: dict[str, str] = {}
+    if long is None:
+        only = _rows_of_one(table, time, answers, draft)
+        table = chosen_rows(table, only)
+    labels = (
+        list(dict.fromkeys(table[long.name]))
+        if long is not None
+        else [name for name in table.columns if name not in (time.column, time.time_of_day)]
+    )
+    matches = names.find_matches(labels, unit_line)
+    compartment = _compartment(matches, answers, draft)
+    _check_given(answers, labels)
+    body = _Body(table, long, layout.decimal)
+    assigned = names.assign(matches, compartment, answers.columns)
+    mapped, units = _mapped(body, assigned, site, answers, draft)
+    zone, why = find_zone(time, table, site, answers.time_zone)
+    if zone is None:
+        choices = ("Europe/Amsterdam", "UTC")
+        question = "in which time zone are its times?"
+        draft.questions.append(Question("time_zone", question, choices, "--time-zone Europe/Amsterdam"))
+    if why:
+        draft.notes.append(why)
+    mapping = ExportMapping(
+        columns=mapped,
+        time=TimeColumn(time.column, time.time_of_day, time.form, zone or "UTC"),
+        delimiter=layout.delimiter,
+        decimal=layout.decimal,
+        missing=(*MISSING, *_marks(body, mapped)),
+        encoding=layout.encoding,
+        sheet=layout.sheet,
+        header=layout.header,
+        first_row=layout.first_row if layout.first_row != max(layout.header) + 1 else None,
+        only=only,
+        long=long,
+    )
+    read = {one for rule in mapped.values() for one in (rule.column, *rule.add)}
+    unused = tuple(name for name in labels if name not in read and name not in only)
+    return Proposal(path, layout, mapping, table, units, unused, tuple(draft.notes), tuple(draft.questions))
+
+
+def _unit_line(
+    rows: Sequence[Sequence[str]], lines: Sequence[int], layout: Layout, table: ExportTable
+) -> dict[str, str]:
+    """Return column -> unit, of a file with a line of units."""
+    if layout.units is None:
+        return {}
+    row = rows[list(lines).index(layout.units)]
+    return dict(zip(table.columns, row, strict=False))
+
+
+def _ordered(time: TimeForm, answers: Answers, draft: _Draft) -> TimeForm:
+    """Return the time in the order of day and month that the user gives, or asks for it where none is likelier."""
+    forms = (time.form, *time.alternatives)
+    if answers.date_order is not None:
+        first = ORDERS[answers.date_order][0]
+        chosen = next((form for form in forms if form.startswith(first)), None)
+        if chosen is None:
+            raise IgrowError(f"the times do not read as {answers.date_order}: they are of the form {time.form}")
+        return replace(time, form=chosen, alternatives=())
+    if time.alternatives:
+        orders = tuple(order for order, parts in ORDERS.items() if any(form.startswith(parts[0]) for form in forms))
+        draft.questions.append(
+            Question("date_order", "does the day or the month come first in its dates?", orders, "--date-order dmy")
+        )
+    return time
+
+
+def _long(table: ExportTable, time: TimeForm, layout: Layout) -> LongTable | None:
+    """Return the columns of name and value of an export with one reading a row."""
+    others = [name for name in table.columns if name not in (time.column, time.time_of_day)]
+    if len(others) > 6:
+        return None
+    for name in others:
+        labels = set(table[name])
+        if not 2 <= len(labels) <= 500 or len(labels) > 0.5 * len(table.lines):
+            continue
+        told = {match.quantity for match in names.find_matches(labels, {})}
+        value = next(
+            (one for one in others if one != name and column_texts(table[one], layout.decimal).numeric > 0.8), None
+        )
+        if len(told) >= 2 and value is not None and column_texts(table[name], layout.decimal).numeric < 0.2:
+            return LongTable(name, value)
+    return None
+
+
+def _rows_of_one(table: ExportTable, time: TimeForm, answers: Answers, draft: _Draft) -> dict[str, str]:
+    """Return the rows to read of a file that holds several compartments under each other."""
+    stamps = table[time.column]
+    if time.time_of_day is not None:
+        stamps = [f"{day} {hour}" for day, hour in zip(stamps, table[time.time_of_day], strict=True)]
+    repeated = len(stamps) / max(len(set(stamps)), 1)
+    if repeated < 1.9:
+        return {}
+    for name in table.columns:
+        labels = sorted(set(table[name]) - {""})
+        told = vocabulary.is_compartment(name)
+        if name != time.column and told and 2 <= len(labels) <= _MOST_COMPARTMENTS:
+            if answers.compartment in labels:
+                return {name: str(answers.compartment)}
+            _ask_compartment(labels, draft)
+            return {name: labels[0]}
+    return {}
+
+
+def _compartment(matches: Sequence[names.Match], answers: Answers, draft: _Draft) -> str:
+    known = names.compartments(matches)
+    if answers.compartment is not None and known:
+        wanted = vocabulary.folded(answers.compartment)
+        chosen = next((one for one in known if one == wanted or one.split()[-1] == wanted), None)
+        if chosen is None:
+            raise IgrowError(f"no compartment is called {answers.compartment!r}; there are {', '.join(known)}")
+        return chosen
+    if len(known) > 1:
+        _ask_compartment(known, draft)
+    return known[0] if known else ""
+
+
+def _ask_compartment(labels: Sequence[str], draft: _Draft) -> None:
+    option = f"--compartment {labels[0]!r}"
+    draft.questions.append(Question("compartment", "which compartment is the log of?", tuple(labels), option))
+
+
+def _check_given(answers: Answers, labels: Sequence[str]) -> None:
+    for quantity, column in answers.columns.items():
+        if quantity not in QUANTITIES:
+            raise IgrowError(f"--column {quantity}={column}: no such quantity: {nearest(quantity, QUANTITIES)}")
+        if column not in labels:
+            raise IgrowError(f"--column {quantity}={column}: no such column: {nearest(column, labels)}")
+
+
+def _mapped(
+    body: _Body,
+    assigned: names.Assignment,
+    site: Site | None,
+    answers: Answers,
+    draft: _Draft,
+) -> tuple[dict[str, ColumnMapping], dict[str, str]]:
+    """Return the rule of each quantity, and the units that they are taken to be in."""
+    rules: dict[str, ColumnMapping] = {}
+    units: dict[str, str] = {}
+    for quantity in QUANTITIES:
+        match = assigned.chosen.get(quantity)
+        if match is None:
+            continue
+        texts = body.texts(match.column)
+        if texts.numeric + texts.missing < 0.5 and not texts.words:
+            draft.notes.append(f"{match.column!r} was taken for {quantity}, but its cells are no numbers: left out")
+            continue
+        unit = names.unit_called(quantity, answers.units[quantity]) if quantity in answers.units else match.unit
+        rule = ColumnMapping(match.column, words=texts.words)
+        if unit is not None:
+            scale, amount, offset = unit.scale, unit.amount, unit.offset
+            if quantity == "global_radiation" and "sum" in vocabulary.words_in(match.column) and amount == "interval":
+                amount = "day"
+            rule = replace(rule, scale=scale, offset=offset, amount=amount)
+        elif names.dimension(quantity) in ("dose", "water", "power"):
+            rescued = _by_capacity(quantity, rule, texts.highest, site)
+            if rescued is None:
+                _ask_unit(quantity, match.column, draft)
+                continue
+            rule = rescued
+            draft.notes.append(f"{match.column!r} has no unit: taken for a switch, times what the site can do at most")
+        rules[quantity] = rule
+        units[quantity] = unit.name if unit is not None else ""
+        for rival in assigned.rivals.get(quantity, ()):
+            draft.notes.append(f"{rival!r} would do for {quantity} as well: --column {quantity}={rival!r} takes it")
+    _add_lamp_power(rules, units, site, draft)
+    for quantity in ("air_temperature", "outdoor_temperature"):
+        if quantity not in rules:
+            taken = {rule.column for rule in rules.values()}
+            left = tuple(name for name in body.table.columns if name not in taken)[:40]
+            text = f"which column is the {quantity}, or in which other file does it stand?"
+            draft.questions.append(Question(f"columns:{quantity}", text, left, f"--column {quantity}=NAME"))
+    return rules, units
+
+
+def _by_capacity(quantity: str, rule: ColumnMapping, highest: float, site: Site | None) -> ColumnMapping | None:
+    """Return a switch (0 to 1, or to 100) as a rate of what the site can do, or None where that is not known."""
+    if site is None or not 0.0 < highest <= 100.0 or (highest > 1.0 and highest < 90.0):
+        return None
+    share = 1.0 if highest <= 1.0 else 0.01
+    if quantity == "co2_dosing" and site.greenhouse.co2_dosing_capacity > 0.0:
+        return replace(rule, scale=share * site.greenhouse.co2_dosing_capacity)
+    if quantity == "lamp_power" and site.greenhouse.lamps is not None:
+        return replace(rule, scale=share * site.greenhouse.lamps.power)
+    return None
+
+
+def _add_lamp_power(rules: dict[str, ColumnMapping], units: dict[str, str], site: Site | None, draft: _Draft) -> None:
+    """Give the lamps' power where the log tells only that they burn, and the site how strong they are."""
+    if "lamp_on" not in rules or "lamp_power" in rules or site is None or site.greenhouse.lamps is None:
+        return
+    rule = rules["lamp_on"]
+    power = site.greenhouse.lamps.power
+    rules["lamp_power"] = replace(rule, scale=rule.scale * power)
+    units["lamp_power"] = units["lamp_on"]
+    draft.notes.append(f"lamp_power is {power:g} W m-2, as the site says, where {rule.column!r} says that lamps burn")
+
+
+def _ask_unit(quantity: str, column: str, draft: _Draft) -> None:
+    known = tuple(dict.fromkeys(unit.name for unit in vocabulary.units()[names.dimension(quantity)].values()))
+    option = f"--unit {quantity}={known[0]!r}"
+    draft.questions.append(Question(f"units:{quantity}", f"in which unit is {column!r} ({quantity})?", known, option))
+
+
+def _marks(body: _Body, rules: Mapping[str, ColumnMapping]) -> tuple[str, ...]:
+    """Return the texts in mapped columns that are neither numbers nor words: marks of a missing value."""
+    found = dict.fromkeys(mark for rule in rules.values() for mark in body.texts(rule.column).marks)
+    return tuple(mark for mark in found if mark not in MISSING)

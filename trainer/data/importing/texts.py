@@ -1,0 +1,45 @@
+"""What the cells of a column are: numbers, nothing, words for on and off, or marks of a fault."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from igrow.trainer.data import vocabulary
+from igrow.trainer.data.mapping import MISSING
+from igrow.trainer.data.number_texts import number
+
+
+@dataclass(frozen=True)
+class ColumnTexts:
+    """A column by the kinds of its cells."""
+
+    numeric: float
+    """Share of cells that are numbers."""
+    missing: float
+    """Share of cells that say that there is none."""
+    words: Mapping[str, float]
+    """Words for on and off -> 1 and 0."""
+    marks: tuple[str, ...]
+    """Other texts."""
+    highest: float
+    """Largest number, nan without any."""
+
+
+def column_texts(cells: Sequence[str], decimal: str) -> ColumnTexts:
+    """Return what the cells of a column are; `decimal` is the sign before decimals."""
+    count = Counter(cells)
+    total = max(len(cells), 1)
+    values = {text: value for text in count if text not in MISSING and (value := number(text, decimal)) is not None}
+    rest = [text for text in count if text not in values and text not in MISSING]
+    words = {
+        text: vocabulary.switch_words()[text.lower()] for text in rest if text.lower() in vocabulary.switch_words()
+    }
+    return ColumnTexts(
+        sum(count[text] for text in values) / total,
+        sum(count[text] for text in count if text in MISSING) / total,
+        words,
+        tuple(text for text in rest if text not in words),
+        max(values.values(), default=float("nan")),
+    )

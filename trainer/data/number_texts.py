@@ -1,0 +1,29 @@
+"""Numbers as exports write them: decimal commas, thousands, units behind them."""
+
+from __future__ import annotations
+
+import re
+
+_PLAIN = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)")
+_POWER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)[eE][-+]?\d+")
+_WITH_UNIT = re.compile(r"([-+]?[\d.,'\u00a0\u202f ]*\d[.,]?)\s*([^\d\s][^\d]*(?:m[23²³])?[^\d]*)?")
+
+
+def number(text: str, decimal: str) -> float | None:
+    """Return the number of a text, which a unit may follow, or None where it is none.
+
+    Args:
+        text: such as ``1.234,5``, ``21.5 °C`` or ``8e-06``.
+        decimal: the sign before its decimals, ``.`` or ``,``; the other one and blanks are between thousands.
+    """
+    if _POWER.fullmatch(text):
+        return float(text.replace(",", "."))
+    found = _WITH_UNIT.fullmatch(text)
+    if found is None:
+        return float(text) if _PLAIN.fullmatch(text) else None
+    digits = re.sub(r"['\u00a0\u202f ]", "", found[1])
+    group = "." if decimal == "," else ","
+    if decimal in digits or re.fullmatch(rf"[-+]?\d{{1,3}}(\{group}\d{{3}})+", digits):
+        digits = digits.replace(group, "")
+    digits = digits.replace(",", ".")
+    return float(digits) if _PLAIN.fullmatch(digits) else None
