@@ -17,7 +17,7 @@ from igrow.trainer.calibration.evaluation import errors_of, evaluate, summarise
 from igrow.trainer.calibration.holding import fit_holding
 from igrow.trainer.calibration.posterior import prior
 from igrow.trainer.calibration.site_model import fit_site
-from igrow.trainer.data import read_log
+from igrow.trainer.cli.log_arguments import add_log_arguments, log_of
 from igrow.trainer.data.splits import alternate_weeks, split_weeks
 from igrow.trainer.diagnosis.deployed import learn_misfit
 from igrow.trainer.export.bundle import read_hybrid_model, write_hybrid_bundle
@@ -28,9 +28,7 @@ EXAMPLE = "igrow-trainer calibrate DATA/agc2019 --compartment Reference --out ou
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's options."""
-    parser.add_argument("log", type=Path, nargs="+", help="telemetry files, or the folder of a data set or exchange")
-    parser.add_argument("--compartment", help="its name, where a data set has several")
-    parser.add_argument("--site", type=Path, help="site file; a known data set brings its own")
+    add_log_arguments(parser)
     parser.add_argument(
         "--bundle", type=Path, help="bundle whose parameters are known before (default: the built-in one)"
     )
@@ -44,11 +42,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Fit, test, write the bundle."""
     if arguments.out.exists():
         raise IgrowError(f"{arguments.out} exists already; name a new folder")
-    place = arguments.log[0] if len(arguments.log) == 1 else arguments.log
-    log = read_log(place, arguments.site, compartment=arguments.compartment)
+    log = log_of(arguments)
+    log.require("a calibration")
     site = log.greenhouse
-    for note in log.notes:
-        print(f"note: {note}")
     model = read_hybrid_model(read_bundle(arguments.bundle or default_bundle_folder()), site)
     # What the built-in bundle knows is a virtual greenhouse; a real one begins with the site's description.
     knowledge = model.posterior if arguments.bundle else prior(nominal(site))

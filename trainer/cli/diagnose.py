@@ -12,7 +12,7 @@ from pathlib import Path
 from igrow.core.bundle import Bundle, default_bundle_folder, read_bundle
 from igrow.core.errors import IgrowError
 from igrow.core.site import Site
-from igrow.trainer.data import read_log
+from igrow.trainer.cli.log_arguments import add_log_arguments, log_of
 from igrow.trainer.diagnosis.correction import corrected_model
 from igrow.trainer.diagnosis.deployed import Deployed, from_manifest
 from igrow.trainer.diagnosis.diagnose import Evidence, diagnose
@@ -24,10 +24,8 @@ EXAMPLE = "igrow-trainer diagnose logs/ --bundle bundle/ --site site.yaml --out 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("log", nargs="+", type=Path, metavar="LOG", help="telemetry: CSV, Parquet, or a folder of them")
+    add_log_arguments(parser)
     parser.add_argument("--bundle", type=Path, help="the bundle in force (default: the built-in one)")
-    parser.add_argument("--site", type=Path, help="the site's YAML file; a known data set brings its own")
-    parser.add_argument("--compartment", help="its name, where a data set has several")
     parser.add_argument("--out", type=Path, required=True, help="folder for diagnosis.json, report.html and the bundle")
     parser.add_argument("--without", action="append", default=[], metavar="EFFECT", help="an effect not to consider")
     parser.add_argument("--seed", type=int, default=0, help="of random flips and bootstraps")
@@ -39,8 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
     Raises:
         IgrowError: a file cannot be read or the log cannot be diagnosed.
     """
-    place = arguments.log[0] if len(arguments.log) == 1 else arguments.log
-    log = read_log(place, arguments.site, compartment=arguments.compartment)
+    log = log_of(arguments)
     site = log.greenhouse
     bundle = read_bundle(arguments.bundle or default_bundle_folder())
     deployed = from_manifest(bundle.manifest, site)

@@ -66,7 +66,7 @@ def _prepared(source: Source, site: Site | None, place: str, accept: Collection[
     # What a wrong unit pushes out of range is no sensor's fault.
     wrong = {name for fault in faults for name in fault.quantity.split(", ")}
     faults += [fault for fault in screened.faults if fault.quantity not in wrong]
-    notes = [*source.notes, *accepted, *screened.notes, *_grid_notes(telemetry, table)]
+    notes = [*source.notes, *accepted, *screened.notes, *_grid_notes(telemetry, table), *_unjudged(table, site)]
     return Log(
         source.name,
         table,
@@ -78,6 +78,20 @@ def _prepared(source: Source, site: Site | None, place: str, accept: Collection[
         source.harvests,
         source.resources,
     )
+
+
+def _unjudged(table: Telemetry, site: Site | None) -> list[str]:
+    """Say what of a log nobody can judge, and why."""
+
+    def told(name: str) -> bool:
+        return name in table and bool(np.isfinite(table[name]).any())
+
+    notes = []
+    if site is not None and site.greenhouse.co2_dosing_capacity > 0.0 and told("air_co2") and not told("co2_dosing"):
+        notes.append("air_co2 cannot be judged: the log does not tell how much CO2 was dosed")
+    if not told("global_radiation"):
+        notes.append("without global_radiation the log's clock could not be held against the sun")
+    return notes
 
 
 def _grid_notes(telemetry: Telemetry, table: Telemetry) -> list[str]:

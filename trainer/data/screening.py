@@ -24,6 +24,15 @@ STUCK_HOURS: Mapping[str, float] = {
     "sky_temperature": 12.0,
 }
 """Hours after which an unchanged reading is no reading (saturated humidity aside)."""
+COARSE: Mapping[str, float] = {
+    "air_temperature": 0.25,
+    "outdoor_temperature": 0.25,
+    "sky_temperature": 0.9,
+    "air_humidity": 0.9,
+    "outdoor_humidity": 0.9,
+    "air_co2": 9.0,
+}
+"""A column in steps of so much may well stand still for longer: three times the hours."""
 SPIKE: Mapping[str, float] = {
     "air_temperature": 4.0,
     "air_humidity": 15.0,
@@ -81,9 +90,8 @@ def screen(telemetry: Telemetry) -> Screening:
         if name in SPIKE:
             checks.append(("spike", _spikes(np.where(wrong, np.nan, values), SPIKE[name])))
         if name in STUCK_HOURS:
-            checks.append(
-                ("stuck", _stuck(telemetry.time, values, STUCK_HOURS[name], saturated=name.endswith("humidity")))
-            )
+            hours = STUCK_HOURS[name] * (3.0 if _resolution(values) >= COARSE[name] else 1.0)
+            checks.append(("stuck", _stuck(telemetry.time, values, hours, saturated=name.endswith("humidity"))))
         before = int(np.isfinite(raw).sum())
         for reason, rows in checks:
             stretches = [
@@ -135,6 +143,13 @@ def _spikes(values: Floats, size: float) -> NDArray[np.bool_]:
         with np.errstate(invalid="ignore"):
             rows[1:-1] = (np.minimum(np.abs(before), np.abs(after)) > size) & (before * after > 0.0)
     return rows
+
+
+def _resolution(values: Floats) -> float:
+    """Return the step in which a column is written: the smallest change that is not rare (0 without any)."""
+    change = np.abs(np.diff(values[np.isfinite(values)]))
+    change = change[change > 0.0]
+    return float(np.quantile(change, 0.02)) if len(change) else 0.0
 
 
 def _stuck(time: NDArray[np.datetime64], values: Floats, hours: float, *, saturated: bool) -> NDArray[np.bool_]:

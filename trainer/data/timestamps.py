@@ -13,7 +13,7 @@ import numpy as np
 
 from igrow.core.local_time import from_local
 from igrow.core.telemetry import Times
-from igrow.trainer.data.vocabulary import month_names
+from igrow.trainer.data.vocabulary import folded, month_names
 
 ISO, EXCEL, UNIX, UNIX_MS = "ISO 8601", "excel", "unix", "unix ms"
 _EXCEL_EPOCH = datetime.datetime(1899, 12, 30)
@@ -73,9 +73,9 @@ def _iso(text: str) -> datetime.datetime:
 
 def _formatted(text: str, form: str) -> datetime.datetime:
     if "%b" in form:
-        text = _LETTERS.sub(lambda found: month_names().get(found[0].lower(), found[0]), text)
+        text = _LETTERS.sub(lambda found: month_names().get(folded(found[0]), found[0]), text)
     if "%p" in form:
-        text = re.sub(r"\b([ap])\.?\s?m\.?(?=\W|$)", r"\1m", text, flags=re.IGNORECASE)
+        text = re.sub(r"\b([ap])\.\s?m\.?", r"\1m", text, flags=re.IGNORECASE)
     try:
         return datetime.datetime.strptime(text, form)
     except ValueError:

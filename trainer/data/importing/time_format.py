@@ -153,7 +153,7 @@ def _written_forms(texts: Sequence[str]) -> list[str]:
         parts = list(tokens[: date[2] + 1])
         fits = True
         for position, sign in zip(date, order, strict=True):
-            long = len(tokens[position]) == 4
+            long = tokens[position].isdigit() and len(tokens[position]) == 4
             fits &= (sign == "Y" or not long) and ((sign == "%b") == (position in months))
             parts[position] = ("%Y" if long else "%y") if sign == "Y" else sign
         form = _clock_after(tokens, date[2] + 1, "".join(parts)) if fits else None
@@ -165,7 +165,9 @@ def _written_forms(texts: Sequence[str]) -> list[str]:
 def _clock_after(tokens: Sequence[str], start: int, form: str) -> str | None:
     """Return a form with the time of day that follows the date, or None for what is no time of day."""
     signs = iter(("%H", "%M", "%S", "%f"))
-    half = any(re.fullmatch(r"[ap]\.?m?\.?", token, re.IGNORECASE) for token in tokens[start:])
+    rest = re.sub(r"([ap])\.\s?m\.?", r"\1m", "".join(tokens[start:]), flags=re.IGNORECASE)
+    tokens, start = _TOKEN.findall(rest), 0
+    half = any(re.fullmatch(r"[ap]m", token, re.IGNORECASE) for token in tokens)
     compact = [token for token in tokens[start:] if token.isdigit()]
     if len(compact) == 1 and len(compact[0]) in (4, 6):
         signs = iter(("%H%M" if len(compact[0]) == 4 else "%H%M%S",))
@@ -175,11 +177,9 @@ def _clock_after(tokens: Sequence[str], start: int, form: str) -> str | None:
             if sign is None:
                 return None
             form += "%I" if half and sign == "%H" else sign
-        elif re.fullmatch(r"[ap]m?|m", token, re.IGNORECASE):
-            form += "%p" if not form.endswith("%p") else ""
         else:
-            form += token
-    return re.sub(r"%p\.?\s?\.?", "%p", form)
+            form += "%p" if re.fullmatch(r"[ap]m", token, re.IGNORECASE) else token
+    return form
 
 
 def _midnight(texts: Sequence[str], form: str) -> bool:

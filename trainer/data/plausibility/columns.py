@@ -22,6 +22,7 @@ CLOSED_IN_LIGHT, CLOSED_BY_DAY, OPEN_AT_NIGHT = 90.0, 75.0, 40.0
 the second there and less than the third in the dark."""
 BRIGHT = 200.0
 """W m-2."""
+_LEAST_ROWS = 48
 WARM_NIGHT = 14.0
 """degC outside: below it a screen that is there would be closed at night, not by day."""
 
@@ -82,10 +83,11 @@ def _by_day(day: NDArray[np.int64], values: Floats) -> Floats:
 def screens_reversed(telemetry: Telemetry, site: Site) -> list[DataFault]:
     """Return the screens that are closed in bright light and open in cold nights: their 100 means open."""
     elevation = sun.elevation(telemetry.time, site.latitude, site.longitude)
-    if "global_radiation" in telemetry and np.isfinite(telemetry["global_radiation"]).any():
-        bright = np.nan_to_num(telemetry["global_radiation"]) > BRIGHT
-    else:
-        bright = elevation > 25.0
+    bright = elevation > 15.0
+    if "global_radiation" in telemetry:
+        seen = np.nan_to_num(telemetry["global_radiation"]) > BRIGHT
+        # A radiation in another unit is never so bright.
+        bright = seen if seen.sum() >= _LEAST_ROWS else bright
     dark = elevation < -6.0
     if "outdoor_temperature" in telemetry:
         dark &= np.nan_to_num(telemetry["outdoor_temperature"], nan=WARM_NIGHT) < WARM_NIGHT
@@ -95,7 +97,7 @@ def screens_reversed(telemetry: Telemetry, site: Site) -> list[DataFault]:
             continue
         values = telemetry[name]
         by_day, at_night = values[bright & np.isfinite(values)], values[dark & np.isfinite(values)]
-        if min(len(by_day), len(at_night)) < 48:
+        if min(len(by_day), len(at_night)) < _LEAST_ROWS:
             continue
         day, night = float(by_day.mean()), float(at_night.mean())
         if day > CLOSED_IN_LIGHT or (day > CLOSED_BY_DAY and night < OPEN_AT_NIGHT):

@@ -35,7 +35,7 @@ JUMP = (0.6, 1.4)
 """Hours by which noon jumps where clocks change."""
 LEAST_LENGTH = 0.6
 """Of the mean vector of the radiation's hours, over that of the sun's, below which it is no daylight."""
-DARKEST, BRIGHTEST = 0.38, 1.25
+DARKEST, BRIGHTEST = 0.38, 1.12
 """Clearness that a clear sky exceeds, and never exceeds."""
 CLEAR = 0.8
 """Usual clearness of a clear sky."""

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from igrow.core.errors import IgrowError
@@ -37,6 +36,8 @@ def read(path: Path) -> Any:
     Raises:
         IgrowError: the file cannot be read as a table.
     """
+    import pandas as pd  # noqa: PLC0415  (slow to import)
+
     try:
         if path.suffix == ".parquet":
             frame = pd.read_parquet(path)

@@ -1,0 +1,143 @@
+"""The plausibility gate: what is wrong with a log is named as what it is, with its mend; a clean log passes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.plausibility import SPOILS, Clean, Spoil, false_alarms, real_logs
+from igrow.core.site import Site
+from igrow.core.telemetry import Telemetry, to_grid
+from igrow.core.yaml_schema import parse
+from igrow.trainer.data import prepare_log
+from igrow.trainer.data.export import read
+from igrow.trainer.data.mapping import ExportMapping
+from igrow.trainer.data.plausibility import find_faults
+from igrow.trainer.data.plausibility.sums import running_sum
+from igrow.trainer.data.rows import merge
+from tests.virtual_log import virtual_log
+
+SITE = Site(name="virtual", latitude=52.0, longitude=4.5, time_zone="Europe/Amsterdam")
+
+
+@pytest.fixture(scope="module")
+def clean() -> Clean:
+    return Clean("virtual", SITE, virtual_log(20, seed=5))
+
+
+def test_a_clean_log_passes_at_every_pace(clean: Clean) -> None:
+    for step in (300, 900, 1800, 3600):
+        assert find_faults(to_grid(clean.telemetry, step), SITE) == ()
+
+
+@pytest.mark.parametrize("name", SPOILS)
+def test_a_fault_is_named_as_what_it_is_with_its_mend(clean: Clean, name: str) -> None:
+    spoil: Spoil = SPOILS[name]
+    found = find_faults(spoil.spoilt(clean), SITE)
+    assert {fault.kind for fault in found} & set(spoil.kinds), [str(fault) for fault in found]
+    assert {fault.kind for fault in found} <= set(spoil.kinds), [str(fault) for fault in found]
+    assert all(fault.mend for fault in found)
+
+
+@pytest.mark.parametrize(
+    "name", ["air temperature in degF", "air temperature in kelvin", "humidity 0 to 1", "CO2 in %", "wind in km/h"]
+)
+def test_a_certain_remedy_gives_the_log_back(clean: Clean, name: str) -> None:
+    spoilt = SPOILS[name].spoilt(clean)
+    (fault,) = find_faults(spoilt, SITE)
+    assert fault.remedy is not None
+    mended = spoilt[fault.quantity] * fault.remedy.scale + fault.remedy.offset
+    np.testing.assert_allclose(mended, clean.telemetry[fault.quantity], rtol=1e-6, atol=1e-6)
+
+
+def test_a_sum_of_radiation_names_its_unit(clean: Clean) -> None:
+    (fault,) = find_faults(SPOILS["radiation as a sum of the day"].spoilt(clean), SITE)
+    assert "by its size in J cm-2" in fault.sentence
+    assert fault.remedy is not None
+    assert (fault.remedy.amount, fault.remedy.scale) == ("day", 1e4)
+
+
+def test_wall_time_read_as_utc_names_the_zone_of_the_site(clean: Clean) -> None:
+    (fault,) = find_faults(SPOILS["wall time read as UTC"].spoilt(clean), SITE)
+    assert fault.kind == "local_time"
+    assert "Europe/Amsterdam" in fault.mend
+
+
+def test_a_clock_that_jumps_where_clocks_change_is_wall_time() -> None:
+    log = virtual_log(40, seed=6, step=900.0)
+    spring = Telemetry(log.time + (np.datetime64("2020-03-09") - log.time[0].astype("datetime64[D]")), log.columns)
+    # The virtual sun is that of February: the clock is off by its equation of time alone, a few minutes.
+    later = spring.time >= np.datetime64("2020-03-29T01:00:00")
+    shifted = merge(spring.time + np.where(later, 3600, 0).astype("timedelta64[s]"), spring.columns).telemetry
+    kinds = [fault.kind for fault in find_faults(shifted, SITE)]
+    assert kinds == ["local_time"]
+
+
+def test_rows_of_two_compartments_under_each_other_contradict_themselves(clean: Clean) -> None:
+    table = clean.telemetry
+    time = np.concatenate([table.time, table.time])
+    columns = {name: np.concatenate([values, values]) for name, values in table.columns.items()}
+    columns["air_temperature"][len(table) :] += 2.0
+    (fault,) = merge(time, columns).faults
+    assert fault.kind == "repeated_times"
+    assert "air_temperature differs by 2" in fault.sentence
+
+
+def test_rows_that_stand_twice_are_said_and_no_fault(clean: Clean) -> None:
+    table = clean.telemetry
+    merged = merge(np.repeat(table.time, 2), {name: np.repeat(values, 2) for name, values in table.columns.items()})
+    assert merged.faults == ()
+    assert any("have the time of another row" in note for note in merged.notes)
+
+
+def test_rows_in_any_order_are_put_in_order(clean: Clean) -> None:
+    table = clean.telemetry
+    back = merge(table.time[::-1], {name: values[::-1] for name, values in table.columns.items()})
+    assert (back.telemetry.time == table.time).all()
+    assert any("newest to the oldest" in note for note in back.notes)
+    order = np.random.default_rng(0).permutation(len(table))
+    mixed = merge(table.time[order], {name: values[order] for name, values in table.columns.items()})
+    np.testing.assert_array_equal(mixed.telemetry["air_co2"], table["air_co2"])
+    assert any("put in the order of time" in note for note in mixed.notes)
+
+
+def test_readings_on_few_days_only_are_too_sparse(clean: Clean) -> None:
+    air = np.full(len(clean.telemetry), np.nan)
+    air[: 2 * 288] = clean.telemetry["air_temperature"][: 2 * 288]
+    (fault,) = find_faults(clean.telemetry.with_columns({"air_temperature": air}), SITE)
+    assert (fault.kind, fault.quantity) == ("sparse", "air_temperature")
+
+
+def test_an_accepted_fault_is_a_note(clean: Clean) -> None:
+    late = SPOILS["clock 2 h early"].spoilt(clean)
+    assert prepare_log(late, SITE).faults
+    from igrow.trainer.data.reading import _prepared
+    from igrow.trainer.data.source import Source
+
+    log = _prepared(Source("late", late), SITE, "here", accept=("clock", "local_time"))
+    assert log.faults == ()
+    assert any(note.startswith("accepted although noon comes") for note in log.notes)
+
+
+def test_no_rate_is_taken_for_a_sum(clean: Clean) -> None:
+    for step in (300, 3600):
+        table = to_grid(clean.telemetry, step)
+        assert all(running_sum(table.time, values) is None for values in table.columns.values())
+
+
+def test_sums_since_midnight_become_rates(tmp_path: Path, clean: Clean) -> None:
+    table = SPOILS["radiation as a sum of the day"].spoilt(clean)
+    lines = [f"{time}Z,{value:.3f}" for time, value in zip(table.time, table["global_radiation"], strict=True)]
+    (tmp_path / "export.csv").write_text("t,sum\n" + "\n".join(lines) + "\n")
+    rule = "{global_radiation: {column: sum, amount: day, scale: 10000}}"
+    text = f"time: {{column: t, time_zone: Europe/Amsterdam}}\ncolumns: {rule}\n"
+    rates = read(tmp_path / "export.csv", parse(text, ExportMapping)).telemetry["global_radiation"]
+    np.testing.assert_allclose(rates[1:], clean.telemetry["global_radiation"][1:], atol=0.1)
+
+
+def test_real_logs_raise_no_alarm(data_folder: Path) -> None:
+    logs = [log for log in real_logs(data_folder) if "from" not in log.name or "28 days" in log.name]
+    assert len(logs) > 15
+    assert false_alarms(logs) == []
