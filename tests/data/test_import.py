@@ -161,6 +161,7 @@ def test_a_folder_of_exports_shares_one_mapping(tmp_path: Path, truth: Telemetry
         ("", "no row has a time and numbers"),
         ("just words\nand more of them\n", "no row has a time and numbers"),
         ("a,b\n1,2\n3,4\n", "no row has a time and numbers"),
+        ("t,T,RH\n2020-01-01 00:00,20,5,80,1\n2020-01-01 00:05,20,6,80,2\n", "5 cells where the header has 3"),
         ("2020-01-01 00:00,20\n2020-01-01 00:05,21\n", "no line names the columns"),
     ],
 )

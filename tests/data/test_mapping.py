@@ -68,7 +68,7 @@ def test_an_export_that_does_not_fit_its_mapping_is_refused(tmp_path: Path, text
     [
         ("time: {column: t}\ncolumns:\n  air_temprature: {column: T}\n", r"mapping.yaml:3:3: .*air_temperature"),
         ('decimal: "x"\ncolumns: {}\n', "decimal is 'x'"),
-        ('decimal: ","\ndelimiter: ","\ncolumns: {}\n', "not the delimiter"),
+        ('delimiter: ";;"\ncolumns: {}\n', "one character is needed"),
     ],
 )
 def test_a_mapping_that_means_nothing_is_refused_with_its_place(tmp_path: Path, text: str, message: str) -> None:
@@ -76,3 +76,21 @@ def test_a_mapping_that_means_nothing_is_refused_with_its_place(tmp_path: Path, 
     path.write_text(text)
     with pytest.raises(SchemaError, match=message):
         load(path)
+
+
+def test_quoted_decimal_commas_between_commas_are_read(tmp_path: Path) -> None:
+    mapping = 'decimal: ","\ntime: {column: t, time_zone: UTC}\ncolumns: {air_temperature: {column: T}}\n'
+    telemetry = export(tmp_path, 't,T\n2020-01-01 00:00,"21,5"\n2020-01-01 00:05,"1.021,5"\n', mapping)
+    assert telemetry["air_temperature"].tolist() == [21.5, 1021.5]
+
+
+def test_a_row_with_more_cells_than_names_is_refused_with_its_line(tmp_path: Path) -> None:
+    mapping = "time: {column: t}\ncolumns: {air_temperature: {column: T}}\n"
+    with pytest.raises(IgrowError, match=r"export.csv:3: 3 cells where the header has 2"):
+        export(tmp_path, "t,T\n2020-01-01T00:00Z,20\n2020-01-01T00:05Z,20,5\n", mapping)
+
+
+def test_columns_of_one_name_are_told_apart(tmp_path: Path) -> None:
+    mapping = 'time: {column: t}\ncolumns: {air_temperature: {column: T}, outdoor_temperature: {column: "T (2)"}}\n'
+    telemetry = export(tmp_path, "t,T,T\n2020-01-01T00:00Z,20,5\n", mapping)
+    assert (telemetry["air_temperature"][0], telemetry["outdoor_temperature"][0]) == (20.0, 5.0)

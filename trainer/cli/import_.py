@@ -83,6 +83,8 @@ def _import(given: Path, site: Site | None, answers: Answers, arguments: argpars
     target = mapping_path(path, given)
     if target.exists() and not (arguments.force or arguments.dry_run):
         raise IgrowError(f"{target} exists already: --force replaces it")
+    if sys.stderr.isatty():
+        print(f"reading {path}", file=sys.stderr)
     proposal, open_ones = _asked(path, site, answers)
     checked = check(proposal, site)
     print("\n".join(understood(proposal, checked)))

@@ -46,7 +46,11 @@ def read(path: Path, mapping: ExportMapping) -> Merged:
         IgrowError: a column is not there, or a cell is no number or no time.
     """
     cells = read_cells(path, delimiter=mapping.delimiter, encoding=mapping.encoding, sheet=mapping.sheet)
-    table = chosen_rows(as_table(cells, mapping.header, mapping.first_row), mapping.only)
+    return read_table(chosen_rows(as_table(cells, mapping.header, mapping.first_row), mapping.only), mapping)
+
+
+def read_table(table: ExportTable, mapping: ExportMapping) -> Merged:
+    """Return the telemetry of an export's chosen rows; raises IgrowError as `read` does."""
     if mapping.long is not None:
         return _read_long(table, mapping)
     time = times(table, mapping)
@@ -72,6 +76,11 @@ def as_table(cells: Cells, header: Sequence[int] = (1,), first_row: int | None =
         name = " ".join(parts)
         seen = sum(other == name or re.fullmatch(re.escape(name) + r" \(\d+\)", other) is not None for other in names)
         names.append(f"{name} ({seen + 1})" if seen and name else name)
+    for row, line in body:
+        if any(row[width:]):
+            told = f"{len(row)} cells where the header has {width}"
+            hint = "where decimals have commas, cells need another sign between them"
+            raise IgrowError(f"{cells.path}:{line}: {told}: {hint}")
     columns: dict[str, Sequence[str]] = {}
     for position, name in enumerate(names):
         texts = [row[position] if position < len(row) else "" for row, _ in body]

@@ -95,8 +95,8 @@ class ExportMapping:
     def __post_init__(self) -> None:
         if len(self.delimiter) != 1:
             raise SettingError(f"delimiter is {self.delimiter!r}: one character is needed", "delimiter")
-        if self.decimal not in {".", ","} or self.decimal == self.delimiter:
-            raise SettingError(f"decimal is {self.decimal!r}: . or , is needed, and not the delimiter", "decimal")
+        if self.decimal not in {".", ","}:
+            raise SettingError(f"decimal is {self.decimal!r}: . or , is needed", "decimal")
         if not self.header:
             raise SettingError("header is empty: the line with the columns' names is needed", "header")
 

@@ -42,7 +42,7 @@ def check(proposal: Proposal, site: Site | None) -> Checked:
     mapping = proposal.mapping
     mended: list[str] = []
     for _ in range(_ROUNDS):
-        merged = export.read(proposal.path, mapping)
+        merged = export.read_table(proposal.table, mapping)
         faults = (*merged.faults, *find_faults(merged.telemetry, site))
         better = _on_another_clock(proposal, mapping, faults, site, mended) or _remedied(mapping, faults, mended)
         if better is None:
@@ -61,11 +61,11 @@ def _on_another_clock(
     wrong = [fault for fault in faults if fault.kind in CLOCK]
     if not wrong:
         return None
-    for zone in _candidates(site, export.read(proposal.path, mapping)):
+    for zone in _candidates(site, export.read_table(proposal.table, mapping)):
         if zone == mapping.time.time_zone:
             continue
         moved = replace(mapping, time=replace(mapping.time, time_zone=zone))
-        merged = export.read(proposal.path, moved)
+        merged = export.read_table(proposal.table, moved)
         if not any(fault.kind in CLOCK for fault in find_faults(merged.telemetry, site)):
             mended.append(f"times are {zone}: {wrong[0].sentence} where they are taken for {mapping.time.time_zone}")
             return moved
