@@ -281,9 +281,9 @@ def parse_numbers(
 
 
 def parse_times(path: str | Path, cells: Sequence[str], lines: Sequence[int]) -> Times:
-    """Return a column of times, UTC, of texts in ISO 8601 with a zone; raises TelemetryError with the line of one that is none.
+    """Return a column of times, UTC, of texts in ISO 8601 with a zone; that of `write_csv` is read at once.
 
-    The form that `write_csv` writes is read at once.
+    Raises TelemetryError with the line of one that is none.
     """
     try:
         if all(cell.endswith("Z") for cell in cells):

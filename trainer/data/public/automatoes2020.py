@@ -38,7 +38,7 @@ class Champion:
 def read(folder: Path) -> Champion:
     """Read the folder's two files; raises IgrowError where one is absent or holds no daily table."""
     try:
-        sheet = pd.read_excel(folder / WORKBOOK, sheet_name=0, header=None)
+        sheet = pd.read_excel(folder / WORKBOOK, sheet_name=0, header=None, engine="calamine")
         simulated = pd.read_csv(folder / SIMULATED, index_col=0)
     except (OSError, ValueError) as error:
         raise IgrowError(f"{folder}: {WORKBOOK} and {SIMULATED} are needed ({error})") from error

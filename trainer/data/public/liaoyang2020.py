@@ -54,7 +54,7 @@ def read(folder: Path) -> Pilot:
         raise IgrowError(f"{folder}: production.csv and Income.csv hold different days")
     path = folder / "overall_cost.xlsx"
     try:
-        sheets = pd.read_excel(path, sheet_name=list(COSTS))
+        sheets = pd.read_excel(path, sheet_name=list(COSTS), engine="calamine")
     except (OSError, ValueError) as error:
         raise IgrowError(f"{path}: needs the sheets {', '.join(COSTS)} ({error})") from error
     costs = {
