@@ -22,9 +22,9 @@ import numpy as np
 from igrow.core.exchange import FolderPlace, Seal, pack_segment
 from igrow.core.quantities import QUANTITIES
 from igrow.core.telemetry import Telemetry
+from igrow.trainer.data import read_log
 from igrow.trainer.fleet.runner import run_tasks
 from igrow.trainer.fleet.tasks import Ending, Task
-from igrow.trainer.data import read_log
 from igrow.trainer.service.archive import Archive
 from igrow.trainer.service.collecting import collect
 
