@@ -19,7 +19,7 @@ _VERDICTS = {
     "named": "The model lacked something, and it has a name.",
     "ambiguous": "The model lacks something; more than one cause would explain it.",
     "unexplained": "Something real goes on that no known cause explains.",
-    "data_fault": "The log cannot be diagnosed: a sensor that is needed does not work.",
+    "data_fault": "The log cannot be diagnosed as it stands: the data are at fault, not the greenhouse.",
 }
 _HORIZON_NAMES = {"1_step": "1 step", "24_h": "24 h", "7_d": "7 days"}
 
