@@ -52,8 +52,8 @@ class Greenhouse:
     """A log, its record and setpoints."""
 
     def __init__(self, log: Log) -> None:
-        self.log, self.site = log, log.greenhouse
-        self.record: Record = site_record(log.telemetry, log.greenhouse, STEP)
+        self.log, self.site = log, log.known_site
+        self.record: Record = site_record(log.telemetry, log.known_site, STEP)
         self.setpoints, self.inferred = setpoint_columns(log.telemetry, self.record)
         self.week = weeks(self.record.time)
 

@@ -64,7 +64,7 @@ def compartments(data: Path) -> Iterator[Compartment]:
         start = log.telemetry.time[0] + np.timedelta64(14, "D")
         middle = start + np.timedelta64(CALIBRATION_DAYS, "D")
         end = middle + np.timedelta64(DIAGNOSIS_DAYS, "D")
-        yield Compartment(f"{folder} {name}", log.greenhouse, log.select(start, middle), log.select(middle, end))
+        yield Compartment(f"{folder} {name}", log.known_site, log.select(start, middle), log.select(middle, end))
 
 
 def deploy(log: Log, site: Site) -> Deployed:

@@ -44,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise IgrowError(f"{arguments.out} exists already; name a new folder")
     log = log_of(arguments)
     log.require("a calibration")
-    site = log.greenhouse
+    site = log.known_site
     model = read_hybrid_model(read_bundle(arguments.bundle or default_bundle_folder()), site)
     # What the built-in bundle knows is a virtual greenhouse; a real one begins with the site's description.
     knowledge = model.posterior if arguments.bundle else prior(nominal(site))

@@ -38,7 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
         IgrowError: a file cannot be read or the log cannot be diagnosed.
     """
     log = log_of(arguments)
-    site = log.greenhouse
+    site = log.known_site
     bundle = read_bundle(arguments.bundle or default_bundle_folder())
     deployed = from_manifest(bundle.manifest, site)
     diagnosis, evidence = diagnose(log, site, deployed, without=arguments.without, seed=arguments.seed)

@@ -34,5 +34,5 @@ def log_of(arguments: argparse.Namespace) -> Log:
     )
     for note in log.notes:
         print(f"note: {note}", file=sys.stderr)
-    assert log.greenhouse  # raises where the site is not known
+    assert log.known_site  # raises where the site is not known
     return log

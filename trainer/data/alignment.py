@@ -23,6 +23,8 @@ SHIFTS = (0.0, 0.5, 1.0)
 """Rows by which actuators are read ahead."""
 _DAYS = 14
 """Days that suffice to tell."""
+_LEAST_SCATTER = 1e-9
+"""Of a log without any noise."""
 _MARGIN = 0.01
 """Fall of the log of the scatter that a reading ahead must bring."""
 
@@ -49,9 +51,9 @@ def best_shift(telemetry: Telemetry, site: Site, parameters: Mapping[str, float]
         total = 0.0
         for name in measurement.PREDICTED:
             error = shown[name][0] - record.measured[name][starts + 1]
-            if np.isfinite(error).any():
-                change = np.diff(error)
-                total += float(np.log(np.nanmean(np.abs(change))))
+            change = np.abs(np.diff(error))
+            if np.isfinite(change).any():
+                total += float(np.log(max(np.nanmean(change), _LEAST_SCATTER)))
         scatter.append(total)
     best = int(np.argmin(scatter))
     return SHIFTS[best] if scatter[best] < scatter[0] - _MARGIN else 0.0

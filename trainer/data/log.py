@@ -68,7 +68,7 @@ class Log:
         return float((time[-1] - time[0]).astype(np.int64)) / 86_400.0 if len(time) else 0.0
 
     @property
-    def greenhouse(self) -> Site:
+    def known_site(self) -> Site:
         """The site; raises IgrowError where it is not known."""
         if self.site is None:
             raise IgrowError(f"{self.name}: this log does not tell its greenhouse: give the site file with --site")
@@ -101,7 +101,7 @@ class Log:
 
     def best_shift(self, parameters: Mapping[str, float]) -> float:
         """Return the rows by which the actuators are to be read ahead (`igrow.trainer.data.alignment`)."""
-        return alignment.best_shift(self.telemetry, self.greenhouse, parameters)
+        return alignment.best_shift(self.telemetry, self.known_site, parameters)
 
     def record(self, shift: float = 0.0) -> Record:
         """Return the record on the working grid, its actuators read `shift` rows ahead.
@@ -109,7 +109,7 @@ class Log:
         Raises:
             IgrowError: the site is not known, or the log lacks outdoor or air temperature.
         """
-        return grid_record(self.telemetry, self.greenhouse, shift)
+        return grid_record(self.telemetry, self.known_site, shift)
 
     def to_pandas(self) -> Any:
         """Return the telemetry as a `pandas.DataFrame`, its index the time in UTC."""

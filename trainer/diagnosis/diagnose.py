@@ -365,6 +365,6 @@ def _errors(record: Record, split: Split, stages: Mapping[str, Stage]) -> dict[s
 def _data_fault(log: Log) -> Diagnosis:
     time = log.telemetry.time
     return Diagnosis(
-        log.greenhouse.name, "data_fault", time[0], time[-1], 0, 0, (), {}, log.screened,
+        log.known_site.name, "data_fault", time[0], time[-1], 0, 0, (), {}, log.screened,
         notes=tuple(map(str, log.faults)),
     )  # fmt: skip
