@@ -28,6 +28,7 @@ _BY_KIND = {
     "write": Level.CRITICAL,
     "daemon": Level.CRITICAL,
     "service": Level.NOTICE,
+    "interlock": Level.NOTICE,
 }
 
 

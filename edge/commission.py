@@ -16,6 +16,7 @@ from igrow.edge.bus.plc import Reading, RegisterPlc
 from igrow.edge.configuration import Configuration
 from igrow.edge.guard import GuardedWriter, GuardRules, GuardState, Request, guard
 from igrow.edge.image import Image
+from igrow.edge.point_rules import highest_beat
 from igrow.edge.registers.model import expected_unit
 
 READ_AGAIN = 2.0
@@ -82,7 +83,10 @@ class Commissioning:
         """Walk through all checks; tell whether every one was passed."""
         plc = RegisterPlc(self._configuration.register_map)
         plc.start()
-        writer = GuardedWriter(plc, has_heartbeat="heartbeat" in self._configuration.register_map.points)
+        heartbeat = self._configuration.register_map.points.get("heartbeat")
+        writer = GuardedWriter(
+            plc, has_heartbeat=heartbeat is not None, highest_beat=highest_beat(heartbeat) if heartbeat else 1
+        )
         tell = self._dialogue.tell
         try:
             if not await self._line_is_up(plc):

@@ -11,7 +11,7 @@ from __future__ import annotations
 import datetime
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 from zoneinfo import ZoneInfo
@@ -21,19 +21,20 @@ from igrow.core.bundle import default_bundle_folder
 from igrow.core.errors import IgrowError
 from igrow.core.exchange.address import Address, parse_address
 from igrow.core.local_time import zone
-from igrow.core.quantities import ACTUATORS, QUANTITIES, SETPOINTS
-from igrow.core.site import SetpointLimits, Site, load_site
-from igrow.core.yaml_schema import SettingError, duration, load, place, setting
+from igrow.core.quantities import QUANTITIES, SETPOINTS
+from igrow.core.site import Site, load_site
+from igrow.core.yaml_schema import duration, load, place, setting
 from igrow.edge.climate_alarms import ClimateAlarm
-from igrow.edge.guard import DEFAULT_INTERLOCKS, Bound, GuardRules, Interlock
-from igrow.edge.guard.interlocks import SAFE, InterlockError
+from igrow.edge.guard import DEFAULT_INTERLOCKS, GuardRules
 from igrow.edge.guard.rules import GuardRuleError
+from igrow.edge.guard.writer import HEARTBEAT
+from igrow.edge.guard_settings import GuardSettings, SensorSettings
 from igrow.edge.mqtt.settings import MqttSettings
 from igrow.edge.notifications.settings import NotificationSettings
-from igrow.edge.point_rules import point_rule
+from igrow.edge.point_rules import highest_beat, point_rule
 from igrow.edge.registers.bus_load import estimate
 from igrow.edge.registers.loading import load_register_map
-from igrow.edge.registers.model import SYSTEM_POINTS, RegisterMap
+from igrow.edge.registers.model import RegisterMap
 from igrow.edge.sensors.rules import SensorRule, default_rule
 from igrow.edge.sources.recipe import Recipe
 
@@ -43,6 +44,8 @@ _HOUR = datetime.timedelta(hours=1)
 _DAY = datetime.timedelta(days=1)
 BUILT_IN_BUNDLE = "built_in"
 """What `bundle` says for the one that is installed with igrow."""
+WRITABLE_BAD_SAMPLES = 2
+"""Readings in a row until a register that we write is believed to show what it cannot mean."""
 STATUS_PORT = 8420
 """The one port that the systemd unit lets the daemon listen on (SocketBindAllow)."""
 
@@ -78,92 +81,6 @@ class CycleSettings:
     respect_hand: datetime.timedelta = setting(
         low=datetime.timedelta(0), high=7 * _DAY, default=2 * _HOUR, help="how long a change at the PLC is respected"
     )
-
-
-@dataclass(frozen=True)
-class BoundSettings:
-    """What an engaged interlock leaves to a point."""
-
-    low: str | None = setting(default=None, help="smallest value: a number, or safe")
-    high: str | None = setting(default=None, help="largest value: a number, or safe")
-
-    def __post_init__(self) -> None:
-        for key, text in (("low", self.low), ("high", self.high)):
-            if text is not None and text != SAFE:
-                try:
-                    float(text)
-                except ValueError:
-                    raise SettingError(f"{key} is {text}: a number or safe is needed", key) from None
-
-    def bound(self) -> Bound:
-        """Return the guard's bound."""
-        return Bound(*(text if text is None or text == SAFE else float(text) for text in (self.low, self.high)))
-
-
-@dataclass(frozen=True)
-class InterlockSettings:
-    """One interlock; they are listed in order of precedence."""
-
-    name: str = setting(help="short name, for the ledger")
-    quantity: str = setting(help="what it watches: a quantity or a system point of the register map")
-    release: float = setting(help="lets go when the value is back beyond this")
-    bounds: Mapping[str, BoundSettings] = setting(
-        keys=(*SETPOINTS, *ACTUATORS), help="what it leaves to each point while engaged"
-    )
-    above: float | None = setting(default=None, help="engages above this value")
-    below: float | None = setting(default=None, help="or engages below this value")
-    when_unknown: Mapping[str, BoundSettings] = setting(
-        keys=(*SETPOINTS, *ACTUATORS), default_factory=dict, help="bounds while the quantity cannot be believed"
-    )
-    why: str = setting(default="", help="one line for people")
-
-    def __post_init__(self) -> None:
-        known = (*QUANTITIES, *SYSTEM_POINTS)
-        if self.quantity not in known:
-            raise SettingError(f"quantity is {self.quantity}: a quantity or a system point is needed", "quantity")
-        try:
-            self.interlock()
-        except InterlockError as error:
-            raise SettingError(str(error), "release") from None
-
-    def interlock(self) -> Interlock:
-        """Return the guard's interlock."""
-        return Interlock(
-            self.name,
-            self.quantity,
-            {name: bound.bound() for name, bound in self.bounds.items()},
-            self.above,
-            self.below,
-            self.release,
-            {name: bound.bound() for name, bound in self.when_unknown.items()},
-            self.why,
-        )
-
-
-@dataclass(frozen=True)
-class GuardSettings:
-    """What the guard knows beside the site's limits of the setpoints."""
-
-    points: Mapping[str, SetpointLimits] = setting(
-        keys=ACTUATORS, default_factory=dict, help="limits of writable points that are no setpoints, such as vents"
-    )
-    interlocks: tuple[InterlockSettings, ...] | None = setting(
-        default=None, help="interlocks in order of precedence; null takes the built-in ones"
-    )
-    non_volatile_daily_budget: int = setting(
-        low=2, high=1000, default=48, help="writes a day to a register that wears out"
-    )
-
-
-@dataclass(frozen=True)
-class SensorSettings:
-    """How one sensor differs from the table of what sensors do; null keeps the table's value."""
-
-    rate: float | None = setting(low=0, default=None, help="fastest true change per minute, in its unit")
-    jump: float | None = setting(low=0, default=None, help="change allowed at once, in its unit")
-    frozen_after: datetime.timedelta | None = setting(low=_MINUTE, default=None, help="longest true standstill")
-    stale_after: datetime.timedelta | None = setting(low=_SECOND, default=None, help="age that makes it stale")
-    missing_after: datetime.timedelta | None = setting(low=_SECOND, default=None, help="age that makes it missing")
 
 
 @dataclass(frozen=True)
@@ -343,6 +260,7 @@ def put_together(path: Path, file: DaemonFile, site: Site, register_map: Registe
         )
     _check_clock(path, file.cycle, register_map)
     _check_exchange(path, file)
+    _check_heartbeat(path, register_map)
     setpoints = tuple(name for name in setpoints if name in site.setpoints)
     for name in file.guard.points:
         if name not in points or not points[name].writable:
@@ -355,7 +273,8 @@ def put_together(path: Path, file: DaemonFile, site: Site, register_map: Registe
         limits = file.guard.points.get(name) or site.limits[name]
         where = (path, "guard", "points", name) if name in file.guard.points else (site_file, "limits", name)
         try:
-            rules[name] = point_rule(limits, points[name], file.guard.non_volatile_daily_budget)
+            rule = point_rule(limits, points[name], file.guard.non_volatile_daily_budget)
+            rules[name] = replace(rule, decided=name in setpoints)
         except GuardRuleError as error:
             raise ConfigurationError(f"{place(*where)}: {error}") from None
     settings = file.guard.interlocks
@@ -386,6 +305,17 @@ def _check_exchange(path: Path, file: DaemonFile) -> None:
         )
 
 
+def _check_heartbeat(path: Path, register_map: RegisterMap) -> None:
+    """Raise ConfigurationError for a heartbeat register that cannot show a change."""
+    heartbeat = register_map.points.get(HEARTBEAT)
+    if heartbeat is None:
+        return
+    try:
+        highest_beat(heartbeat)
+    except GuardRuleError as error:
+        raise ConfigurationError(f"{register_map.path or path}: points.{error}") from None
+
+
 def _check_clock(path: Path, cycle: CycleSettings, register_map: RegisterMap) -> None:
     """Raise ConfigurationError for a pace that the registers or the buses cannot keep."""
     clock = cycle.clock
@@ -407,28 +337,16 @@ def _check_clock(path: Path, cycle: CycleSettings, register_map: RegisterMap) ->
 
 
 def sensor_rules(register_map: RegisterMap, file: DaemonFile) -> dict[str, SensorRule]:
-    """Return the rule of each point that can be read: the table's, changed by the file."""
+    """Return the rule of each point that can be read: the table's, changed by the file.
+
+    What stands in a register that we write is no measurement; one that it cannot hold has to be seen twice.
+    """
     interval = file.cycle.interval.total_seconds()
     rules = {}
     for name, point in register_map.points.items():
         rule = default_rule(name, poll_period=max(point.poll, interval), low=point.low, high=point.high)
         own = file.sensors.get(name)
-        rules[name] = rule if own is None else _changed(rule, own)
+        if point.writable:
+            rule = replace(rule, bad_samples=WRITABLE_BAD_SAMPLES)
+        rules[name] = rule if own is None else own.applied_to(rule)
     return rules
-
-
-def _changed(rule: SensorRule, own: SensorSettings) -> SensorRule:
-    def seconds(given: datetime.timedelta | None, otherwise: float) -> float:
-        return otherwise if given is None else given.total_seconds()
-
-    return SensorRule(
-        low=rule.low,
-        high=rule.high,
-        rate=rule.rate if own.rate is None else own.rate / 60.0,
-        jump=rule.jump if own.jump is None else own.jump,
-        frozen_after=seconds(own.frozen_after, rule.frozen_after),
-        still_low=rule.still_low,
-        still_high=rule.still_high,
-        stale_after=seconds(own.stale_after, rule.stale_after),
-        missing_after=seconds(own.missing_after, rule.missing_after),
-    )

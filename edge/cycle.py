@@ -7,19 +7,24 @@ last: it tells the PLC that a whole cycle was completed, and a lock-step plant t
 from __future__ import annotations
 
 import time
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from igrow.edge.clock import Clock
-from igrow.edge.guard import GuardedWriter, GuardRules, GuardState, Readback, Request, Verdict, guard
-from igrow.edge.guard.core import begin_again, never_sent
-from igrow.edge.guard.readback import Outcome
+from igrow.edge.guard import GuardedWriter, GuardRules, GuardState, Readback, Request, Verdict, Write, guard
+from igrow.edge.guard.core import LONGEST_RAMP, begin_again, go_on, never_sent, postponed
+from igrow.edge.guard.findings import Finding, Outcome
+from igrow.edge.guard.memory import note, recall
+from igrow.edge.guard.writer import HEARTBEAT
 from igrow.edge.image import Image, Quality
 from igrow.edge.journal import Journal
 from igrow.edge.ports import SetpointStatus
 from igrow.edge.sensors import ImageBuilder, RawReading
 from igrow.edge.sources import Choice, Decision, Source, decide
+
+ASKED_AT_STOP = ("plc_manual", "plc_fallback", HEARTBEAT)
+"""What has to be known beside the setpoints themselves before a stop moves them."""
 
 
 class ReadablePlc(Protocol):
@@ -41,6 +46,18 @@ class CycleResult:
     """Wall-clock length of the cycle."""
 
 
+@dataclass(frozen=True, slots=True)
+class StopReport:
+    """What a stop left behind."""
+
+    reached: bool
+    """The PLC answers."""
+    manual: bool
+    """Somebody operates it by hand, so nothing was written."""
+    by_hand: tuple[str, ...]
+    """The points that were left as a hand has set them."""
+
+
 class ControlCycle:
     """Everything that one cycle needs, and the little that it remembers."""
 
@@ -57,9 +74,12 @@ class ControlCycle:
         *,
         setpoints: Sequence[str],
         respect_hand: float,
-        state: GuardState | None = None,
+        keep: Callable[[Image, Mapping[str, object]], None] | None = None,
     ) -> None:
-        """`setpoints` are the points that sources decide; interlocks may force every point of `rules`."""
+        """`setpoints` are the points that sources decide; interlocks may force every point of `rules`.
+
+        `keep` is handed what a restart must not forget, in each cycle before anything is written.
+        """
         self._plc = plc
         self._clock = clock
         self._builder = builder
@@ -70,8 +90,24 @@ class ControlCycle:
         self._journal = journal
         self._setpoints = tuple(setpoints)
         self._respect_hand = respect_hand
-        self.state = state or GuardState()
+        self._keep = keep
+        self.state = GuardState()
         self._source = ""
+        self._manual = False
+        self._look_at: set[str] = set()
+        """Points to be read in the next cycle although they are not due, since they wait to be written."""
+
+    def carry_over(self, before: ControlCycle, same: Collection[str]) -> None:
+        """Go on where the cycle before a reload stood; `same` are the points that mean the same register as before."""
+        self.state = before.state
+        self._source, self._manual = before._source, before._manual
+        self._builder.carry_over(before._builder, same)
+        for name in self.readback.points.keys() & before.readback.points.keys() & set(same):
+            self.readback.points[name] = before.readback.points[name]
+
+    def recall(self, content: Mapping[str, object], later: float, *, same: Collection[str], agree: bool) -> None:
+        """Go on where the process before this one stood; see `igrow.edge.guard.memory`."""
+        self.state = recall(content, self.readback, later, same=same, agree=agree)
 
     async def run(self, names: Collection[str] | None = None) -> CycleResult:
         """Run one cycle. `names` None reads what is due."""
@@ -80,73 +116,152 @@ class ControlCycle:
         decision = decide(self.sources, image, self._setpoints)
         requests = {name: Request(choice.value, choice.source) for name, choice in decision.choices.items()}
         verdict = await self._guard_and_write(requests, image)
-        self._log(image, decision)
-        error = await self._writer.heartbeat() if image.link_ok else None
-        self._journal.alarm("heartbeat", "" if error is None else f"the heartbeat could not be written: {error}")
-        statuses = self._statuses(decision.choices, image)
+        self._log(image, decision, verdict)
+        await self._beat(image)
+        statuses = self._statuses(decision.choices, image, verdict)
         return CycleResult(image, decision, verdict, statuses, time.perf_counter() - began)
 
-    async def stop(self) -> bool:
-        """Write the safe setpoints, through the guard; tell whether the PLC could be reached.
+    async def stop(self) -> StopReport:
+        """Write the safe setpoints, through the guard, where no hand rules.
 
         The heartbeat then ends, and the PLC falls back by itself.
         """
-        image = await self._read(None)
+        image = await self._read(self._builder.names((*self._rules.points, *ASKED_AT_STOP)))
         await self._guard_and_write({}, image, stopping=True)
-        return image.link_ok
+        held = () if self._manual else tuple(sorted(self.readback.held(image.monotonic)))
+        return StopReport(image.link_ok, self._manual, held)
 
     async def _read(self, names: Collection[str] | None) -> Image:
         readings = await self._plc.read(names)
+        if names is None and (more := self._look_at - readings.keys()):
+            readings = {**readings, **await self._plc.read(sorted(more))}
+        image = self._image(readings)
+        if names is None and (unseen := set(self.readback.unseen(image)) - readings.keys()):
+            image = self._image(await self._plc.read(sorted(unseen)))
+        self._look_whether_by_hand(image)
+        return image
+
+    def _image(self, readings: Mapping[str, RawReading]) -> Image:
+        """Make the image of these readings, and look what it shows of our writes and of others' hands."""
         image = self._builder.build(readings, self._clock.monotonic(), self._clock.true_time())
         self._journal.begin(image)
-        findings = self.readback.observe(image)
+        beat = image.value_of(HEARTBEAT)
+        lost = self._writer.heartbeat_was_lost(beat.value if beat.age <= 0.0 else None)
+        findings = self.readback.observe(image, restarted=lost)
         self._journal.findings(findings, self._respect_hand)
-        moved = {f.point for f in findings if f.outcome in (Outcome.FALLBACK, Outcome.BY_HAND, Outcome.UNCONFIRMED)}
-        if moved:
-            self.state = begin_again(self.state, moved)
+        self._ramps_after(findings)
         return image
+
+    def _ramps_after(self, findings: Sequence[Finding]) -> None:
+        """Let ramps begin where the PLC now stands, or go on where it was off for a moment only."""
+        moved: set[str] = set()
+        stood: dict[str, float] = {}
+        for found in findings:
+            briefly = found.outcome is Outcome.RESTARTED and found.unseen <= LONGEST_RAMP
+            if found.expected is not None and (found.outcome is Outcome.CROSSED or briefly):
+                stood[found.point] = found.expected
+            elif found.outcome not in (Outcome.CONFIRMED, Outcome.HAND_ENDED):
+                moved.add(found.point)
+        self.state = go_on(begin_again(self.state, moved), stood)
+
+    def _look_whether_by_hand(self, image: Image) -> None:
+        """Keep what `plc_manual` last said, as long as nothing says otherwise."""
+        flag = image.value_of("plc_manual")
+        if flag.value is None or flag.quality not in (Quality.GOOD, Quality.STALE):
+            return
+        manual = flag.value >= 0.5
+        if manual != self._manual:
+            self._journal.event("plc_by_hand" if manual else "plc_by_hand_ended", point="plc_manual")
+        self._manual = manual
 
     async def _guard_and_write(
         self, requests: Mapping[str, Request], image: Image, *, stopping: bool = False
     ) -> Verdict:
-        held = self._held(image)
-        shown = self.readback.shown()
-        before = self.state
-        verdict = guard(requests, shown, held, image, before, self._rules, stopping=stopping)
+        now, before = image.monotonic, self.state
+        held, restored = self._hands(now)
+        if stopping:
+            held, restored = self.readback.held(now), {}
+        verdict = guard(
+            {**requests, **restored}, self.readback.shown(), held, image, before, self._rules,
+            stopping=stopping, manual=self._manual,
+        )  # fmt: skip
         self.state = verdict.state
-        if not image.link_ok:
-            # Nothing can be written, nothing may be remembered as written, and no ramp may run on unseen.
-            for name in self._rules.points:
-                self.state = never_sent(self.state, before, name)
-            return verdict
-        outcomes = await self._writer.carry_out(verdict.writes)
+        writes = self._that_may_leave(verdict.writes, image, before)
+        for write in writes:
+            self.readback.wrote(write, now)
+        if self._keep is not None:
+            self._keep(image, note(self.state, self.readback))
+        outcomes = await self._writer.carry_out(writes)
         for outcome in outcomes:
-            if outcome.may_have_arrived:
-                self.readback.wrote(outcome.write, image.monotonic)
-            else:
+            if not outcome.may_have_arrived:
+                self.readback.not_sent(outcome.write)
                 self.state = never_sent(self.state, before, outcome.write.point)
-        self._journal.ledger(verdict.clamps, outcomes)
+        pending = [name for name in self._rules.points if self.readback.pending(name)]
+        clamps = [clamp for clamp in verdict.clamps if image.reaches(clamp.point)]
+        self._journal.ledger(clamps, outcomes, pending)
+        targets = {name: memory.ramp for name, memory in verdict.state.points.items()}
+        self._journal.problems(self.readback.settle(targets))
         return verdict
 
-    def _held(self, image: Image) -> Mapping[str, float]:
-        manual = image.value_of("plc_manual")
-        if manual.quality is Quality.GOOD and manual.value is not None and manual.value >= 0.5:
-            return dict.fromkeys(self._rules.points, self._respect_hand)
-        return self.readback.held(image.monotonic)
+    def _hands(self, now: float) -> tuple[dict[str, float], dict[str, Request]]:
+        """Return the hands that stand, with the seconds that they are respected, and requests for those moved away."""
+        held: dict[str, float] = {}
+        restored: dict[str, Request] = {}
+        for name, hand in self.readback.hands(now).items():
+            if hand.stands:
+                held[name] = hand.seconds
+            else:
+                why = (
+                    f"back to {hand.value:g}, set by hand at the PLC and respected for {hand.seconds / 60:.0f} min more"
+                )
+                restored[name] = Request(hand.value, "hand", why, at_once=True)
+        return held, restored
 
-    def _log(self, image: Image, decision: Decision) -> None:
+    def _that_may_leave(self, writes: Sequence[Write], image: Image, before: GuardState) -> list[Write]:
+        """Keep back what nobody would see arrive, and what might undo a hand that nobody has looked for yet."""
+        leaving: list[Write] = []
+        self._look_at = set()
+        for name in self._rules.points:
+            if not image.reaches(name):
+                # Nothing may be remembered as written, and no ramp may run on unseen.
+                self.state = never_sent(self.state, before, name)
+        for write in writes:
+            value = image.value_of(write.point)
+            if not image.reaches(write.point):
+                continue
+            if not write.urgent and value.age > 0.0 and value.quality is not Quality.MISSING:
+                self._look_at.add(write.point)
+                self.state = postponed(self.state, before, write.point)
+            else:
+                leaving.append(write)
+        return leaving
+
+    async def _beat(self, image: Image) -> None:
+        """Tell the PLC that a cycle was completed: the unit that hears it was part of the cycle."""
+        error = None
+        if image.reaches(HEARTBEAT):
+            error = await self._writer.heartbeat()
+            if error is None:
+                self.readback.beat(image.monotonic)
+        self._journal.alarm("heartbeat", "" if error is None else f"the heartbeat could not be written: {error}")
+
+    def _log(self, image: Image, decision: Decision, verdict: Verdict) -> None:
         if decision.source != self._source:
             self._journal.event("source", now=decision.source, before=self._source or "none", why=decision.why)
             self._source = decision.source
         self._journal.sensors(image)
+        self._journal.interlocks(verdict.engaged, self._rules.points)
         self._journal.telemetry(image)
 
-    def _statuses(self, choices: Mapping[str, Choice], image: Image) -> dict[str, SetpointStatus]:
-        held = self._held(image)
+    def _statuses(self, choices: Mapping[str, Choice], image: Image, verdict: Verdict) -> dict[str, SetpointStatus]:
+        forced = {clamp.point: clamp.reason for clamp in verdict.clamps if clamp.kind == "interlock"}
+        held = self.readback.held(image.monotonic)
+        if self._manual:
+            held = dict.fromkeys(self._rules.points, self._respect_hand)
         statuses = {}
         for name in self._rules.points:
             choice, memory = choices.get(name), self.state.points.get(name)
-            statuses[name] = SetpointStatus(
+            status = SetpointStatus(
                 requested=choice.value if choice else None,
                 applied=memory.written if memory else None,
                 shown=image.value_of(name).value,
@@ -154,4 +269,9 @@ class ControlCycle:
                 why=choice.why if choice else "",
                 held_until=image.monotonic + held[name] if name in held else None,
             )
+            if name in forced:
+                status = replace(status, source="interlock", why=forced[name])
+            elif memory is not None and memory.taken is not None:
+                status = replace(status, source="interlock", why=f"on its way back to {memory.taken:g}")
+            statuses[name] = status
         return statuses

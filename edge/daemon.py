@@ -12,12 +12,12 @@ from pathlib import Path
 
 from igrow.core.errors import IgrowError
 from igrow.edge.configuration import Configuration, load_configuration
-from igrow.edge.cycle import CycleResult
+from igrow.edge.cycle import CycleResult, StopReport
 from igrow.edge.journal import Journal
 from igrow.edge.notify import Notifier
 from igrow.edge.ports import Plan, Snapshot
 from igrow.edge.state_lock import sole_use
-from igrow.edge.wiring import Control, Services, build_control, open_services, remember
+from igrow.edge.wiring import Control, Services, build_control, carry_over, open_services, remember
 
 STOP_SECONDS = 5.0
 """Longest time that the safe setpoints may take on the way out."""
@@ -64,7 +64,7 @@ class Daemon:
             remembered = False
             while await self._due():
                 if not remembered:
-                    remember(self._control, self.services.store, budgets=True)
+                    remember(self._control, self.services.store)
                     remembered = True
                 if self._reload:
                     await self._reload_now()
@@ -101,7 +101,6 @@ class Daemon:
         self.last = result
         self.cycles += 1
         image = result.image
-        control.holds.keep(control.cycle.readback.held(image.monotonic), image.true_time)
         with self._contained("climate alarms"):
             control.climate_alarms.tick(image, self._journal.alarm)
         with self._contained("updates"):
@@ -158,9 +157,10 @@ class Daemon:
             self.services,
             self._journal,
             clock=before.clock if before else None,
-            state=before.cycle.state if before else None,
             plc=before.plc if before and _same_registers(before.configuration, self.configuration) else None,
         )
+        if before is not None:
+            carry_over(control, before)
         if before is None or control.plc is not before.plc:
             control.plc.start()
         return control
@@ -182,7 +182,6 @@ class Daemon:
             self._control = self._begin(before)
             if self._control.plc is not before.plc:
                 await before.plc.close()
-            remember(self._control, self.services.store, budgets=False)
             self._journal.event("reloaded", path=str(configuration.path))
         self._notifier.ready()
 
@@ -191,16 +190,11 @@ class Daemon:
         control = self._control
         assert control is not None
         try:
-            reached = await asyncio.wait_for(control.cycle.stop(), STOP_SECONDS)
+            report = await asyncio.wait_for(control.cycle.stop(), STOP_SECONDS)
         except TimeoutError:
-            reached = False
+            report = None
         try:
-            setpoints = (
-                "the safe setpoints were written"
-                if reached
-                else "the PLC does not answer, so its own safe setpoints rule after its timeout"
-            )
-            self._journal.event("stopped", setpoints=setpoints)
+            self._journal.event("stopped", setpoints=_left(report))
         finally:
             await control.plc.close()
             await self.services.status.close()
@@ -241,6 +235,17 @@ class Daemon:
                 if rule.daily_budget is not None and name in points
             },
         )
+
+
+def _left(report: StopReport | None) -> str:
+    """Return in words how the setpoints were left."""
+    if report is None or not report.reached:
+        return "the PLC does not answer, so its own safe setpoints rule after its timeout"
+    if report.manual:
+        return "nothing was written, as somebody operates the PLC by hand"
+    if report.by_hand:
+        return f"the safe setpoints were written, but for {', '.join(report.by_hand)}, which a hand has set"
+    return "the safe setpoints were written"
 
 
 def _same_registers(old: Configuration, new: Configuration) -> bool:

@@ -38,6 +38,11 @@ class Value:
     """Seconds since the value was read; infinite when nothing was ever read."""
     why: str = ""
     """One line for people when the quality is not good."""
+    in_doubt: bool = False
+    """The newest readings are bad, and too few to act on: what hangs on this point stays as it is until it is one
+    thing or the other."""
+    believed: float | None = None
+    """While in doubt, the last value that was believed."""
 
 
 MISSING = Value(None, Quality.MISSING, float("inf"), "never read")
@@ -53,8 +58,14 @@ class Image:
     """Seconds since 1970 UTC; None while the clock cannot be trusted."""
     values: Mapping[str, Value] = field(default_factory=lambda: MappingProxyType({}))
     link_ok: bool = True
-    """At least one point was read in this cycle."""
+    """At least one unit answers."""
+    silent: Mapping[str, frozenset[str]] = field(default_factory=lambda: MappingProxyType({}))
+    """The units that were asked and did not answer, each with its points."""
 
     def value_of(self, name: str) -> Value:
         """Return the value of a point, `MISSING` for a point that this plant does not have."""
         return self.values.get(name, MISSING)
+
+    def reaches(self, name: str) -> bool:
+        """Tell whether the unit that holds a point answers."""
+        return self.link_ok and not any(name in points for points in self.silent.values())

@@ -6,8 +6,11 @@ exactly; between two such values rounding stays between them.
 
 from __future__ import annotations
 
+import math
+
 from igrow.core.site import SetpointLimits
 from igrow.edge.guard.rules import GuardRuleError, PointRule
+from igrow.edge.guard.writer import HIGHEST_BEAT
 from igrow.edge.registers.codec import decode, encode
 from igrow.edge.registers.model import DataType, Point
 
@@ -39,6 +42,21 @@ def point_rule(limit: SetpointLimits, point: Point, daily_budget: int) -> PointR
         daily_budget=daily_budget if point.non_volatile else None,
         resolution=_resolution(point),
     )
+
+
+def highest_beat(point: Point) -> int:
+    """Return the largest number of the heartbeat's counter that its register tells from the one before.
+
+    Raises GuardRuleError where the register cannot show a change.
+    """
+    high = min(point.high, float(HIGHEST_BEAT))
+    beats = int(high) if math.isfinite(high) else 0
+    if beats < 1 or point.low > 0.0 or abs(point.scale) > 1.0:
+        raise GuardRuleError(
+            f"heartbeat: {point.low:g} to {point.high:g} with scale {point.scale:g} cannot count 0, 1, ...: give it "
+            "`low: 0`, a `high` of at least 1, and no scale"
+        )
+    return beats
 
 
 def _resolution(point: Point) -> float:

@@ -37,9 +37,9 @@ class WriteRecord:
     applied: float | None
     """What was written; None when nothing was."""
     source: str
-    """Who asked: override, plan, last_plan, recipe, hands_off, interlock or stop."""
+    """Who asked: override, plan, last_plan, recipe, hands_off, interlock, hand or stop."""
     reason: str
-    """Why applied differs from requested; empty when it does not."""
+    """Why applied differs from requested, or what an interlock or a hand gets back; else empty."""
     outcome: str
     """"written", "clamped" (nothing was written this time), "confirmed", "unconfirmed" or "failed"."""
 
@@ -80,6 +80,12 @@ class Store(Protocol):
 
     def writes_of_last_day(self) -> Sequence[WriteRecord]:
         """Return the rows with outcome "written" of the 24 h before the newest such row, oldest first."""
+
+    def record_state(self, time: float | None, content: Mapping[str, object]) -> None:
+        """Add what control must know again after a restart, durably, before returning; the newest counts."""
+
+    def newest_state(self) -> Mapping[str, object] | None:
+        """Return what was recorded last, or None."""
 
     def telemetry(self, start: float, end: float) -> Telemetry:
         """Return the stored values with quality good in [start, end), seconds since 1970 UTC; others are NaN."""

@@ -17,24 +17,26 @@ from igrow.edge.configuration import ClockSource, Configuration
 from igrow.edge.cycle import ControlCycle
 from igrow.edge.exchange import ExchangeService
 from igrow.edge.exchange.service import TransferRules
-from igrow.edge.guard import GuardedWriter, GuardState, Readback
+from igrow.edge.guard import GuardedWriter, Readback
 from igrow.edge.guard.core import DAY, with_earlier_writes
 from igrow.edge.guard.crop import restored
-from igrow.edge.holds import HoldFile
+from igrow.edge.guard.writer import HEARTBEAT
 from igrow.edge.journal import Journal
+from igrow.edge.moment import Moment, this_boot
 from igrow.edge.overriding import override_file
 from igrow.edge.pace import FollowedPlant, Pace, TickPace
 from igrow.edge.planning import PlanningProcess, ProcessLimits
 from igrow.edge.planning_schedule import PlanningRules, PlanningSchedule
+from igrow.edge.point_rules import highest_beat
 from igrow.edge.ports import Exchange, Plan, PlanningService, StatusService, Store, UpdateService
 from igrow.edge.registers.model import TWIN_SUFFIX
+from igrow.edge.remembering import StateNotes, registers_of
 from igrow.edge.sensors import ImageBuilder, TwinSensors
 from igrow.edge.sources import FreshPlan, GrowerOverride, HandsOff, LastValidPlan, PlanKeeper, RecipeSource
 from igrow.edge.status import StatusServer
 from igrow.edge.store import SqliteStore, StoreLimits
 from igrow.edge.updates import BundleUpdates, SignedSource, UpdateRules
 
-HOLD_FILE = "holds.json"
 STATUS_FILE = "status.json"
 TWIN_TOLERANCE = {
     "air_temperature": 1.5,
@@ -45,6 +47,8 @@ TWIN_TOLERANCE = {
     "wind_speed": 5.0,
 }
 """Largest difference of two working sensors of one quantity, in its unit."""
+FALLBACK_CYCLES = 3.0
+"""A PLC's heartbeat timeout is longer than this many cycles (docs/commissioning.md)."""
 
 
 @dataclass
@@ -78,7 +82,9 @@ class Control:
     cycle: ControlCycle
     keeper: PlanKeeper
     schedule: PlanningSchedule | None
-    holds: HoldFile
+    notes: StateNotes
+    boot: str
+    """Names this start of the machine; empty where the plant's clock and not the machine's is followed."""
     climate_alarms: ClimateAlarms
 
     @property
@@ -146,17 +152,17 @@ def build_control(
     journal: Journal,
     *,
     clock: Clock | None = None,
-    state: GuardState | None = None,
     plc: RegisterPlc | None = None,
 ) -> Control:
     """Build what runs the cycles; connects nothing yet.
 
-    `clock`, `state` (the guard's memory) and, where the registers are the same, `plc` come from before a reload.
+    `clock` and, where the registers are the same, `plc` come from before a reload.
     """
     file, site, rules = configuration.file, configuration.site, configuration.guard_rules
+    register_map = configuration.register_map
     interval = file.cycle.interval.total_seconds()
     respect_hand = file.cycle.respect_hand.total_seconds()
-    plc = plc or RegisterPlc(configuration.register_map)
+    plc = plc or RegisterPlc(register_map)
     readable: RegisterPlc | FollowedPlant = plc
     pace: Pace
     if file.cycle.clock is ClockSource.SYSTEM:
@@ -165,17 +171,22 @@ def build_control(
     else:
         # A reload must not begin the plant's time again, as the guard's memory is dated by it.
         clock = clock if isinstance(clock, PlcClock) else PlcClock()
-        names = configuration.register_map.points
         lockstep = file.cycle.clock is ClockSource.LOCKSTEP
-        readable = pace = FollowedPlant(plc, clock, names=names, interval=interval, lockstep=lockstep)
+        readable = pace = FollowedPlant(plc, clock, names=register_map.points, interval=interval, lockstep=lockstep)
     keeper = PlanKeeper(services.planning.latest if services.planning is not None else _no_plan)
     every = site.planning.replan_every.total_seconds()
+    units = {name: point.device for name, point in register_map.points.items()}
+    boot = this_boot() if isinstance(clock, SystemClock) else ""
+    notes = StateNotes(services.store, boot, registers_of(register_map, rules.points))
+    heartbeat = register_map.points.get(HEARTBEAT)
     cycle = ControlCycle(
         readable,
         clock,
-        ImageBuilder(configuration.sensor_rules, _twins(configuration), sun_elevation(site.latitude, site.longitude)),
+        ImageBuilder(
+            configuration.sensor_rules, _twins(configuration), sun_elevation(site.latitude, site.longitude), units
+        ),
         [
-            GrowerOverride(override_file(configuration.state_folder)),
+            GrowerOverride(override_file(configuration.state_folder), boot),
             FreshPlan(keeper, fresh_for=1.5 * every),
             LastValidPlan(keeper),
             RecipeSource(file.recipe, configuration.zone),
@@ -186,45 +197,56 @@ def build_control(
             rules.points,
             confirm_within=max(file.cycle.confirm_within.total_seconds(), 3.0 * interval),
             respect_hand=respect_hand,
+            silence=FALLBACK_CYCLES * interval,
+            units=units,
         ),
-        GuardedWriter(plc, has_heartbeat="heartbeat" in configuration.register_map.points),
+        GuardedWriter(
+            plc, has_heartbeat=heartbeat is not None, highest_beat=highest_beat(heartbeat) if heartbeat else 1
+        ),
         journal,
         setpoints=configuration.setpoints,
         respect_hand=respect_hand,
-        state=state,
+        keep=notes.keep,
     )
     return Control(
-        configuration, plc, clock, pace, cycle, keeper, _schedule(configuration, services),
-        HoldFile(configuration.state_folder / HOLD_FILE),
+        configuration, plc, clock, pace, cycle, keeper, _schedule(configuration, services), notes, boot,
         ClimateAlarms(usual_climate_alarms(site.crop) if file.climate_alarms is None else file.climate_alarms),
     )  # fmt: skip
 
 
-def remember(control: Control, store: Store, *, budgets: bool) -> None:
+def remember(control: Control, store: Store) -> None:
     """Carry over what a restart must not forget.
 
-    Hands that are respected, what the crop has had and, with `budgets`, writes of the last day.
+    Hands that are respected, intervals, interlocks, what the crop has had, and writes of the last day.
 
     To be called when the clock was first read. A write whose age cannot be known counts as just done.
     """
-    now, true_time = control.clock.monotonic(), control.clock.true_time()
-    for name, seconds in control.holds.load(true_time).items():
-        control.cycle.readback.restore_hold(name, now + seconds)
-    place = control.configuration.guard_rules.crop
-    if place is not None and true_time is not None and control.cycle.state.crop.at is None:
+    now = Moment(control.boot, control.clock.monotonic(), control.clock.true_time())
+    respect_hand = control.configuration.file.cycle.respect_hand.total_seconds()
+    ledgers_time = control.notes.recall(control.cycle, now, respect_hand=respect_hand)
+    place, true_time = control.configuration.guard_rules.crop, now.time
+    if place is not None and true_time is not None:
         log = store.telemetry(true_time - 2 * DAY, true_time)
         had = restored(agronomy.remember(place, log, true_time))
         control.cycle.state = replace(control.cycle.state, crop=had)
     rules = control.configuration.guard_rules.points
-    if not budgets or all(rule.daily_budget is None for rule in rules.values()):
+    if all(rule.daily_budget is None for rule in rules.values()):
         return
     times: dict[str, list[float]] = {}
     for record in store.writes_of_last_day():
         rule = rules.get(record.point)
         if rule is not None and rule.daily_budget is not None:
-            age = 0.0 if true_time is None or record.time is None else max(0.0, true_time - record.time)
-            times.setdefault(record.point, []).append(now - age)
+            age = 0.0 if ledgers_time is None or record.time is None else max(0.0, ledgers_time - record.time)
+            times.setdefault(record.point, []).append(now.monotonic - age)
     control.cycle.state = with_earlier_writes(control.cycle.state, times)
+
+
+def carry_over(control: Control, before: Control) -> None:
+    """Let control go on where it stood before a reload, for all points that still mean the same register."""
+    old, new = before.configuration.register_map, control.configuration.register_map
+    was = registers_of(old, old.points)
+    same = [name for name, register in registers_of(new, new.points).items() if was.get(name) == register]
+    control.cycle.carry_over(before.cycle, same)
 
 
 def _schedule(configuration: Configuration, services: Services) -> PlanningSchedule | None:

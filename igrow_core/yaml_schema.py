@@ -132,6 +132,12 @@ def nearest(name: str, known: Iterable[str]) -> str:
     return f"did you mean {found[0]}?" if found else f"known here: {', '.join(choices)}"
 
 
+def read_number(text: str) -> float:
+    """Return a number written as in these files; for a key that is a number or a word. Raises ValueError."""
+    number: float = _convert(text, float)
+    return number
+
+
 class _Reader:
     """Reads nodes by type; knows the file's name for its errors."""
 
@@ -290,7 +296,10 @@ def _convert(text: str, kind: Any) -> Any:
         match = _DURATION.fullmatch(text)
         if not match or match[2] not in _SECONDS:
             raise ValueError
-        return datetime.timedelta(seconds=float(match[1]) * _SECONDS[match[2]])
+        try:
+            return datetime.timedelta(seconds=float(match[1]) * _SECONDS[match[2]])
+        except OverflowError:
+            raise ValueError("the duration is too long") from None
     if kind is datetime.date:
         if not re.fullmatch(r"\d{4}-\d\d-\d\d", text):
             raise ValueError

@@ -15,7 +15,7 @@ from igrow.core.agronomy import Memory, Place
 from igrow.edge.image import Image
 from igrow.edge.sensors.consequences import usable_for_control
 
-EXEMPT = ("override", "stop")
+EXEMPT = ("override", "hand", "stop")
 SHORTEST, LONGEST = 60.0, 900.0
 """Seconds that a decision is taken for, at least and at most."""
 DARK_CLOCK = "the clock is wrong, so nobody knows how long the night still is"

@@ -6,6 +6,7 @@ everything else, since a broken vent cannot be mended by a good climate.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -19,7 +20,7 @@ SAFE = "safe"
 
 
 class InterlockError(IgrowError):
-    """An interlock that can never let go."""
+    """An interlock that can never let go, or whose numbers are none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +29,13 @@ class Bound:
 
     low: float | str | None = None
     high: float | str | None = None
+
+    def __post_init__(self) -> None:
+        numbers = [bound for bound in (self.low, self.high) if isinstance(bound, int | float)]
+        if not all(map(math.isfinite, numbers)):
+            raise InterlockError(f"bounds of {self.low} to {self.high} bound nothing: finite numbers are needed")
+        if len(numbers) == 2 and numbers[0] > numbers[1]:
+            raise InterlockError(f"low is {self.low:g}: it must not be above high, {self.high:g}")
 
     def limits(self, safe: float) -> tuple[float, float]:
         """Return the bounds as numbers."""
@@ -53,6 +61,8 @@ class Interlock:
     def __post_init__(self) -> None:
         if (self.above is None) == (self.below is None):
             raise InterlockError(f"interlock {self.name}: give either above or below")
+        if not all(math.isfinite(x) for x in (self.above, self.below, self.release) if x is not None):
+            raise InterlockError(f"interlock {self.name}: above, below and release must be finite numbers")
         if self.above is not None and self.release > self.above:
             raise InterlockError(f"interlock {self.name}: release {self.release:g} must be at or under {self.above:g}")
         if self.below is not None and self.release < self.below:
@@ -80,7 +90,8 @@ def evaluate(
 ) -> tuple[list[Force], frozenset[str]]:
     """Return what is forced now, in order of precedence, and which interlocks are engaged.
 
-    An interlock whose quantity this plant does not measure at all is left out: it was never there to rely on.
+    An interlock whose quantity this plant does not measure at all is left out: it was never there to rely on. One
+    whose quantity is in doubt forces nothing new (`in_doubt`).
     """
     forces: list[Force] = []
     now: set[str] = set()
@@ -90,7 +101,7 @@ def evaluate(
         reading = image.values[interlock.quantity]
         value = usable_for_control(reading)
         if value is None:
-            if interlock.when_unknown:
+            if interlock.when_unknown and not reading.in_doubt:
                 why = f"{interlock.quantity} is {reading.quality.value}"
                 forces.append(Force(interlock.name, interlock.when_unknown, why))
             # What was engaged before the sensor failed stays remembered until the sensor says otherwise.
@@ -102,6 +113,19 @@ def evaluate(
             limit = f"above {interlock.above:g}" if interlock.above is not None else f"below {interlock.below:g}"
             forces.append(Force(interlock.name, interlock.bounds, f"{interlock.quantity} {value:g}, {limit}"))
     return forces, frozenset(now)
+
+
+def in_doubt(interlocks: tuple[Interlock, ...], image: Image) -> Mapping[str, str]:
+    """Return the points that stay where they are, and why: a sensor may have failed, and it is too early to act on it.
+
+    These are the points that its interlock would force if it had failed, and points whose own reading is in doubt.
+    """
+    doubts = {name: f"{name}: {value.why}" for name, value in image.values.items() if value.in_doubt}
+    points = dict(doubts)
+    for interlock in interlocks:
+        if interlock.quantity in doubts:
+            points.update(dict.fromkeys(interlock.when_unknown, doubts[interlock.quantity]))
+    return points
 
 
 DEFAULT_INTERLOCKS: tuple[Interlock, ...] = (

@@ -1,144 +1,301 @@
 """What stands in the PLC: confirms our writes by a later read, and notices hands that changed a setpoint there.
 
-A write counts only when a reading taken after it shows the value. A reading that shows something else than what
-was agreed before means that somebody changed it at the PLC; that is respected for a configured time. The PLC's own
-fallback to safe setpoints, after we were silent for too long, is told apart by its register or by the silence.
+A write counts only when a reading taken after it shows the value, or what this device makes of it (a resolution, a
+limit or a ramp of its own). A reading that shows something else has one of these causes, looked for in this order:
+
+1. the point is the PLC's own (no source decides it): the PLC's control has moved it;
+2. the PLC puts the value of one setpoint into another;
+3. the PLC has started anew: its heartbeat register was cleared, or all setpoints show what memory holds at power-up;
+4. the PLC fell back to its own safe setpoints: `plc_fallback` says so, or nothing was heard of us for long enough;
+5. a hand. It is respected for a configured time, and its value is remembered: what moves the point away meanwhile
+   (an interlock, a fallback, a restart) does not end it.
+
+Whether a PLC could be heard is judged for each unit by itself.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from enum import Enum
+from collections.abc import Iterator, Mapping
 
-from igrow.edge.guard.core import Write
+from igrow.edge.guard.answers import matches, on_the_way, rounds
+from igrow.edge.guard.findings import Finding, Hand, Outcome, Problem
+from igrow.edge.guard.point_memory import PointMemory
+from igrow.edge.guard.power_up import Look, by_unit, started_anew
 from igrow.edge.guard.rules import PointRule
+from igrow.edge.guard.state import Write
 from igrow.edge.image import Image, Quality, Value
 
-
-class Outcome(Enum):
-    """What a look at the PLC showed."""
-
-    CONFIRMED = "confirmed"
-    UNCONFIRMED = "unconfirmed"
-    BY_HAND = "by_hand"
-    FALLBACK = "fallback"
-    HAND_ENDED = "hand_ended"
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """One outcome at one point."""
-
-    point: str
-    outcome: Outcome
-    expected: float | None
-    shown: float | None
-    source: str = ""
-
-
-@dataclass(slots=True)
-class _Memory:
-    agreed: float | None = None
-    """What the PLC showed when we last agreed with it."""
-    pending: Write | None = None
-    pending_at: float = -math.inf
-    held_until: float = -math.inf
+SILENCE = 30.0
+"""Seconds without a word after which a PLC may have fallen back: three cycles of ten seconds."""
 
 
 class Readback:
     """Remembers per point what was agreed, what is still to be confirmed and what is held by a hand."""
 
-    def __init__(self, rules: Mapping[str, PointRule], *, confirm_within: float, respect_hand: float) -> None:
-        """`confirm_within` and `respect_hand` in seconds."""
+    def __init__(
+        self,
+        rules: Mapping[str, PointRule],
+        *,
+        confirm_within: float,
+        respect_hand: float,
+        silence: float = SILENCE,
+        units: Mapping[str, str] | None = None,
+    ) -> None:
+        """`confirm_within`, `respect_hand` and `silence` in seconds; `units` maps points to the unit that holds them.
+
+        After `silence` without a word, or without our heartbeat, a PLC may have fallen back by itself.
+        """
         self._rules = rules
         self._confirm_within = confirm_within
         self._respect_hand = respect_hand
-        self._points = {name: _Memory() for name in rules}
-        self._silent = False
-        self._in_fallback = False
+        self._silence = silence
+        self._units = units or {}
+        self.points = {name: PointMemory() for name in rules}
+        self._beat_at: float | None = None
 
     def wrote(self, write: Write, now: float) -> None:
-        """Remember a write that may have reached the PLC; a later reading must show it."""
-        memory = self._points[write.point]
-        memory.pending, memory.pending_at = write, now
+        """Remember a write that is about to leave; a later reading must show it."""
+        self.points[write.point].sent_now(write, now)
 
-    def restore_hold(self, point: str, seconds: float) -> None:
-        """Respect a hand that was noticed before a restart for so many seconds more (with a clock at 0)."""
-        if point in self._points:
-            self._points[point].held_until = seconds
+    def not_sent(self, write: Write) -> None:
+        """Forget the newest write to a point, which certainly never left."""
+        self.points[write.point].sent.pop()
+
+    def beat(self, now: float) -> None:
+        """Remember that the heartbeat went out."""
+        self._beat_at = now
 
     def held(self, now: float) -> dict[str, float]:
         """Return the seconds that each point changed by hand is still respected."""
-        return {name: m.held_until - now for name, m in self._points.items() if m.held_until > now}
+        return {name: hand.seconds for name, hand in self.hands(now).items()}
+
+    def hands(self, now: float) -> dict[str, Hand]:
+        """Return the hands that are respected."""
+        hands = {}
+        for name, memory in self.points.items():
+            if memory.hand is not None and memory.held_until > now:
+                stands = memory.stands is None or matches(self._rules[name], memory.stands, memory.hand)
+                hands[name] = Hand(memory.hand, memory.held_until - now, stands)
+        return hands
 
     def shown(self) -> dict[str, float | None]:
-        """Return what stands in the PLC as far as we know: a write on its way counts until a read denies it."""
-        result: dict[str, float | None] = {}
-        for name, memory in self._points.items():
-            result[name] = memory.pending.value if memory.pending is not None else memory.agreed
-        return result
+        """Return what stands in the PLC as far as we know: a write on its way counts until a read denies it.
 
-    def observe(self, image: Image) -> list[Finding]:
-        """Compare an image with what was written; call once in each cycle, before deciding."""
+        Where the device made something of its own of a write, the point counts as standing where we wanted it.
+        """
+        return {name: memory.shown for name, memory in self.points.items()}
+
+    def pending(self, point: str) -> bool:
+        """Tell whether a write to a point is still to be confirmed."""
+        memory = self.points[point]
+        return bool(memory.sent) and not memory.overdue
+
+    def unseen(self, image: Image) -> list[str]:
+        """Return the points to be read now, although they may not be due: something has happened to their PLC.
+
+        Otherwise a hand that comes after it could not be told from it.
+        """
+        return [
+            name
+            for name, memory in self.points.items()
+            if memory.was_disturbed and image.reaches(name) and image.value_of(name).quality is not Quality.MISSING
+        ]
+
+    def settle(self, targets: Mapping[str, float | None]) -> Mapping[str, Problem | None]:
+        """Return what is wrong with our writes by point, leaving out what is no longer wanted otherwise.
+
+        `targets` is where the guard wants each point by now; None where it wants nothing.
+        """
+        for name, memory in self.points.items():
+            target = targets.get(name)
+            if memory.problem and (target is None or memory.shows(self._rules[name], target)):
+                memory.problem = None
+        return {name: memory.problem for name, memory in self.points.items()}
+
+    def observe(self, image: Image, *, restarted: bool = False) -> list[Finding]:
+        """Compare an image with what was written; call once in each cycle, before deciding.
+
+        `restarted`: the heartbeat's register was cleared, so the unit that holds it has started anew.
+        """
         now = image.monotonic
-        if not image.link_ok:
-            self._silent = True
-            return list(self._ended(now))
-        silent, self._silent = self._silent, False
-        self._in_fallback = _is_set(image.value_of("plc_fallback"))
+        for memory in self.points.values():
+            memory.grow_old(now)
+        self._listen(image, restarted)
         findings: list[Finding] = []
-        for name, memory in self._points.items():
+        looks: dict[str, Look] = {}
+        for name, memory in self.points.items():
             value = image.value_of(name)
-            if value.value is None or value.quality in (Quality.MISSING, Quality.STALE):
-                findings.extend(self._overdue(name, memory, now, None))
-            else:
-                findings.extend(self._compare(name, memory, value.value, now - value.age, now, silent))
+            if not memory.is_new(value, now):
+                findings.extend(self._unread(name, value, image))
+                continue
+            assert value.value is not None
+            found = self._ours(name, value.value, image)
+            since, unapplied = now - value.age - memory.looked_at, found is not None and self.pending(name)
+            looks[name] = Look(value.value, found is None, since, memory.was_silent, unapplied)
+            findings.extend(found or ())
+            memory.looked_at = now - value.age
+        findings.extend(self._explain(looks, image))
+        for name in looks:
+            self.points[name].forget_absence()
         findings.extend(self._ended(now))
         return findings
 
-    def _ended(self, now: float) -> Iterable[Finding]:
-        for name, memory in self._points.items():
-            if memory.held_until <= now and memory.held_until > -math.inf:
-                memory.held_until = -math.inf
-                yield Finding(name, Outcome.HAND_ENDED, None, memory.agreed)
+    def _listen(self, image: Image, restarted: bool) -> None:
+        """Note how long each point's unit could not be heard, or could not hear us."""
+        now, fallback = image.monotonic, _is_set(image.value_of("plc_fallback"))
+        for name, memory in self.points.items():
+            memory.hear(now, answers=image.reaches(name), beat_at=self._beat_at)
+            memory.fell_back |= fallback
+            memory.restarted |= restarted and self._same_unit(name, "heartbeat")
 
-    def _compare(
-        self, name: str, memory: _Memory, shown: float, read_at: float, now: float, silent: bool
-    ) -> Iterable[Finding]:
-        rule, pending = self._rules[name], memory.pending
-        if pending is not None:
-            if read_at <= memory.pending_at:
-                return self._overdue(name, memory, now, None)
-            if _matches(rule, shown, pending.value):
-                memory.agreed, memory.pending = pending.value, None
-                return [Finding(name, Outcome.CONFIRMED, pending.value, shown, pending.source)]
-            if memory.agreed is None or _matches(rule, shown, memory.agreed):
-                return self._overdue(name, memory, now, shown)
-            memory.pending = None
-        elif memory.agreed is None:
-            memory.agreed = shown
+    def _same_unit(self, name: str, other: str) -> bool:
+        return self._units.get(name, "") == self._units.get(other, "")
+
+    def _ended(self, now: float) -> Iterator[Finding]:
+        for name, memory in self.points.items():
+            if memory.hand is not None and memory.held_until <= now:
+                memory.hand = None
+                yield Finding(name, Outcome.HAND_ENDED, None, memory.stands)
+
+    # what is ours
+
+    def _ours(self, name: str, shown: float, image: Image) -> list[Finding] | None:
+        """Return the findings where a reading shows what stood there or what we wrote; None where it does not."""
+        rule, memory, now = self._rules[name], self.points[name], image.monotonic
+        if memory.stands is None:
+            memory.stands = shown
+        stays = matches(rule, shown, memory.stands)
+        newest = memory.sent[-1] if memory.sent else None
+        if newest is not None and stays and matches(rule, shown, newest.value):
+            return [self._confirmed(name, shown)]
+        if stays:
+            return self._overdue(name, now)
+        # A PLC takes writes in turn, so of equal ones it is the first.
+        ours = next((sent for sent in (*memory.late, *memory.sent) if matches(rule, shown, sent.value)), None)
+        if ours is not None and ours is newest:
+            return [self._confirmed(name, shown)]
+        if ours is not None:
+            memory.applied(ours, shown, now)
             return []
-        elif _matches(rule, shown, memory.agreed):
+        if memory.answers is not None and matches(rule, shown, memory.answers):
+            memory.stands = shown
             return []
-        expected, memory.agreed = pending.value if pending else memory.agreed, shown
-        if self._in_fallback or (silent and _matches(rule, shown, rule.safe)):
-            return [Finding(name, Outcome.FALLBACK, expected, shown)]
-        memory.held_until = now + self._respect_hand
-        return [Finding(name, Outcome.BY_HAND, expected, shown)]
+        return self._answered(name, shown, image)
 
-    def _overdue(self, name: str, memory: _Memory, now: float, shown: float | None) -> list[Finding]:
-        pending = memory.pending
-        if pending is None or now - memory.pending_at <= self._confirm_within:
+    def _answered(self, name: str, shown: float, image: Image) -> list[Finding] | None:
+        """Judge a change that may be what the device makes of a write that is on its way."""
+        rule, memory, now = self._rules[name], self.points[name], image.monotonic
+        if memory.overdue or not memory.sent or memory.stands is None:
+            return None
+        moving = memory.moved_at > -math.inf and not memory.was_disturbed
+        if memory.restarted or (not moving and self._fell_back(name, shown, image)):
+            return None
+        newest = memory.sent[-1]
+        on_its_way = any(on_the_way(rule, memory.stands, sent.value, shown) for sent in memory.sent)
+        if on_its_way or memory.is_known_limit(rule, newest.value, shown):
+            memory.move_to(shown, now)
+            return self._overdue(name, now)
+        return [self._confirmed(name, shown)] if rounds(rule, newest.value, shown) else None
+
+    def _confirmed(self, name: str, shown: float) -> Finding:
+        memory = self.points[name]
+        newest = memory.sent[-1]
+        memory.settled(self._rules[name], shown, newest.value)
+        return Finding(name, Outcome.CONFIRMED, newest.value, shown, newest.source)
+
+    def _overdue(self, name: str, now: float) -> list[Finding]:
+        """Judge a write that no reading shows yet."""
+        rule, memory = self._rules[name], self.points[name]
+        if not memory.sent or memory.overdue or now - memory.waits_since <= self._confirm_within:
             return []
-        memory.pending = None
-        memory.agreed = shown
-        return [Finding(name, Outcome.UNCONFIRMED, pending.value, shown, pending.source)]
+        newest, stands = memory.sent[-1], memory.stands
+        assert stands is not None
+        if rounds(rule, newest.value, stands):
+            return [self._confirmed(name, stands)]
+        there = {other: memory.stands for other, memory in self.points.items()}
+        text = self._crossed(name, there) or f"{newest.value:g} was written to {name}, but the PLC shows {stands:g}"
+        limited = not newest.urgent and memory.is_limited(rule, newest.value)
+        if limited:
+            memory.learn_limit(newest.value)
+            text += ": it seems to have a limit of its own there"
+            memory.settled(rule, stands, newest.value)
+            memory.limited_until = now + self._respect_hand
+        else:
+            memory.overdue, memory.answers = True, None
+        memory.problem = Problem(text, minor=limited)
+        return [Finding(name, Outcome.UNCONFIRMED, newest.value, stands, newest.source, text)]
 
+    def _unread(self, name: str, value: Value, image: Image) -> list[Finding]:
+        """Judge a write to a point that cannot be read, although its unit answers; no reading will ever confirm it."""
+        memory = self.points[name]
+        late = memory.sent and image.monotonic - memory.sent[-1].at > self._confirm_within
+        if not late or value.quality is not Quality.MISSING or not image.reaches(name):
+            return []
+        newest = memory.sent[-1]
+        text = f"{newest.value:g} was written to {name}, which cannot be read back: nobody sees whether it was taken"
+        memory.settled(self._rules[name], memory.stands, newest.value)
+        memory.problem = Problem(text, minor=True)
+        return [Finding(name, Outcome.UNCONFIRMED, newest.value, None, newest.source, text)]
 
-def _matches(rule: PointRule, shown: float, value: float) -> bool:
-    return rule.same(shown, value) or abs(shown - value) <= rule.dead_band
+    # what is not
+
+    def _explain(self, looks: Mapping[str, Look], image: Image) -> Iterator[Finding]:
+        """Say who changed what is not ours, and agree with it."""
+        decided = {name: look for name, look in looks.items() if self._rules[name].decided}
+        anew = {name for _, unit in by_unit(decided, self._units) if started_anew(unit, self._rules) for name in unit}
+        shows = {name: look.shown for name, look in looks.items()}
+        crossed = {n: text for n, look in decided.items() if look.changed and (text := self._crossed(n, shows))}
+        for name, look in looks.items():
+            if not look.changed:
+                continue
+            rule, memory = self._rules[name], self.points[name]
+            expected = memory.sent[-1].value if memory.sent else memory.stands
+            source = memory.sent[-1].source if memory.sent else ""
+            text = ""
+            if not rule.decided:
+                ours = memory.shown if memory.sent or memory.answers is not None else None
+                memory.found(look.shown)
+                if ours is not None:
+                    text = f"{ours:g} was written to {name}, but the PLC moves it to {look.shown:g}"
+                    memory.problem = Problem(text)
+                continue
+            if name in crossed:
+                outcome, text = Outcome.CROSSED, crossed[name]
+            elif memory.restarted or name in anew:
+                outcome = Outcome.RESTARTED
+            elif self._fell_back(name, look.shown, image):
+                outcome = Outcome.FALLBACK
+            else:
+                outcome = Outcome.BY_HAND
+                memory.hand, memory.held_until = look.shown, image.monotonic + self._respect_hand
+            memory.found(look.shown)
+            memory.problem = Problem(text) if text else None
+            yield Finding(name, outcome, expected, look.shown, source, text, look.since)
+
+    def _fell_back(self, name: str, shown: float, image: Image) -> bool:
+        """Tell whether the PLC's own fallback, since the last look, explains what it shows."""
+        rule, memory = self._rules[name], self.points[name]
+        flag, own = image.value_of("plc_fallback"), self._same_unit(name, "plc_fallback")
+        safe = matches(rule, shown, rule.safe)
+        if memory.fell_back:
+            return safe or (own and _is_set(flag))
+        if own and flag.quality is Quality.GOOD and flag.age <= image.value_of(name).age:
+            return False  # the PLC itself says that it did not
+        return safe and memory.absence > self._silence
+
+    def _crossed(self, name: str, shows: Mapping[str, float | None]) -> str:
+        """Return a line where a point shows what was written to another one of its unit; `shows` is what all show."""
+        rule, shown, own = self._rules[name], shows[name], self.points[name].sent
+        for other, there in shows.items():
+            sent = self.points[other].sent
+            if other == name or not sent or shown is None or there is None or not self._same_unit(name, other):
+                continue
+            swapped = bool(own) and self._rules[other].same(there, own[-1].value)
+            outside = not rule.low <= shown <= rule.high
+            if rule.same(shown, sent[-1].value) and (swapped or outside):
+                return f"{name} shows {shown:g}, which was written to {other}: is the register map right?"
+        return ""
 
 
 def _is_set(value: Value) -> bool:

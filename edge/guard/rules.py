@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -34,8 +35,14 @@ class PointRule:
     """Writes in any 24 h: the register wears out."""
     resolution: float = 1e-6
     """The smallest difference that the register can show."""
+    decided: bool = True
+    """A source decides it (a setpoint). Otherwise it is the PLC's own, such as a vent: only interlocks move it, and a
+    change there is no hand but the PLC's control."""
 
     def __post_init__(self) -> None:
+        given = (self.low, self.high, self.safe, self.slew, self.dead_band, self.minimum_interval, self.refresh)
+        if not all(math.isfinite(number) for number in given if number is not None):
+            raise GuardRuleError("limits, slew, dead band, minimum interval and refresh must be finite numbers")
         if not self.low <= self.safe <= self.high:
             raise GuardRuleError(f"safe value {self.safe:g} is outside the limits {self.low:g} to {self.high:g}")
         if self.daily_budget is not None and self.daily_budget < 2:

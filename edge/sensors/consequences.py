@@ -1,5 +1,6 @@
 """What each quality does to control: one table, read by everything that uses an image.
 
+A value in doubt (bad, but in too few readings to act on) counts for control as the last one that was believed.
 A value that is not usable for control makes its interlocks take the safe side (`Interlock.when_unknown`), so the
 greenhouse is never steered by a number that nobody believes. A value that is not usable for planning keeps new
 plans from being made; the valid one runs on until it expires, then the recipe follows.
@@ -41,6 +42,8 @@ CONSEQUENCES: Mapping[Quality, Consequence] = MappingProxyType(
 
 def usable_for_control(value: Value) -> float | None:
     """Return the number that interlocks and the recipe may use, or None."""
+    if value.in_doubt:
+        return value.believed
     return value.value if CONSEQUENCES[value.quality].control else None
 
 

@@ -31,10 +31,27 @@ class SensorRule:
     stale_after: float = 60.0
     missing_after: float = 900.0
     """Age in seconds from which an old value is stale, then missing."""
+    slack: float = 0.0
+    """How far beyond an end of the range still counts as that end: the zero of a good sensor wanders."""
+    bad_samples: int = 1
+    """Bad readings in a row until the sensor counts as bad, and good ones until it counts as good again."""
+
+    def holds(self, value: float) -> bool:
+        """Tell whether a value lies in the range (NaN does not)."""
+        return self.low - self.slack <= value <= self.high + self.slack
+
+    def cut(self, value: float) -> float:
+        """Return the end of the range for a value just beyond it."""
+        return min(max(value, self.low), self.high)
 
 
 _HOUR = 3600.0
 _MINUTE = 60.0
+SLACK = 0.01
+"""Share of a sensor's range by which its zero may wander."""
+BAD_SAMPLES = 3
+SLOW_BAD_SAMPLES = 2
+"""Bad readings in a row that make a sensor bad; fewer where a minute or more lies between two."""
 
 _MOVEMENT: Mapping[str, tuple[float, float, float, float, float]] = MappingProxyType(
     # name: rate per minute, jump, frozen after (h), may stand still at or below, at or above
@@ -61,13 +78,16 @@ def default_rule(name: str, *, poll_period: float, low: float = -INFINITE, high:
 
     `poll_period` (seconds) is how often a new value can be expected: three periods make it stale, and twenty, but
     at least 15 minutes, missing. A second sensor moves like the first; a name that is no quantity has
-    no movement rule.
+    no movement rule. Setpoints and registers that are no quantity are no sensors: one reading of them counts.
     """
     name = name.removesuffix(TWIN_SUFFIX)
     rate, jump, frozen, still_low, still_high = _MOVEMENT.get(name, (INFINITE, INFINITE, INFINITE, -INFINITE, INFINITE))
     quantity = QUANTITIES.get(name)
+    slack, bad_samples = 0.0, 1
     if quantity is not None and quantity.kind is not Kind.SETPOINT:
         low, high = max(low, quantity.low), min(high, quantity.high)
+        slack = SLACK * (high - low)
+        bad_samples = BAD_SAMPLES if poll_period < _MINUTE else SLOW_BAD_SAMPLES
     return SensorRule(
         low=low,
         high=high,
@@ -78,4 +98,6 @@ def default_rule(name: str, *, poll_period: float, low: float = -INFINITE, high:
         still_high=still_high,
         stale_after=3.0 * poll_period,
         missing_after=max(900.0, 20.0 * poll_period),
+        slack=slack,
+        bad_samples=bad_samples,
     )

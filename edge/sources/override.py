@@ -1,18 +1,19 @@
 """The grower's override: a setpoint by hand, for a lease that ends by itself.
 
 `igrow-edge override` leaves a small file; the daemon looks at it in each cycle. A lease counts from when the daemon
-first sees it, on the monotonic clock; the daemon then notes its end in the file, so that a restart does not
-begin it again.
+first sees it, on the monotonic clock; the daemon then notes in the file when that was, so that a restart does not
+begin it again, and a date that jumps does not end it.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from igrow.edge.image import Image
+from igrow.edge.moment import Moment, from_json, to_json
 from igrow.edge.sources.decision import Offer
 from igrow.edge.state_file import read_state, write_state
 
@@ -26,6 +27,8 @@ class Lease:
     """Length of the lease when it was asked for."""
     until: float | None = None
     """Seconds since 1970 UTC at which it ends, once the daemon has seen it with a trusted clock."""
+    seen: Moment | None = None
+    """When the daemon first saw it."""
 
 
 def read_leases(path: Path) -> dict[str, Lease]:
@@ -35,16 +38,22 @@ def read_leases(path: Path) -> dict[str, Lease]:
         if not isinstance(entry, Mapping):
             continue
         value, seconds, until = entry.get("value"), entry.get("seconds"), entry.get("until")
-        if not isinstance(value, int | float) or not isinstance(seconds, int | float) or not math.isfinite(value):
+        if not isinstance(value, int | float) or not isinstance(seconds, int | float):
             continue
-        leases[name] = Lease(float(value), float(seconds), float(until) if isinstance(until, int | float) else None)
+        if math.isfinite(value) and math.isfinite(seconds):
+            end = float(until) if isinstance(until, int | float) else None
+            leases[name] = Lease(float(value), float(seconds), end, from_json(entry.get("seen")))
     return leases
 
 
 def write_leases(path: Path, leases: Mapping[str, Lease]) -> str:
     """Replace the file; return an empty text or one line that says why it could not be written."""
     return write_state(
-        path, {name: {"value": x.value, "seconds": x.seconds, "until": x.until} for name, x in leases.items()}
+        path,
+        {
+            name: {"value": x.value, "seconds": x.seconds, "until": x.until, "seen": x.seen and to_json(x.seen)}
+            for name, x in leases.items()
+        },
     )
 
 
@@ -53,8 +62,10 @@ class GrowerOverride:
 
     name = "override"
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, boot: str = "") -> None:
+        """`boot` names this start of the machine, while its monotonic clock is the daemon's."""
         self._path = path
+        self._boot = boot
         self._stamp: tuple[int, int] | None = None
         self._leases: dict[str, Lease] = {}
         self._ends: dict[str, float] = {}
@@ -76,24 +87,17 @@ class GrowerOverride:
             self._stamp = self._file_stamp()
 
     def _take(self, leases: dict[str, Lease], image: Image) -> None:
-        now, true_time = image.monotonic, image.true_time
+        now = Moment(self._boot, image.monotonic, image.true_time)
         dated: dict[str, Lease] = {}
         for name, lease in leases.items():
-            known = self._leases.get(name)
-            if known is not None and (known.value, known.seconds, known.until) == (
-                lease.value,
-                lease.seconds,
-                lease.until,
-            ):
+            if lease == self._leases.get(name):
                 dated[name] = lease
                 continue
-            if lease.until is not None and true_time is not None:
-                left = min(lease.until - true_time, lease.seconds)
-            else:
-                left = lease.seconds
-            self._ends[name] = now + left
-            end = None if true_time is None else true_time + left
-            dated[name] = Lease(lease.value, lease.seconds, lease.until if lease.until is not None else end)
+            passed = None if lease.seen is None else now.since(lease.seen)
+            left = lease.seconds - (passed or 0.0)
+            self._ends[name] = now.monotonic + left
+            end = None if now.time is None else now.time + left
+            dated[name] = replace(lease, until=end if lease.until is None else lease.until, seen=lease.seen or now)
         self._leases = dated
         if dated != leases:
             write_leases(self._path, dated)

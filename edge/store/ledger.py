@@ -39,7 +39,7 @@ class Record:
 
     sequence: int
     category: str
-    """"event", "write" or "alarm"."""
+    """"event", "write", "alarm", or "state": what a restart must not forget, of which only the newest counts."""
     time: float | None
     """Seconds since 1970 UTC; None where the clock was not to be trusted."""
     body: Mapping[str, object]
@@ -87,9 +87,13 @@ class _File:
             raise
 
     def prune(self) -> bool:
-        """Delete the oldest tenth of the writes or, where there are few, of everything; tell whether it could."""
+        """Delete the oldest tenth of the writes and states or, where there are few, of everything; tell if it could.
+
+        The newest state stays, as there may have been nothing to note for a long time.
+        """
         connection = self.open()
-        for where in ("category = 'write'", "1"):
+        newest = "sequence != (SELECT ifnull(max(sequence), 0) FROM records WHERE category = 'state')"
+        for where in (f"category IN ('write', 'state') AND {newest}", newest):
             (count,) = connection.execute(f"SELECT count(*) FROM records WHERE {where}").fetchone()
             if count >= 1000:
                 connection.execute(

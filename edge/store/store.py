@@ -115,6 +115,16 @@ class SqliteStore:
         with self._lock:
             self._ledger.add("alarm", record.time, asdict(record))
 
+    def record_state(self, time: float | None, content: Mapping[str, object]) -> None:
+        """Add what control must know again after a restart, durably, before returning."""
+        with self._lock:
+            self._ledger.add("state", time, content)
+
+    def newest_state(self) -> Mapping[str, object] | None:
+        """Return what was recorded last, or None."""
+        newest = self.records("state", 1)
+        return newest[0].body if newest else None
+
     def writes_of_last_day(self) -> Sequence[WriteRecord]:
         """Return the rows with outcome "written" of the 24 h before the newest such row, oldest first."""
         with self._lock:
@@ -131,7 +141,7 @@ class SqliteStore:
             return found[::-1]
 
     def records(self, category: str, count: int) -> list[Record]:
-        """Return the newest records of one category ("event", "write", "alarm"), newest first."""
+        """Return the newest records of one category ("event", "write", "alarm", "state"), newest first."""
         with self._lock:
             return [record for record, _ in zip(self._ledger.newest(category), range(count), strict=False)]
 

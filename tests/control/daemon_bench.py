@@ -106,15 +106,19 @@ def write_files(
 class Plant:
     """The PLC's side: can be started, stopped and started again on the same port."""
 
-    def __init__(self, folder: Path, port: int, pace: Pace | None = None, start: str = "2026-03-01T00:00:00") -> None:
+    def __init__(
+        self, folder: Path, port: int, pace: Pace | None = None, start: str = "2026-03-01T00:00:00",
+        device: str | None = None,
+    ) -> None:  # fmt: skip
         self.table = TablePlant(start)
         self._map = load_register_map(folder / "map.yaml")
         self._pace = pace or Lockstep(300.0)
         self._port = port
+        self._device = device
         self.plc: VirtualPlc | None = None
 
     async def up(self) -> None:
-        self.plc = VirtualPlc(self.table, self._map, self._pace)
+        self.plc = VirtualPlc(self.table, self._map, self._pace, device=self._device)
         await self.plc.start(port=self._port)
 
     async def down(self) -> None:

@@ -1,5 +1,7 @@
 """The daemon's file: its errors have a place, its parts fit together, limits fit their registers."""
 
+import dataclasses
+import datetime
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +12,11 @@ from hypothesis import strategies as st
 
 from igrow.core.errors import IgrowError
 from igrow.core.site import SetpointLimits
-from igrow.core.yaml_schema import parse
+from igrow.core.yaml_schema import SchemaError, parse, setting
 from igrow.edge.configuration import ConfigurationError, DaemonFile, load_configuration
+from igrow.edge.guard import GuardedWriter
 from igrow.edge.guard.rules import GuardRuleError
-from igrow.edge.point_rules import point_rule
+from igrow.edge.point_rules import highest_beat, point_rule
 from igrow.edge.registers.codec import decode, encode
 from igrow.edge.registers.loading import parse_register_map
 from igrow.edge.registers.model import DataType, Function, Point
@@ -107,6 +110,14 @@ def test_interlocks_of_the_file_replace_the_built_in_ones(tmp_path):
     [
         ("12", "safe", "release 12 must be at or under 10"),
         ("8", "wide", "high is wide: a number or safe is needed"),
+        ("8", "nan", "high is nan: a number or safe is needed"),
+        ("8", "inf", "high is inf: a number or safe is needed"),
+        ("8", "-Infinity", "high is -Infinity: a number or safe is needed"),
+        ("8", "1e999", "high is 1e999: a number or safe is needed"),
+        ("8", "1_5", "high is 1_5: a number or safe is needed"),
+        ("8", "20, low: 21", "low is 21: it must not be above high, 20"),
+        (".nan", "safe", "release is '.nan'"),
+        ("nan", "safe", "release is 'nan'"),
     ],
 )
 def test_an_interlock_that_makes_no_sense_is_refused_with_its_place(tmp_path, release, bound, message):
@@ -116,6 +127,75 @@ def test_an_interlock_that_makes_no_sense_is_refused_with_its_place(tmp_path, re
         load_configuration(path)
     assert message in str(error.value)
     assert "daemon.yaml:13:" in str(error.value)
+
+
+@pytest.mark.parametrize(("key", "unit"), [("port", ""), ("number", ""), ("duration", " days")])
+@pytest.mark.parametrize("number", ["nan", ".nan", "inf", "-.inf", "1e999", "infinity", "9" * 400, "1_000"])
+def test_no_number_of_a_file_is_anything_but_finite(key, unit, number):
+    @dataclasses.dataclass(frozen=True)
+    class File:
+        port: int = setting(default=1, help="a whole number")
+        number: float = setting(default=1.0, help="a number")
+        duration: datetime.timedelta = setting(default=datetime.timedelta(1), help="a duration")  # noqa: RUF009
+
+    with pytest.raises(SchemaError, match=rf"text:1:\d+: {key} is"):
+        parse(f"{key}: {number}{unit}\n", File)
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        ('type: int16, high: 0, unit: "1"', "cannot count 0, 1"),
+        ('type: uint16, low: 10, unit: "1"', "cannot count 0, 1"),
+        ('type: uint16, scale: 100, unit: "1"', "cannot count 0, 1"),
+    ],
+)
+def test_a_heartbeat_that_cannot_show_a_change_is_refused(tmp_path, lines, message):
+    text = MAP.replace('type: uint16, unit: "1"', lines)
+    with pytest.raises(IgrowError, match=r"heartbeat|low is 0") as error:
+        load_configuration(write_files(tmp_path, 5020, map_text=text))
+    assert message in str(error.value) or "must be less than high" in str(error.value)
+
+
+def test_the_hint_for_a_heartbeat_of_16_bits_with_a_sign_leads_to_one_that_works(tmp_path):
+    text = MAP.replace('address: 3, type: uint16, unit: "1"', 'address: 3, type: int16, unit: "1"')
+    with pytest.raises(IgrowError, match="give a `high` that does"):
+        load_configuration(write_files(tmp_path, 5020, map_text=text))
+    text = MAP.replace('address: 3, type: uint16, unit: "1"', 'address: 3, type: int16, high: 32767, unit: "1"')
+    configuration = load_configuration(write_files(tmp_path, 5020, map_text=text))
+    assert highest_beat(configuration.register_map.points["heartbeat"]) == 32767
+
+
+async def test_a_heartbeat_wraps_where_its_register_ends():
+    written = []
+
+    class Plc:
+        async def write(self, name, value):
+            written.append(value)
+
+    writer = GuardedWriter(Plc(), has_heartbeat=True, highest_beat=3)
+    writer.heartbeat_was_lost(2.0)
+    for _ in range(6):
+        assert await writer.heartbeat() is None
+    assert written == [3.0, 0.0, 1.0, 2.0, 3.0, 0.0]
+
+
+def test_vents_are_the_plcs_own_and_setpoints_are_decided(tmp_path):
+    vent = '  vent_lee: {{device: plc, function: holding, address: 9, type: uint16, unit: "%", writable: true}}\n'
+    path = write_files(tmp_path, 5020, map_text=MAP + vent)
+    path.write_text(path.read_text() + "guard:\n  points:\n    vent_lee: {low: 0, high: 100, safe: 0}\n")
+    points = load_configuration(path).guard_rules.points
+    assert {name: rule.decided for name, rule in points.items()} == {
+        "heating_setpoint": True, "co2_setpoint": True, "vent_lee": False,
+    }  # fmt: skip
+
+
+def test_a_sensor_of_the_file_may_be_believed_bad_sooner_or_later(tmp_path):
+    path = write_files(tmp_path, 5020, clock="system", interval="10 s")
+    assert load_configuration(path).sensor_rules["air_co2"].bad_samples == 3
+    path.write_text(path.read_text() + "sensors:\n  air_co2: {bad_samples: 5}\n")
+    rules = load_configuration(path).sensor_rules
+    assert (rules["air_co2"].bad_samples, rules["air_temperature"].bad_samples) == (5, 3)
 
 
 def test_a_register_that_wears_out_gets_the_daily_budget(tmp_path):

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from daemon_bench import MAP, Plant, free_port, running, until, write_files
 
+from igrow.edge.daemon import Daemon
 from igrow.edge.image import Quality
 from igrow.edge.planning import PlanningProcess, ProcessLimits
 from igrow.edge.ports import ActiveBundle
@@ -19,6 +20,11 @@ from igrow.edge.virtual_plc.pace import Realtime
 
 def kinds(folder: Path) -> list[str]:
     return [str(record.body["kind"]) for record in read_records(folder / "state" / "store", "event")]
+
+
+def agreed(daemon: Daemon, name: str) -> float | None:
+    """What the daemon has last seen in the PLC."""
+    return None if daemon._control is None else daemon._control.cycle.readback.points[name].stands
 
 
 async def test_the_daemon_controls_in_lockstep_and_leaves_safe_setpoints(tmp_path):
@@ -100,36 +106,167 @@ async def test_a_plc_in_1970_is_controlled_by_light_and_nothing_is_dated(tmp_pat
     assert all(record.time is None for record in read_records(tmp_path / "state" / "store", "event"))
 
 
-async def test_a_setpoint_changed_at_the_plc_is_respected_also_across_kill_9(tmp_path):
+async def test_a_setpoint_changed_at_the_plc_is_respected_also_across_kill_9_and_a_restart(tmp_path):
     port = free_port()
     path = write_files(tmp_path, port, clock="system", interval="1 s")
     plant = Plant(tmp_path, port, pace=Realtime())
     await plant.up()
     command = [sys.executable, "-m", "igrow.edge.cli", "run", str(path)]
     process = await asyncio.create_subprocess_exec(*command)
+
+    async def two_cycles():
+        """The second change of the heartbeat comes after a whole cycle."""
+        for _ in range(2):
+            beat = plant.shows("heartbeat")
+            await until(lambda beat=beat: plant.shows("heartbeat") not in (beat, 0.0))
+
     try:
         await until(lambda: plant.shows("co2_setpoint") > 400.0)
         await asyncio.sleep(2.5)
         plant.plc.set_by_hand("co2_setpoint", 555.0)
-        await until((tmp_path / "state" / "holds.json").exists)
+        await until(lambda: "changed_by_hand" in kinds(tmp_path))
         process.send_signal(signal.SIGKILL)
         await process.wait()
-        beat = plant.shows("heartbeat")
         process = await asyncio.create_subprocess_exec(*command)
-        # The second change of the heartbeat comes after a whole cycle of the new daemon.
-        await until(lambda: plant.shows("heartbeat") not in (beat, 0.0))
-        beat = plant.shows("heartbeat")
-        await until(lambda: plant.shows("heartbeat") != beat)
+        await two_cycles()
         assert plant.shows("co2_setpoint") == 555.0
         process.send_signal(signal.SIGTERM)
         assert await asyncio.wait_for(process.wait(), 60.0) == 0
+        assert (plant.shows("heating_setpoint"), plant.shows("co2_setpoint")) == (18.0, 555.0)
+        process = await asyncio.create_subprocess_exec(*command)
+        await two_cycles()
+        assert plant.shows("co2_setpoint") == 555.0
     finally:
         if process.returncode is None:
             process.kill()
             await process.wait()
-    assert plant.shows("co2_setpoint") == 400.0
     await plant.down()
-    assert "changed_by_hand" in kinds(tmp_path)
+    stops = [
+        r.body["detail"] for r in read_records(tmp_path / "state" / "store", "event") if r.body["kind"] == "stopped"
+    ]
+    assert stops == [{"setpoints": "the safe setpoints were written, but for co2_setpoint, which a hand has set"}]
+    (held,) = {
+        r.body["points"]["co2_setpoint"]["hand"] for r in read_records(tmp_path / "state" / "store", "state")[:1]
+    }
+    assert held == 555.0
+
+
+async def test_a_hand_that_has_been_respected_for_long_enough_does_not_begin_again_with_a_restart(tmp_path):
+    port = free_port()
+    path = write_files(tmp_path, port, respect_hand="20 min")
+    plant = Plant(tmp_path, port)
+    await plant.up()
+    async with running(path) as daemon:
+        await until(lambda: agreed(daemon, "co2_setpoint") == 700.0)
+        plant.plc.set_by_hand("co2_setpoint", 555.0)
+        await until(lambda: "changed_by_hand" in kinds(tmp_path))
+    assert plant.shows("co2_setpoint") in (555.0, 700.0)
+    async with running(path) as daemon:
+        await until(lambda: plant.shows("co2_setpoint") == 700.0)
+        cycles = daemon.cycles
+        await until(lambda: daemon.cycles >= cycles + 10)
+        assert plant.shows("co2_setpoint") == 700.0
+    await plant.down()
+    assert kinds(tmp_path).count("changed_by_hand") == 1
+
+
+POLLED = MAP.replace("unit: degC}}", "unit: degC, poll: 1 h}}").replace("unit: m s-1}}", "unit: m s-1, poll: 1 h}}")
+
+
+async def test_a_reload_keeps_what_is_known_of_sensors_that_are_seldom_read(tmp_path):
+    port = free_port()
+    path = write_files(tmp_path, port, clock="system", interval="1 s", map_text=POLLED)
+    plant = Plant(tmp_path, port, pace=Realtime())
+    await plant.up()
+    async with running(path) as daemon:
+        await until(lambda: daemon.cycles >= 3)
+        before = daemon.last.image.value_of("air_temperature")
+        control = daemon._control
+        daemon.reload()
+        await until(lambda: daemon._control is not control and daemon.last.image.monotonic > 0)
+        cycles = daemon.cycles
+        await until(lambda: daemon.cycles >= cycles + 2)
+        value = daemon.last.image.value_of("air_temperature")
+        assert (value.value, value.quality) == (before.value, Quality.GOOD)
+        assert value.age > before.age
+        assert not daemon._journal.alarms.active
+    await plant.down()
+    written = [row.body for row in read_records(tmp_path / "state" / "store", "write")]
+    assert not [row for row in written if row["source"] == "interlock"]
+
+
+async def test_a_reload_looks_afresh_at_a_point_that_means_another_register_now(tmp_path):
+    port = free_port()
+    path = write_files(tmp_path, port)
+    plant = Plant(tmp_path, port)
+    await plant.up()
+    async with running(path) as daemon:
+        await until(lambda: plant.shows("heating_setpoint") == 19.0 and plant.shows("co2_setpoint") == 700.0)
+        control = daemon._control
+        # Now scaled: the very same register means another temperature.
+        old = "address: 0, type: float32, unit: degC, writable: true"
+        text = (tmp_path / "map.yaml").read_text()
+        assert old in text
+        (tmp_path / "map.yaml").write_text(text.replace(old, old.replace("unit", "scale: 2, unit")))
+        daemon.reload()
+        await until(lambda: daemon._control is not control)
+        cycles = daemon.cycles
+        await until(lambda: daemon.cycles >= cycles + 10)
+    await plant.down()
+    assert "changed_by_hand" not in kinds(tmp_path)
+
+
+async def test_an_int16_heartbeat_goes_on_past_its_highest_number(tmp_path):
+    port = free_port()
+    lines = MAP.replace('address: 3, type: uint16, unit: "1"', 'address: 3, type: int16, high: 32767, unit: "1"')
+    path = write_files(tmp_path, port, map_text=lines)
+    plant = Plant(tmp_path, port)
+    await plant.up()
+    plant.plc.memory.set_value("heartbeat", 32760.0)
+    seen = []
+    write = plant.plc.write
+
+    def watched(function, address, values):
+        write(function, address, values)
+        if address == 3:
+            seen.append(plant.shows("heartbeat"))
+
+    plant.plc.write = watched
+    async with running(path) as daemon:
+        await until(lambda: daemon.cycles >= 20)
+        assert not daemon._journal.alarms.active
+    await plant.down()
+    assert seen[:10] == [32761.0, 32762.0, 32763.0, 32764.0, 32765.0, 32766.0, 32767.0, 0.0, 1.0, 2.0]
+
+
+TWO_BUSES = MAP.replace(
+    "timeout: 0.5 s}}", "timeout: 0.5 s}}\n  other: {{transport: tcp, host: 127.0.0.1, port: {other}, timeout: 0.5 s}}"
+).replace("device_id: 1}}", "device_id: 1}}\n  second: {{bus: other, device_id: 1}}")
+TWO_BUSES = TWO_BUSES.replace("co2_setpoint: {{device: plc", "co2_setpoint: {{device: second")
+TWO_BUSES = "\n".join(line for line in TWO_BUSES.splitlines() if "plc_fallback" not in line)
+
+
+async def test_a_bus_that_is_down_while_another_one_is_up_falls_back_and_that_is_no_hand(tmp_path):
+    port, other = free_port(), free_port()
+    path = write_files(tmp_path, port, clock="plc", map_text=TWO_BUSES.replace("{other}", str(other)))
+    first = Plant(tmp_path, port, pace=Realtime(300.0))
+    await first.up()
+    second = Plant(tmp_path, other, pace=Realtime(300.0), device="second")
+    await second.up()
+    async with running(path) as daemon:
+        await until(lambda: agreed(daemon, "co2_setpoint") == 700.0)
+        await second.down()
+        await until(lambda: [alarm.name for alarm in daemon._journal.alarms.active] == ["link second"])
+        assert daemon.last.image.link_ok
+        cycles = daemon.cycles
+        await until(lambda: daemon.cycles >= cycles + 4)
+        await second.up()
+        assert second.shows("co2_setpoint") == 400.0
+        await until(lambda: second.shows("co2_setpoint") == 700.0)
+    await first.down()
+    await second.down()
+    assert "changed_by_hand" not in kinds(tmp_path)
+    assert "plc_fell_back" in kinds(tmp_path)
 
 
 async def test_a_planner_that_hangs_delays_no_cycle_and_the_recipe_rules(tmp_path):

@@ -2,11 +2,13 @@
 
 import math
 
+import numpy as np
 from control_fakes import image_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from igrow.edge.guard import Bound, GuardRules, GuardState, Interlock, PointRule, Request, guard
+from igrow.edge.guard.answers import rounds
 from igrow.edge.guard.core import DAY
 from igrow.edge.image import Image, Quality, Value
 
@@ -129,3 +131,60 @@ def test_every_change_of_a_request_leaves_a_row(rule, asked, times):
             if write.value != asked:
                 assert any(clamp.requested == asked and clamp.applied == write.value for clamp in verdict.clamps)
                 assert write.reason
+
+
+@given(
+    grid=st.sampled_from([0.01, 0.02, 0.05, 0.1, 0.2, 0.25, 0.5]),
+    written=st.floats(12.0, 28.0),
+    way=st.sampled_from([round, math.floor, math.ceil]),
+)
+@settings(max_examples=300, deadline=None)
+def test_what_a_devices_resolution_makes_of_a_write_is_its_answer(grid, written, way):
+    rule = PointRule(low=12.0, high=28.0, safe=18.0)
+    shown = float(np.float32(grid * way(written / grid)))
+    assert rounds(rule, written, shown) or rule.same(written, shown)
+
+
+@given(written=st.floats(12.0, 28.0), shown=st.floats(12.0, 28.0))
+@settings(max_examples=300, deadline=None)
+def test_nothing_further_away_than_the_coarsest_resolution_is_an_answer(written, shown):
+    rule = PointRule(low=12.0, high=28.0, safe=18.0)
+    if rounds(rule, written, shown):
+        assert abs(written - shown) < 0.05 * 16.0
+
+
+@given(
+    before=st.floats(0.0, 100.0), steps=st.lists(st.tuples(st.floats(0.0, 60.0), st.floats(0.0, 300.0)), max_size=12)
+)
+@settings(max_examples=200, deadline=None)
+def test_an_interlock_gives_a_point_that_nobody_asks_for_back_as_it_was(before, steps):
+    """Whatever the wind does: once it is calm for good, the vent stands where it stood."""
+    rule = PointRule(low=0.0, high=100.0, safe=0.0, minimum_interval=60.0, decided=False)
+    wind = Interlock("wind", "wind_speed", {"vent": Bound(high=10.0)}, above=15.0, release=12.0)
+    rules, state, now, stands = GuardRules({"vent": rule}, (wind,)), GuardState(), 0.0, before
+    for speed, passed in [*steps, (0.0, 60.0), (0.0, 60.0)]:
+        now += passed
+        verdict = guard({}, {"vent": stands}, {}, image_of(now, wind_speed=speed), state, rules)
+        state = verdict.state
+        for write in verdict.writes:
+            stands = write.value
+            assert write.reason
+        if speed > 15.0:
+            assert stands <= 10.0
+    assert stands == before
+
+
+@given(
+    rule=point_rules(),
+    asked=ANY_FLOAT,
+    shown=st.one_of(st.none(), ANY_FLOAT),
+    wind=ANY_FLOAT,
+    quality=QUALITIES,
+    stopping=st.booleans(),
+)
+@settings(max_examples=200, deadline=None)
+def test_nothing_is_written_while_somebody_operates_the_plc_by_hand(rule, asked, shown, wind, quality, stopping):
+    image = Image(0.0, None, {"wind_speed": Value(wind, quality, 0.0)})
+    rules, requests = GuardRules({"point": rule}, (FORCE,)), {"point": Request(asked, "plan")}
+    verdict = guard(requests, {"point": shown}, {}, image, GuardState(), rules, stopping=stopping, manual=True)
+    assert not verdict.writes

@@ -110,6 +110,25 @@ def test_a_lease_survives_a_restart_without_beginning_again(tmp_path):
     assert not again.offer(image_of(151.0, T0 + 7201.0)).setpoints
 
 
+@pytest.mark.parametrize("jump", [1e9, -1e9, None])
+def test_a_lease_survives_a_restart_with_its_remaining_time_whatever_the_date_does(tmp_path, jump):
+    path = tmp_path / "override.json"
+    write_leases(path, {"heating_setpoint": Lease(21.0, 7200.0)})
+    assert GrowerOverride(path, "this boot").offer(image_of(1000.0, T0)).setpoints
+    again = GrowerOverride(path, "this boot")
+    date = None if jump is None else T0 + jump
+    assert again.offer(image_of(8100.0, date)).setpoints == {"heating_setpoint": 21.0}
+    assert not again.offer(image_of(8201.0, date)).setpoints
+
+
+def test_a_lease_of_no_finite_length_is_none(tmp_path):
+    path = tmp_path / "override.json"
+    path.write_text(
+        '{"heating_setpoint": {"value": 21, "seconds": NaN}, "co2_setpoint": {"value": 7, "seconds": 1e999}}'
+    )
+    assert not GrowerOverride(path).offer(image_of(0.0, T0)).setpoints
+
+
 def test_a_lease_ends_on_time_although_the_date_jumps_back(tmp_path):
     path = tmp_path / "override.json"
     write_leases(path, {"heating_setpoint": Lease(21.0, 7200.0)})

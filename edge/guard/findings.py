@@ -1,0 +1,53 @@
+"""What the read-back finds, for the journal and the guard."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Outcome(Enum):
+    """What a look at the PLC showed."""
+
+    CONFIRMED = "confirmed"
+    UNCONFIRMED = "unconfirmed"
+    BY_HAND = "by_hand"
+    FALLBACK = "fallback"
+    RESTARTED = "restarted"
+    CROSSED = "crossed"
+    HAND_ENDED = "hand_ended"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One outcome at one point."""
+
+    point: str
+    outcome: Outcome
+    expected: float | None
+    shown: float | None
+    source: str = ""
+    text: str = ""
+    """One line for people where a write did not come out as it should."""
+    unseen: float = 0.0
+    """Seconds since the point was looked at before."""
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """What is wrong with our last write to a point."""
+
+    text: str
+    minor: bool = False
+    """The device makes something of its own of it, or cannot be asked; control goes on with that."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hand:
+    """A setting by hand that is respected."""
+
+    value: float
+    seconds: float
+    """How long it still is."""
+    stands: bool
+    """It is what the PLC shows; otherwise something else has moved the point away."""

@@ -1,0 +1,57 @@
+"""Telling a PLC that has started anew from a hand, where no register says so.
+
+Memory that was never written mostly holds zeros, or what the program sets at power-up, in all setpoints at once. A
+person changes one setpoint after the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from igrow.edge.guard.rules import PointRule
+
+SECONDS_PER_HAND = 15.0
+"""What a person needs for one setpoint at a PLC's panel, at the least."""
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """One setpoint as a reading has just shown it."""
+
+    shown: float
+    changed: bool
+    """It shows something that neither stood there nor was written."""
+    since: float
+    """Seconds since it was looked at before."""
+    was_silent: bool
+    """Its unit did not answer in between."""
+    unapplied: bool = False
+    """It still shows what stood there before a write of ours."""
+
+
+def started_anew(looks: Mapping[str, Look], rules: Mapping[str, PointRule]) -> bool:
+    """Tell whether the setpoints of one unit look like those of a PLC after power-up.
+
+    At least two do not show what they should, all of them show zero or something outside the limits, at least one
+    that has changed shows that; and it came after a silence, or faster than a hand could be.
+    """
+    changed = [name for name, look in looks.items() if look.changed]
+    if not changed or len(changed) + sum(look.unapplied for look in looks.values()) < 2:
+        return False
+    if not all(look.shown == 0.0 or _outside(rules[name], look.shown) for name, look in looks.items()):
+        return False
+    if not any(_outside(rules[name], looks[name].shown) for name in changed):
+        return False
+    silent = all(looks[name].was_silent for name in changed)
+    return silent or max(looks[name].since for name in changed) < SECONDS_PER_HAND * len(changed)
+
+
+def by_unit(looks: Mapping[str, Look], units: Mapping[str, str]) -> Iterator[tuple[str, Mapping[str, Look]]]:
+    """Yield the looks at each unit's points; points without a unit are taken for one unit's."""
+    for unit in sorted({units.get(name, "") for name in looks}):
+        yield unit, {name: look for name, look in looks.items() if units.get(name, "") == unit}
+
+
+def _outside(rule: PointRule, value: float) -> bool:
+    return not rule.low <= value <= rule.high

@@ -1,0 +1,59 @@
+"""Which units answer: judged from the readings of each unit by itself, as one may be off while another is well."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
+
+from igrow.edge.bus.errors import (
+    AddressRefusedError,
+    GatewayRefusedError,
+    NoValueError,
+    QueueFullError,
+    RefusedError,
+    UnknownPointError,
+)
+
+if TYPE_CHECKING:
+    from igrow.edge.sensors.builder import RawReading
+
+
+class Contact:
+    """Remembers of each unit whether it answered when it was last asked."""
+
+    def __init__(self, names: Iterable[str], units: Mapping[str, str]) -> None:
+        """`units` maps points to units; the points without one are one unit's."""
+        self._points: dict[str, frozenset[str]] = {}
+        for name in names:
+            unit = units.get(name, "")
+            self._points[unit] = self._points.get(unit, frozenset()) | {name}
+        self._silent: set[str] = set()
+        self.link_ok = True
+        """A unit answers, or nobody was asked."""
+
+    @property
+    def silent(self) -> Mapping[str, frozenset[str]]:
+        """The units that do not answer, each with its points."""
+        return {unit: self._points[unit] for unit in sorted(self._silent)}
+
+    def hear(self, readings: Mapping[str, RawReading]) -> None:
+        """Take note of who answered."""
+        for unit, points in self._points.items():
+            heard = {_answered(readings[name]) for name in points if name in readings}
+            if True in heard:
+                self._silent.discard(unit)
+            elif False in heard:
+                self._silent.add(unit)
+        self.link_ok = not readings or len(self._silent) < len(self._points)
+
+
+def _answered(reading: RawReading) -> bool | None:
+    """Tell whether a reading shows that its unit is there; None where it says nothing about that."""
+    error = reading.error
+    if error is None:
+        return reading.value is not None
+    if isinstance(error, AddressRefusedError | UnknownPointError | QueueFullError):
+        return None  # an address that was refused once is not asked for again for a while
+    if isinstance(error, NoValueError):
+        return True
+    return isinstance(error, RefusedError) and not isinstance(error, GatewayRefusedError)
