@@ -96,11 +96,8 @@ class Readback:
 
         Otherwise a hand that comes after it could not be told from it.
         """
-        return [
-            name
-            for name, memory in self.points.items()
-            if memory.was_disturbed and image.reaches(name) and image.value_of(name).quality is not Quality.MISSING
-        ]
+        disturbed = [name for name, memory in self.points.items() if memory.was_disturbed and image.reaches(name)]
+        return [name for name in disturbed if image.value_of(name).quality is not Quality.MISSING]
 
     def settle(self, targets: Mapping[str, float | None]) -> Mapping[str, Problem | None]:
         """Return what is wrong with our writes by point, leaving out what is no longer wanted otherwise.
