@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint format soak bench bench-diagnosis bundle api clean
+.PHONY: help demo test lint format soak bench bench-diagnosis results bundle api clean
 
 help: ## List the targets.
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-16s %s\n", $$1, $$2}'
@@ -41,6 +41,9 @@ bench: $(STAMP) ## Print the benchmarks, as ratios measured side by side.
 
 bench-diagnosis: $(STAMP) ## Print the diagnosis benchmark (long).
 	$(BIN)/python -m benchmarks.diagnosis
+
+results: $(STAMP) ## Write the tables of docs/results that are quick to make (the long ones: python -m benchmarks.results --long).
+	$(BIN)/python -m benchmarks.results
 
 bundle: $(STAMP) ## Rebuild the default bundle in igrow_core/default_bundle.
 	$(BIN)/igrow-trainer bundle --out igrow_core/default_bundle

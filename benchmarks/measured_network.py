@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from igrow.core.simulator.hybrid.record import Record
-from igrow.trainer.calibration.forecast import Predictor
-from igrow.trainer.training.simulator import layout
+from igrow.trainer.fit.evaluation import Predictor
+from igrow.trainer.research.network.simulator import layout
 from igrow.trainer.training.stage import StageData, TrainingPlan, run_windows, train_stage, untrained
 
 Floats = NDArray[np.float64]

@@ -32,8 +32,8 @@ from igrow.core.planner.policy import HOURS, OnnxPolicy, to_setpoints
 from igrow.core.planner.template import for_site
 from igrow.core.quantities import SETPOINTS
 from igrow.core.site import Site, load_site
-from igrow.trainer.export.optimizer import export_optimizer
-from igrow.trainer.policies.environment import DailyGreenhouses, Scenario, hourly_weather
+from igrow.trainer.exporting.optimizer import export_optimizer
+from igrow.trainer.research.policies.environment import DailyGreenhouses, Scenario, hourly_weather
 
 DAY = np.timedelta64(86_400, "s")
 SETTINGS = EvolutionSettings(parents=24, offspring=48)

@@ -24,21 +24,21 @@ from benchmarks.measured_network import network_predictor
 from igrow.core.economics import local_days
 from igrow.core.errors import IgrowError
 from igrow.core.planner.recent_use import used_in
-from igrow.core.simulator.hybrid.nominal import nominal, site_record
+from igrow.core.simulator.hybrid.nominal import site_record
 from igrow.core.simulator.hybrid.record import Record
-from igrow.core.simulator.uncertainty import ErrorGrowth
 from igrow.core.telemetry import Telemetry
-from igrow.trainer.calibration.actuation import setpoint_columns
-from igrow.trainer.calibration.evaluation import Errors, errors_of, starts_within, summarise
-from igrow.trainer.calibration.forecast import Predictor, remembering
-from igrow.trainer.calibration.posterior import prior
-from igrow.trainer.calibration.site_model import SiteModel, adapt, fit_site, from_few_days
-from igrow.trainer.calibration.totals import coverage, daily_totals
 from igrow.trainer.data import Log, read_log
 from igrow.trainer.data.public import challenge
 from igrow.trainer.data.splits import weeks
-from igrow.trainer.export.plan import RANGED
-from igrow.trainer.model import known_range
+from igrow.trainer.exporting.plan import RANGED
+from igrow.trainer.fit.actuation import setpoint_columns
+from igrow.trainer.fit.climate import site_prior
+from igrow.trainer.fit.evaluation import Errors, Predictor, errors_of, starts_within, summarise
+from igrow.trainer.fit.model import training_envelope
+from igrow.trainer.research.forecasts.combination import remembering
+from igrow.trainer.research.forecasts.forecaster import Forecaster, adapt, fit_forecaster, from_few_days
+from igrow.trainer.research.forecasts.totals import coverage, daily_totals
+from igrow.trainer.research.forecasts.uncertainty import ErrorGrowth
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -57,14 +57,14 @@ class Greenhouse:
         self.setpoints, self.inferred = setpoint_columns(log.telemetry, self.record)
         self.week = weeks(self.record.time)
 
-    def fit(self, fit: Mask, selection: Mask, **options: object) -> SiteModel:
-        return fit_site([(self.record, self.setpoints, fit, selection)], prior(nominal(self.site)), {}, **options)  # type: ignore[arg-type]
+    def fit(self, fit: Mask, selection: Mask, **options: object) -> Forecaster:
+        return fit_forecaster([(self.record, self.setpoints, fit, selection)], site_prior(self.site), {}, **options)  # type: ignore[arg-type]
 
 
 Predictors = Mapping[str, tuple[Predictor, Mapping[str, ErrorGrowth]]]
 
 
-def predictors(house: Greenhouse, model: SiteModel) -> Predictors:
+def predictors(house: Greenhouse, model: Forecaster) -> Predictors:
     """All ways to drive a model, with their intervals."""
     by_actuators = remembering(model.predictor(house.record))
     found = {"hybrid, actuators": (by_actuators, model.growth)}
@@ -219,7 +219,7 @@ def across(houses: Sequence[Greenhouse], every: float) -> dict[str, object]:
     for house in houses:
         others = [one for one in houses if one is not house]
         parts = [(one.record, one.setpoints, one.week % 4 != 3, one.week % 4 == 3) for one in others]
-        model = fit_site(parts, prior(nominal(house.site)), {}, actuation=False)
+        model = fit_forecaster(parts, site_prior(house.site), {}, actuation=False)
         rows, later_rows = np.ones(len(house.record), dtype=bool), house.week >= 1
         found = {
             "fitted on others": [errors_of(house.record, model.predictor(house.record), HORIZONS, rows, every=every)]
@@ -229,7 +229,7 @@ def across(houses: Sequence[Greenhouse], every: float) -> dict[str, object]:
         found["and first 7 days"] = [
             errors_of(house.record, adapted.predictor(house.record), HORIZONS, later_rows, every=every)
         ]
-        alone = from_few_days(house.record, first, prior(nominal(house.site)))
+        alone = from_few_days(house.record, first, site_prior(house.site))
         found["first 7 days alone"] = [
             errors_of(house.record, alone.predictor(house.record), HORIZONS, later_rows, every=every)
         ]
@@ -237,16 +237,26 @@ def across(houses: Sequence[Greenhouse], every: float) -> dict[str, object]:
     return tables
 
 
+METERS: Mapping[str, tuple[str, tuple[tuple[str, ...], ...]]] = {
+    "heat": ("MJ m-2", (("heat",),)),
+    "electricity": ("kWh m-2", (("electricity_peak", "electricity_off_peak"), ("electricity",))),
+    "co2": ("kg m-2", (("co2",),)),
+}
+"""What plans are charged for: its unit, and the columns whose sum is its meter, as data sets have them."""
+
+
 def metered(log: Log) -> dict[str, object]:
     """Daily use as `recent_use.used_in` tells it from a log, against the data set's own meters."""
     if log.site is None or log.resources is None:
-        raise IgrowError(f"{log.name}: no meters are read from this data set")
+        print(f"\n{log.name}: no meters are read from this data set")
+        return {}
     telemetry, table = log.telemetry, log.resources
     local = local_days(telemetry.time, log.site.time_zone)
     meters = {
-        "heat": ("MJ m-2", table["heat"]),
-        "electricity": ("kWh m-2", table["electricity_peak"] + table["electricity_off_peak"]),
-        "co2": ("kg m-2", table["co2"]),
+        name: (unit, np.sum([table[column] for column in columns], axis=0))
+        for name, (unit, ways) in METERS.items()
+        for columns in ways
+        if all(column in table for column in columns)
     }
     used: dict[str, list[float]] = {name: [] for name in meters}
     for day in table.day:
@@ -260,6 +270,9 @@ def metered(log: Log) -> dict[str, object]:
     for name, (unit, measured) in meters.items():
         told = np.array(used[name])
         both = np.isfinite(told) & np.isfinite(measured)
+        if not both.any():
+            print(f"  {name + ' (' + unit + ')':24s} not told by the log")
+            continue
         worth = both & (measured > 0.05 * np.nanmean(measured))
         median = float(np.median(np.abs(told - measured)[worth] / measured[worth]))
         sums = float(told[both].sum()), float(measured[both].sum())
@@ -282,15 +295,15 @@ def print_coverage(parts: Sequence[Mapping[tuple[str, str], tuple[float, float]]
         print(f"  {driven:10s} {what:28s} {inside / max(number, 1):.3f}")
 
 
-def print_range(house: Greenhouse, model: SiteModel, predict: Predictor, fit: Mask, rows: Mask, every: float) -> None:
+def print_range(house: Greenhouse, model: Forecaster, predict: Predictor, fit: Mask, rows: Mask, every: float) -> None:
     """Tell whether runs outside the training range are worse: by both measures, the error of 24 h runs.
 
     `bounds` is what a bundle's graph tells planning: the largest excess over the bounds of single quantities
-    (`igrow.trainer.model.known_range`). `TrainingRange` sees combinations that never occurred too.
+    (`igrow.trainer.fit.model.training_envelope`). `TrainingRange` sees combinations that never occurred too.
     """
     record = house.record
     known = {**record.inputs, **record.measured, **house.setpoints}
-    bounds = known_range({name: known[name][fit] for name in RANGED})
+    bounds = training_envelope({name: known[name][fit] for name in RANGED})
     excess = {
         "bounds": np.max(
             [np.maximum(low - known[name], known[name] - high) / (high - low) for name, (low, high) in bounds.items()],

@@ -45,7 +45,7 @@ from igrow.core.sun import unix_seconds
 from igrow.core.telemetry import Telemetry
 from igrow.edge.planning.forecast import persistence
 from igrow.edge.planning.make_plan import RECENT_DAYS
-from igrow.trainer.policies.environment import DAY, Greenhouses, Scenario, hourly_weather
+from igrow.trainer.research.policies.environment import DAY, Greenhouses, Scenario, hourly_weather
 
 Values = NDArray[np.float64]
 

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-Array = Any
-"""An array of the namespace `xp`, or a float."""
+from igrow.core.arrays import Array
 
 STANDARD_PRESSURE = 101_325.0
 """Air pressure at sea level, Pa."""

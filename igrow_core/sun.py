@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = Any
-"""An array of the namespace `xp`, or a float."""
+from igrow.core.arrays import Array
 
 SECONDS_PER_DAY = 86_400.0
 SOLAR_CONSTANT = 1361.0

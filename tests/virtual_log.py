@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from igrow.core import sun
 from igrow.core.simulator import actuation
@@ -51,6 +52,18 @@ def setpoints(days: int, step: float) -> dict[str, Floats]:
         "co2_setpoint": np.where(day, 700.0, 400.0),
         "lamp_on": np.where((hour > 4.0) & (hour < 18.0), 1.0, 0.0),
         "irrigation_on": np.where(day, 0.1, 0.0),
+    }
+
+
+def disturbances(days: int, step: float, seed: int, size: float = 1.0) -> dict[str, Floats]:
+    """Coloured fluxes that no model knows: correlation time of two hours."""
+    generator = np.random.default_rng(seed)
+    count = round(days * 86_400 / step)
+    keep = float(np.exp(-step / 7200.0))
+    sizes = {"heat": 4.0, "vapour": 1e-6, "co2": 6e-8}
+    return {
+        name: size * usual * np.sqrt(1.0 - keep**2) * lfilter([1.0], [1.0, -keep], generator.standard_normal(count))
+        for name, usual in sizes.items()
     }
 
 

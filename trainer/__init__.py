@@ -1,1 +1,60 @@
-"""The trainer side: learns the simulator from logs, finds what it lacks, and publishes the corrected one."""
+"""The trainer side: learns the simulator from logs, finds what it lacks, and publishes the corrected one.
+
+    from igrow.trainer import calibrate, diagnose, export, publish, read_log
+
+    log = read_log("export.csv", "site.yaml")           # any source; log.notes say what was set aside
+    model = calibrate(log)                              # a fitted model with its covariance
+    result = diagnose(later, model)                     # of a later log: result.summary(), result.findings
+    bundle = export(result.corrected, "out/bundle")     # what a gateway runs
+    publish(bundle, "/srv/igrow", "keys")               # signed, into the exchange
+
+Every command, benchmark and service goes this road. Names are imported when they are first used.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from igrow.trainer.data import Log, prepare_log, read_log
+    from igrow.trainer.diagnosis import diagnose
+    from igrow.trainer.exporting import export, read_model
+    from igrow.trainer.fit import FittedModel, calibrate
+    from igrow.trainer.publishing import publish
+
+_PLACES = {
+    "FittedModel": "igrow.trainer.fit",
+    "Log": "igrow.trainer.data",
+    "calibrate": "igrow.trainer.fit",
+    "diagnose": "igrow.trainer.diagnosis",
+    "export": "igrow.trainer.exporting",
+    "prepare_log": "igrow.trainer.data",
+    "publish": "igrow.trainer.publishing",
+    "read_log": "igrow.trainer.data",
+    "read_model": "igrow.trainer.exporting",
+}
+
+__all__ = [
+    "FittedModel",
+    "Log",
+    "calibrate",
+    "diagnose",
+    "export",
+    "prepare_log",
+    "publish",
+    "read_log",
+    "read_model",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Import one of the road's names when it is first used: torch, onnx and pandas are slow to load."""
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_PLACES[name]), name)
+
+
+def __dir__() -> list[str]:
+    """List the road's names."""
+    return sorted(_PLACES)

@@ -8,29 +8,25 @@ learned, and the range that planning may use.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
 
-from igrow.core.bundle import BUILT_IN, Span
+from igrow.core.bundle import BUILT_IN
 from igrow.core.greenhouse import Season, generate_weather, recipe, simulate_many
 from igrow.core.greenhouse.described import parameters_of
-from igrow.core.local_time import utc_datetime
 from igrow.core.quantities import SETPOINTS
-from igrow.core.simulator import holding
 from igrow.core.simulator.crop import CropStages
-from igrow.core.simulator.hybrid.nominal import nominal, site_record
+from igrow.core.simulator.hybrid.nominal import site_record
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
-from igrow.trainer.calibration.actuation import fit_actuation, setpoint_columns
-from igrow.trainer.calibration.fit import calibrate
-from igrow.trainer.calibration.holding import fit_holding
-from igrow.trainer.calibration.posterior import Posterior, prior
 from igrow.trainer.data import prepare_log
-from igrow.trainer.diagnosis.deployed import learn_misfit
-from igrow.trainer.export.plan import RANGED
-from igrow.trainer.model import HybridModel, known_range
+from igrow.trainer.exporting.plan import RANGED
+from igrow.trainer.fit.actuation import fit_actuation, setpoint_columns
+from igrow.trainer.fit.calibrate import calibrate
+from igrow.trainer.fit.model import FittedModel, training_envelope
 from igrow.trainer.training.crop import fit_net_growth, train_networks
 
 START = np.datetime64("2020-01-20T00:00:00")
@@ -89,7 +85,7 @@ def varied_recipe(start: np.datetime64, end: np.datetime64, random: np.random.Ge
     return Telemetry(hours, {name: rows[:, column] for column, name in enumerate(SETPOINTS)})
 
 
-def default_model(site: Site, *, seed: int = 0, report: Report = print) -> HybridModel:
+def default_model(site: Site, *, seed: int = 0, report: Report = print) -> FittedModel:
     """Build the simulator of an unmeasured site from virtual seasons.
 
     Args:
@@ -99,31 +95,30 @@ def default_model(site: Site, *, seed: int = 0, report: Report = print) -> Hybri
     """
     report(f"simulating {HOUSES} virtual greenhouses for {DAYS} days")
     seasons = virtual_seasons(site, HOUSES, DAYS, seed)
-    posterior, misfit = _fitted(site, seasons[0], report)
-    rules, held = _fitted_control(site, seasons, posterior.values)
+    logs = [prepare_log(season.measured, site) for season in seasons]
+    model = calibrate(logs[0], progress=report)
+    physical, alignment = model.posterior.values, model.alignment or 0.0
+    parts = [(record := log.record(alignment), setpoint_columns(log.telemetry, record)[0], None) for log in logs]
     growth, harvest = train_networks([season.true for season in seasons], seed=seed, report=report)
     records = [site_record(season.true, site, 300.0) for season in seasons]
-    conversion, maintenance = fit_net_growth(records, posterior.values, [season.true for season in seasons])
+    conversion, maintenance = fit_net_growth(records, physical, [season.true for season in seasons])
     report(
         f"growth: {conversion:.3f} kg of dry matter per kg of CO2, {24e3 * maintenance:.2f} g m-2 a day for maintenance"
     )
-    tables = [season.measured for season in seasons]
-    end = START + np.timedelta64(DAYS, "D")
-    return HybridModel(
-        site=site,
-        posterior=posterior,
-        # A virtual greenhouse, however well it was described: the real one is another.
+    columns = {name: np.concatenate([log.telemetry[name] for log in logs]) for name in (*RANGED, *SETPOINTS)}
+    return replace(
+        model,
+        # A virtual greenhouse, however well it was described: the real one is another, and so are its log and errors.
         calibrated_on=BUILT_IN,
-        actuation=rules,
-        holding=held,
+        alignment=None,
+        errors=(),
+        actuation=fit_actuation(parts, physical),
         crop=CropStages(growth, harvest, conversion, maintenance),
-        training_span=Span(utc_datetime(START), utc_datetime(end)),
-        training_range=known_range({name: concatenate_column(tables, name) for name in (*RANGED, *SETPOINTS)}),
-        known_misfit=misfit,
+        training_range=training_envelope(columns),
     )
 
 
-def equipped(model: HybridModel) -> HybridModel:
+def equipped(model: FittedModel) -> FittedModel:
     """Return the model with the capacities of its site's equipment."""
     house = model.site.greenhouse
     rules, held = dict(model.actuation), dict(model.holding)
@@ -133,31 +128,4 @@ def equipped(model: HybridModel) -> HybridModel:
     for name, screen in (("energy_screen", house.energy_screen), ("blackout_screen", house.blackout_screen)):
         if screen is None:
             rules |= {f"{name}_unlit": 0.0, f"{name}_lit": 0.0, f"{name}_open": 0.0}
-    return model.controlled(rules, held)
-
-
-def _fitted_control(
-    site: Site, seasons: Sequence[Season], physical: Mapping[str, float]
-) -> tuple[dict[str, float], dict[str, float]]:
-    """Fit both to the virtual seasons."""
-    parts = []
-    for season in seasons:
-        record = site_record(season.measured, site, 300.0)
-        parts.append((record, setpoint_columns(season.measured, record)[0], None))
-    held = {name: parameter.value for name, parameter in holding.PARAMETERS.items()}
-    record, setpoints, _ = parts[0]
-    return fit_actuation(parts, physical), fit_holding(record, setpoints, physical, held)
-
-
-def concatenate_column(tables: Sequence[Telemetry], name: str) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """Return all values of one column, one table after the other."""
-    return np.concatenate([table[name] for table in tables])
-
-
-def _fitted(site: Site, season: Season, report: Report) -> tuple[Posterior, dict[str, float]]:
-    """Fit the physical parameters to one log; returns them and what they leave unexplained."""
-    log = prepare_log(season.measured, site)
-    record = log.record(log.best_shift(nominal(site)))
-    fitted = calibrate([(record, None)], prior(nominal(site)), {}, every_hours=8.0, progress=report)
-    deviation = dict(zip(fitted.names, map(float, fitted.standard_deviation), strict=True))
-    return fitted, learn_misfit(record, fitted.values, deviation, site.longitude)
+    return replace(model, actuation=rules, holding=held)

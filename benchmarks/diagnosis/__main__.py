@@ -1,11 +1,11 @@
 """Print the diagnosis benchmark: `python -m benchmarks.diagnosis [WHAT]`.
 
 `scoring` (the default) draws 208 cases, simulates their logs and those that the models are calibrated on, diagnoses
-each, and prints the table beside its bounds. `elsewhere` does the same with greenhouses that nothing was learned from,
-each with a model calibrated on its own first weeks; `uncalibrated` diagnoses the same logs with the built-in bundle.
-`matched` does the like with greenhouses of the simulator's own structure; `real` diagnoses the public logs. `usual`
-learns anew what is usual between greenhouses, from seeds that no case has. Everything is made afresh: an hour or so on
-two cores.
+each, and prints the table beside its bounds. `others` does the same with greenhouses that nothing was learned from,
+each with a model calibrated on its own first weeks; `transferred` diagnoses the same logs with the built-in bundle.
+`matched` does the like with greenhouses of the simulator's own structure; `real` diagnoses the public logs.
+`nuisance` learns anew what greenhouses show though nothing is missing, and `rules` fits the bounds that are fitted,
+both from seeds that no case has; `thresholds` prints all rules. Everything is made afresh: an hour or so on two cores.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from benchmarks.diagnosis import matched, real, usual
+from benchmarks.diagnosis import matched, nuisance, real, rules
 from benchmarks.diagnosis.cases import SEASONS, Case, draw
-from benchmarks.diagnosis.houses import elsewhere, of_seasons
+from benchmarks.diagnosis.greenhouses import of_seasons, others
 from benchmarks.diagnosis.logs import Reference, built_in, reference, simulate_cases
 from benchmarks.diagnosis.scoring import Outcome, judge, show, table
 from igrow.core.telemetry import Telemetry
 
-WHAT = ("scoring", "tuning", "elsewhere", "uncalibrated", "matched", "usual", "real")
-HOUSES_ELSEWHERE = 8
+WHAT = ("scoring", "tuning", "others", "transferred", "matched", "nuisance", "rules", "thresholds", "real")
+OTHER_GREENHOUSES = 8
 SEASONS_USED = ("winter", "spring")
 
 
@@ -48,35 +48,41 @@ def main() -> int:
         return real.main(options.data)
     if options.what == "matched":
         return matched.main(options.processes)
-    if options.what == "usual":
-        return usual.main(options.processes)
-    away = options.what in {"elsewhere", "uncalibrated"}
+    if options.what == "nuisance":
+        return nuisance.main(options.processes)
+    if options.what == "rules":
+        return rules.main(options.processes)
+    if options.what == "thresholds":
+        return rules.show()
+    away = options.what in {"others", "transferred"}
     if away and options.season:
-        parser.error("houses elsewhere have seasons of their own: leave --season out")
+        parser.error("other greenhouses have seasons of their own: leave --season out")
     seasons = of_seasons()
-    houses = elsewhere(HOUSES_ELSEWHERE) if away else {name: seasons[name] for name in options.season or SEASONS_USED}
+    greenhouses = (
+        others(OTHER_GREENHOUSES) if away else {name: seasons[name] for name in options.season or SEASONS_USED}
+    )
     outcomes: list[Outcome] = []
     with ProcessPoolExecutor(options.processes) as pool:
-        print(f"calibrating on the reference logs of {', '.join(houses)}", file=sys.stderr)
+        print(f"calibrating on the reference logs of {', '.join(greenhouses)}", file=sys.stderr)
         references = {}
-        for name, one in zip(houses, pool.map(reference, houses.values()), strict=True):
+        for name, one in zip(greenhouses, pool.map(reference, greenhouses.values()), strict=True):
             references[name] = one
-            print(f"{len(references)} of {len(houses)}: {name}", file=sys.stderr)
+            print(f"{len(references)} of {len(greenhouses)}: {name}", file=sys.stderr)
         units = {name: one.unit for name, one in references.items()}
         cases = draw("scoring" if away else options.what, options.cases, units, options.seed)
-        own = {name: [case for case in cases if case.house == name] for name in houses}
+        own = {name: [case for case in cases if case.greenhouse == name] for name in greenhouses}
         print(f"simulating {len(cases)} logs", file=sys.stderr)
         simulated = pool.map(
             simulate_cases,
             references.values(),
             own.values(),
-            [options.days] * len(houses),
+            [options.days] * len(greenhouses),
         )
-        if options.what == "uncalibrated":
-            references = {name: replace(one, deployed=built_in(one.house.site)) for name, one in references.items()}
+        if options.what == "transferred":
+            references = {name: replace(one, model=built_in(one.greenhouse.site)) for name, one in references.items()}
         jobs = [
             (case, log, references[name])
-            for name, logs in zip(houses, simulated, strict=True)
+            for name, logs in zip(greenhouses, simulated, strict=True)
             for case, log in zip(own[name], logs, strict=True)
         ]
         for number, outcome in enumerate(pool.map(_judge, jobs), 1):

@@ -1,7 +1,7 @@
 """The benchmark's cases: what is hidden in which greenhouse, drawn from seeds, never by hand.
 
 Sizes are in ENR: RMS of the effect in 24 h free runs over the RMS that stays when nothing is missing, root mean square
-over temperature, humidity and CO2; measured once per house on the reference log with the calibrated model. A cause
+over temperature, humidity and CO2; measured once per greenhouse on the reference log with the calibrated model. A cause
 that its bounds keep from reaching the size there (a closed valve in a winter of full heat) is not drawn.
 Tuning and scoring draw from disjoint seeds, and bend the truth with disjoint forms.
 """
@@ -44,7 +44,7 @@ FORMS = {
 }
 """(exponent, threshold, delay in seconds) of the true effect against the catalogue's."""
 REACHABLE = 1.5
-"""ENR that a cause must be able to reach in a house to be drawn for it."""
+"""ENR that a cause must be able to reach in a greenhouse to be drawn for it."""
 
 
 @dataclass(frozen=True)
@@ -54,8 +54,8 @@ class Case:
     name: str
     group: str
     """nothing, single, sensor, pair, onset, outside or withheld."""
-    house: str
-    """Key of `houses`."""
+    greenhouse: str
+    """Key of `greenhouses`."""
     seed: int
     causes: tuple[str, ...] = ()
     size: float = 0.0
@@ -75,7 +75,7 @@ def draw(kind: str, count: int, units: Mapping[str, Mapping[str, float]], seed: 
     Args:
         kind: ``tuning`` or ``scoring``.
         count: about how many.
-        units: amplitude of ENR 1 of every cause, by house; its houses are used.
+        units: amplitude of ENR 1 of every cause, by greenhouse; its greenhouses are used.
         seed: of the first case (None: the kind's).
     """
     first = SEEDS[kind] if seed is None else seed
@@ -90,24 +90,24 @@ def draw(kind: str, count: int, units: Mapping[str, Mapping[str, float]], seed: 
         "pair": _shuffled(rng, process),
         "onset": _shuffled(rng, [*process, *sensor]),
     }
-    houses = list(units)
+    greenhouses = list(units)
     cases: list[Case] = []
     for group, share in SHARES.items():
         for index in range(max(1, round(share * count))):
-            house = houses[index % len(houses)]
+            greenhouse = greenhouses[index % len(greenhouses)]
             causes: tuple[str, ...] = ()
             if group != "nothing":
-                causes = (_next(turns[group], units[house], ()),)
+                causes = (_next(turns[group], units[greenhouse], ()),)
             if group == "pair":
-                causes = (*causes, _next(turns["single" if index % 2 else "sensor"], units[house], causes))
+                causes = (*causes, _next(turns["single" if index % 2 else "sensor"], units[greenhouse], causes))
             cases.append(
                 Case(
                     name=f"{kind}-{group}-{index:03d}",
                     group=group,
-                    house=house,
+                    greenhouse=greenhouse,
                     seed=first + len(cases),
                     causes=causes,
-                    size=_size(group, index // len(houses)),
+                    size=_size(group, index // len(greenhouses)),
                     forms=tuple(FORMS[kind][int(rng.integers(len(FORMS[kind])))] for _ in causes),
                     onset_day=float(rng.uniform(7.0, 20.0)) if group == "onset" else None,
                     without=causes if group == "withheld" else (),
@@ -131,7 +131,7 @@ def hidden(case: Case, unit: dict[str, float], start: np.datetime64) -> list[Hid
 
     Args:
         case: the case.
-        unit: amplitude of ENR 1 for every cause in the case's house.
+        unit: amplitude of ENR 1 for every cause in the case's greenhouse.
         start: of the log.
     """
     onset = None if case.onset_day is None else start + np.timedelta64(round(case.onset_day * 24), "h")
@@ -160,10 +160,10 @@ def _shuffled(rng: np.random.Generator, names: list[str]) -> list[str]:
 
 
 def _next(turn: list[str], unit: Mapping[str, float], but: tuple[str, ...]) -> str:
-    """Take the next cause that can be seen in the house, and put it at the end of the line."""
+    """Take the next cause that can be seen in the greenhouse, and put it at the end of the line."""
     for position, name in enumerate(turn):
         definition = EFFECTS.get(name) or UNCATALOGUED[name]
         if name not in but and REACHABLE * unit[name] <= abs(definition.amplitude.high):
             turn.append(turn.pop(position))
             return name
-    raise AssertionError("a house in which no cause can be seen")
+    raise AssertionError("a greenhouse in which no cause can be seen")

@@ -13,23 +13,23 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.diagnosis.cases import REACHABLE, Case
-from benchmarks.diagnosis.houses import of_seasons
+from benchmarks.diagnosis.greenhouses import of_seasons
 from benchmarks.diagnosis.logs import MISMATCH, Reference, reference, simulate_cases
+from igrow.core.arrays import Floats
 from igrow.core.effects import EFFECTS
 from igrow.core.simulator.hybrid.nominal import site_record
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.core.simulator.hybrid.record import free_run, observe
 from igrow.core.telemetry import Telemetry, to_grid
+from igrow.trainer.data import prepare_log
 from igrow.trainer.diagnosis import diagnose
-from igrow.trainer.diagnosis.activation import ActiveTerm, activate
-from igrow.trainer.diagnosis.deployed import Deployed
-from igrow.trainer.diagnosis.linearisation import STEP
+from igrow.trainer.diagnosis.knowledge import ActiveTerm, activate
+from igrow.trainer.fit import FittedModel
 
-Floats = NDArray[np.float64]
-
+STEP = 900.0
+"""Seconds between rows of the logs."""
 SEASON, DAYS, SEED = "winter", 28, 9500
 NOTHING = 40
 SIZES = (1.0, 0.3)
@@ -41,13 +41,13 @@ NOISE = {"air_temperature": 0.1, "air_humidity": 0.6, "air_co2": 8.0}
 
 
 def matched_log(
-    driven: Telemetry, deployed: Deployed, terms: Sequence[ActiveTerm], rng: np.random.Generator
+    driven: Telemetry, model: FittedModel, terms: Sequence[ActiveTerm], rng: np.random.Generator
 ) -> Telemetry:
     """Return a log of 15 min in which the hybrid stage, 8 % off, is the greenhouse.
 
     Args:
         driven: log whose weather and actuators are taken.
-        deployed: the model that it is 8 % off from.
+        model: that it is 8 % off from.
         terms: what is hidden in it.
         rng: for parameters, disturbances and noise.
     """
@@ -55,7 +55,7 @@ def matched_log(
     record = site_record(coarse, SITE, STEP)
     plant = {
         name: float(np.clip(value * (1.0 + MISMATCH * rng.normal()), PARAMETERS[name].low, PARAMETERS[name].high))
-        for name, value in deployed.parameters.items()
+        for name, value in model.posterior.values.items()
     }
     effects = activate(record, terms)
     count = len(record)
@@ -83,24 +83,24 @@ def _coloured(rng: np.random.Generator, count: int, size: float) -> Floats:
     return course
 
 
-def _judge(job: tuple[int, Telemetry, Deployed, str, float]) -> tuple[str, float, str, tuple[str, ...]]:
-    seed, driven, deployed, cause, amplitude = job
+def _judge(job: tuple[int, Telemetry, FittedModel, str, float]) -> tuple[str, float, str, tuple[str, ...]]:
+    seed, driven, model, cause, amplitude = job
     shape = {one.name: one.typical for one in EFFECTS[cause].shapes} if cause else {}
     terms = (ActiveTerm(cause, amplitude, shape),) if cause else ()
-    log = matched_log(driven, deployed, terms, np.random.default_rng(seed))
-    diagnosis, _ = diagnose(log, SITE, deployed)
+    log = matched_log(driven, model, terms, np.random.default_rng(seed))
+    diagnosis = diagnose(prepare_log(log, SITE), model)
     return cause, amplitude, diagnosis.verdict, tuple(one.effect for one in diagnosis.findings)
 
 
-def _jobs(known: Reference) -> list[tuple[int, Telemetry, Deployed, str, float]]:
+def _jobs(known: Reference) -> list[tuple[int, Telemetry, FittedModel, str, float]]:
     drivers = [Case(f"matched-{index}", "nothing", SEASON, SEED + index) for index in range(20)]
     logs = simulate_cases(known, drivers, DAYS)
-    # The actuators are read as they stand, and the calibration's misfit is the mechanistic greenhouse's own.
-    deployed = replace(known.deployed, known_misfit={}, shift=0.0)
+    # The actuators are read as they stand, and the calibration's discrepancy is the mechanistic greenhouse's own.
+    model = replace(known.model, discrepancy={}, alignment=0.0)
     seen = [name for name, effect in EFFECTS.items() if REACHABLE * known.unit[name] <= abs(effect.amplitude.high)]
     wanted = [("", 0.0)] * NOTHING + [(name, size * known.unit[name]) for size in SIZES for name in seen]
     return [
-        (SEED + 1000 + index, logs[index % len(logs)], deployed, cause, amplitude)
+        (SEED + 1000 + index, logs[index % len(logs)], model, cause, amplitude)
         for index, (cause, amplitude) in enumerate(wanted)
     ]
 

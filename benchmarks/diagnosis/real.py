@@ -20,12 +20,12 @@ import numpy as np
 
 from benchmarks.diagnosis.logs import built_in
 from igrow.core.errors import IgrowError
-from igrow.core.simulator.hybrid.nominal import nominal
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.core.site import Site
-from igrow.trainer.calibration import calibrate, prior
 from igrow.trainer.data import Log, read_log
-from igrow.trainer.diagnosis import Deployed, Diagnosis, diagnose, learn_misfit, structure
+from igrow.trainer.diagnosis import Diagnosis, diagnose
+from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX
+from igrow.trainer.fit import FittedModel, Gaussian, calibrate
 
 COMPARTMENTS = (
     ("agc2019", "Reference"),
@@ -43,6 +43,8 @@ LOST = {
     "transpiration_night_share": "night_transpiration",
 }
 """Parameters that the model loses, and the effect that is then missing."""
+SURE = 1e-6
+"""Relative standard deviation of a parameter that the model has lost."""
 PLACEBO = ("wind_speed", "wind_direction", "rain")
 
 
@@ -67,16 +69,6 @@ def compartments(data: Path) -> Iterator[Compartment]:
         yield Compartment(f"{folder} {name}", log.known_site, log.select(start, middle), log.select(middle, end))
 
 
-def deploy(log: Log, site: Site) -> Deployed:
-    """Calibrate on a log as a bundle would be."""
-    shift = log.best_shift(nominal(site))
-    record = log.record(shift)
-    posterior = calibrate([(record, None)], prior(nominal(site)), {}, every_hours=8.0)
-    deviations = dict(zip(posterior.names, map(float, posterior.standard_deviation), strict=True))
-    misfit = learn_misfit(record, posterior.values, deviations, site.longitude)
-    return Deployed(posterior.values, deviations, (), misfit, shift)
-
-
 def say(title: str, diagnosis: Diagnosis) -> None:
     causes = ", ".join(f"{one.effect} ({'/'.join(one.rivals)})" for one in diagnosis.findings) or "-"
     print(f"{title:72} {diagnosis.verdict:12} {causes}", flush=True)
@@ -86,16 +78,17 @@ def say(title: str, diagnosis: Diagnosis) -> None:
             print(f"{'':44} {quantity:16} 24 h: {stages}")
 
 
-def lose(model: Deployed, parameter: str) -> Deployed:
-    """Return the model with a term at the lowest value that its parameter may have."""
-    own = structure.PARAMETER_PREFIX + parameter
-    return replace(
-        model,
-        parameters={**model.parameters, parameter: PARAMETERS[parameter].low},
-        standard_deviation={**model.standard_deviation, parameter: 0.0},
-        # What the calibration log said of this parameter beside would bring a part of it back.
-        known_misfit={key: value for key, value in model.known_misfit.items() if key != own},
-    )
+def lose(model: FittedModel, parameter: str) -> FittedModel:
+    """Return the model with a term at the lowest value that its parameter may have, and sure of it."""
+    posterior, place = model.posterior, model.posterior.names.index(parameter)
+    mean, covariance = posterior.mean.copy(), posterior.covariance.copy()
+    mean[place] = PARAMETERS[parameter].low
+    covariance[place, :] = covariance[:, place] = 0.0
+    covariance[place, place] = (SURE * PARAMETERS[parameter].value) ** 2
+    # What the calibration log said of this parameter beside would bring a part of it back.
+    own = PARAMETER_PREFIX + parameter
+    discrepancy = {key: value for key, value in model.discrepancy.items() if key != own}
+    return replace(model, posterior=Gaussian(posterior.names, mean, covariance), discrepancy=discrepancy)
 
 
 def placebo(log: Log, other: Log) -> Log:
@@ -112,20 +105,20 @@ def main(data: Path | None) -> int:
     found: dict[str, set[str]] = {}
     for one in compartments(data):
         print(f"calibrating {one.name} on {CALIBRATION_DAYS} days", file=sys.stderr)
-        model = deploy(one.before, one.site)
-        diagnosis, _ = diagnose(one.after, one.site, model)
+        model = calibrate(one.before)
+        diagnosis = diagnose(one.after, model)
         say(one.name, diagnosis)
         found[one.name] = {finding.effect for finding in diagnosis.findings}
-        uncalibrated, _ = diagnose(one.after, one.site, built_in(one.site))
-        say("  with the built-in bundle", uncalibrated)
+        transferred = diagnose(one.after, built_in(one.site))
+        say("  with the built-in bundle", transferred)
         for parameter, effect in LOST.items():
-            told, _ = diagnose(one.after, one.site, lose(model, parameter))
-            say(f"  model without {effect} ({parameter} was {model.parameters[parameter]:.3g})", told)
+            told = diagnose(one.after, lose(model, parameter))
+            say(f"  model without {effect} ({parameter} was {model.posterior.values[parameter]:.3g})", told)
         for column in WITHHELD:
             if column in one.after.telemetry:
-                told, _ = diagnose(one.after.without(column), one.site, model)
+                told = diagnose(one.after.without(column), model)
                 say(f"  log without {column}", told)
-        false, _ = diagnose(placebo(one.after, one.before), one.site, model)
+        false = diagnose(placebo(one.after, one.before), model)
         say("  wind and rain of other weeks", false)
     shared = {name for names in found.values() for name in names if sum(name in other for other in found.values()) > 1}
     print(f"causes found in more than one compartment: {', '.join(sorted(shared)) or 'none'}")

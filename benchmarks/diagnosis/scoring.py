@@ -6,29 +6,30 @@ import itertools
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from benchmarks.diagnosis.cases import Case, hidden
 from benchmarks.diagnosis.logs import Reference
 from igrow.core import sun
+from igrow.core.arrays import Floats
 from igrow.core.effects import EFFECTS
 from igrow.core.greenhouse import HiddenEffect
 from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
-from igrow.trainer.diagnosis import diagnose, freefit, likelihood, linearisation, search, selection, structure
-from igrow.trainer.diagnosis.activation import ActiveTerm, activate
-from igrow.trainer.diagnosis.diagnose import Evidence, Stage
-from igrow.trainer.diagnosis.gram import Term
-from igrow.trainer.diagnosis.problem import Problem
+from igrow.trainer.data import prepare_log
+from igrow.trainer.diagnosis import DEFAULT, compare, diagnose, linear, sensitivity
+from igrow.trainer.diagnosis.design import Design
+from igrow.trainer.diagnosis.evidence import Evidence, errors_with
+from igrow.trainer.diagnosis.knowledge import ActiveTerm
+from igrow.trainer.diagnosis.linear import Term
 
 NOISE = {"air_temperature": 0.5, "air_humidity": 2.0, "air_co2": 35.0}
 """Scales under which errors of different quantities are added."""
 
-WORTHS = (0.0, selection.STRUCTURE, 30.0, 100.0, float("inf"))
-"""Classes of what a cause is worth, log-likelihood; gains below the second are not named."""
+GAIN_CLASSES = (0.0, DEFAULT.least_gain, 30.0, 100.0, float("inf"))
+"""Classes of the log-likelihood that is to be expected of a cause; gains below the second are not named."""
 
 
 @dataclass(frozen=True)
@@ -50,23 +51,25 @@ class Outcome:
     corrected: float
     perfect: float
     """With the true cause in the model, in the catalogue's form."""
-    worth: float | None
-    """Log-likelihood that a lone true cause is worth on this log, were the model right but for it: what a search can
-    see at best. None for nothing, pairs, beginnings and causes outside the catalogue."""
-    known_worth: float | None
-    """The same were the parameters and the usual differences known."""
+    expected_gain: float | None
+    """Log-likelihood to be expected of a lone true cause on this log, were the model right but for it: what a search
+    can see at best. None for nothing, pairs, beginnings and causes outside the catalogue."""
+    known_gain: float | None
+    """The same were the parameters and the nuisance subspace known."""
     seconds: float
 
 
 def judge(case: Case, telemetry: Telemetry, reference: Reference) -> Outcome:
     """Diagnose one case and compare with the truth."""
     begun = time.perf_counter()
-    site = reference.house.site
-    diagnosis, evidence = diagnose(telemetry, site, reference.deployed, without=case.without)
+    site = reference.greenhouse.site
+    log = prepare_log(telemetry, site)
+    diagnosis = diagnose(log, reference.model, without=case.without)
+    evidence = diagnosis.evidence
     seconds = time.perf_counter() - begun
-    causes = [one for one in diagnosis.findings if one.kind != "remainder"]
+    causes = [one for one in diagnosis.findings if one.kind != "discrepancy"]
     found = tuple(one.effect for one in diagnosis.findings)
-    truth = {one.name: one for one in hidden(case, reference.unit, reference.house.start)}
+    truth = {one.name: one for one in hidden(case, reference.unit, reference.greenhouse.start)}
     relative, covered, onset_error = None, None, None
     for one in causes:
         if one.effect not in truth:
@@ -81,7 +84,7 @@ def judge(case: Case, telemetry: Telemetry, reference: Reference) -> Outcome:
             )
         break
     errors = diagnosis.errors
-    worth, known_worth = _worth(evidence.first.problem, case, truth) if evidence is not None else (None, None)
+    gains = _expected_gains(evidence.first.design, case, truth) if evidence is not None else (None, None)
     return Outcome(
         case,
         diagnosis.verdict,
@@ -92,19 +95,16 @@ def judge(case: Case, telemetry: Telemetry, reference: Reference) -> Outcome:
         onset_error,
         _sum(errors, "recalibrated"),
         _sum(errors, "corrected"),
-        _perfect(evidence, truth, reference.house.site)
-        if evidence is not None and truth
-        else _sum(errors, "recalibrated"),
-        worth,
-        known_worth,
+        _perfect(evidence, truth, site) if evidence is not None and truth else _sum(errors, "recalibrated"),
+        *gains,
         seconds,
     )
 
 
-def _worth(problem: Problem, case: Case, truth: Mapping[str, HiddenEffect]) -> tuple[float | None, float | None]:
+def _expected_gains(design: Design, case: Case, truth: Mapping[str, HiddenEffect]) -> tuple[float | None, float | None]:
     """Return half the squared size of a lone true cause over its standard deviation, under the noise that it leaves.
 
-    First with the parameters and the usual differences integrated out, then as if they were known.
+    First with the parameters and the nuisance subspace integrated out, then as if they were known.
     """
     if len(case.causes) != 1 or case.causes[0] not in EFFECTS or case.onset_day is not None:
         return None, None
@@ -112,16 +112,16 @@ def _worth(problem: Problem, case: Case, truth: Mapping[str, HiddenEffect]) -> t
     typical = {shape.name: shape.typical for shape in EFFECTS[name].shapes}
     own = [
         (sum(abs(candidate.values[key] - value) for key, value in typical.items()), column)
-        for column, candidate in zip(problem.candidate, problem.candidates, strict=True)
+        for column, candidate in zip(design.block("effect").columns, design.candidates, strict=True)
         if candidate.effect == name
     ]
     if not own:
         return None, None
     term = Term(min(own)[1])
-    model = structure.null_model(problem).with_term(term)
-    grams = problem.whitened(likelihood.profile(problem, model).whitening).grams
+    model = design.null_model().with_term(term)
+    grams = design.whitened(compare.profile(design, model).whitening).grams
     size = float(truth[name].size or 0.0)
-    free = float(search.fit(grams, model).deviations[0])
+    free = float(linear.fit(grams, model).deviations[0])
     known = float(grams.products[grams.fit, term.column, term.column].sum())
     return 0.5 * (size / free) ** 2, 0.5 * size**2 * known
 
@@ -130,26 +130,22 @@ def _sum(errors: Mapping[str, Mapping[str, Mapping[str, float]]], stage: str) ->
     return sum(table["24_h"][stage] / NOISE[quantity] for quantity, table in errors.items() if "24_h" in table)
 
 
-def _perfect(evidence: Evidence, truth: Mapping[str, Any], site: Site) -> float:
+def _perfect(evidence: Evidence, truth: Mapping[str, HiddenEffect], site: Site) -> float:
     """Return the error of the model with the true causes in it, its parameters refitted."""
-    record, split, prepared = evidence.record, evidence.split, evidence.first.problem
     terms = []
-    added: dict[str, Any] = {}
+    added: dict[str, Floats] = {}
+    line = evidence.first.design.line
+    weekday = 1.0 * sun.weekday(sun.solar_day(evidence.log.record.time, site.longitude))
+    line = replace(line, drivers={**line.drivers, "weekday": weekday})
     for name, one in truth.items():
+        size = float(one.size or 0.0)
         if name in EFFECTS:
             shape = {shape.name: shape.typical for shape in EFFECTS[name].shapes}
-            terms.append(ActiveTerm(name, float(one.size), shape, one.start))
+            terms.append(ActiveTerm(name, size, shape, one.start))
             continue
-        line = prepared.line
-        weekday = 1.0 * sun.weekday(sun.solar_day(record.time, site.longitude))
-        line = replace(line, drivers={**line.drivers, "weekday": weekday})
-        for channel, flux in linearisation.unit_fluxes(line, UNCATALOGUED[name], {}).items():
-            added[channel] = added.get(channel, 0.0) + float(one.size) * flux
-    effects = activate(record, terms)
-    fitted = freefit.fit(record, prepared.line.runs, split, evidence.knowledge, effects, None, added)
-    runs = Stage(*fitted, tuple(terms), {}, added).runs(record, split)
-    assert runs is not None
-    return sum(float(np.nanmean(np.abs(error))) / NOISE[name] for name, error in runs.errors.items())
+        for channel, flux in sensitivity.unit_fluxes(line, UNCATALOGUED[name], {}).items():
+            added[channel] = added.get(channel, 0.0) + size * flux
+    return sum(error / NOISE[name] for name, error in errors_with(evidence, terms, added).items())
 
 
 def _share(chosen: Sequence[Outcome], right: Callable[[Outcome], bool]) -> tuple[float, int]:
@@ -164,8 +160,8 @@ def _first_right(one: Outcome) -> bool:
     return bool(one.found) and one.found[0] in one.case.causes
 
 
-def _worth_between(outcomes: Sequence[Outcome], low: float, high: float) -> list[Outcome]:
-    return [one for one in outcomes if one.worth is not None and low <= one.worth < high]
+def _gain_between(outcomes: Sequence[Outcome], low: float, high: float) -> list[Outcome]:
+    return [one for one in outcomes if one.expected_gain is not None and low <= one.expected_gain < high]
 
 
 def _claims(outcomes: Sequence[Outcome]) -> list[Outcome]:
@@ -191,11 +187,12 @@ def table(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int, str]]:
     covered = [one.covered for one in outcomes if one.covered is not None]
     claims = _claims(outcomes)
     alone = _group(outcomes, "single", "sensor")
-    worth = {
-        size: [one.worth for one in alone if one.case.size == size and one.worth is not None] for size in (1.0, 0.3)
+    expected = {
+        size: [one.expected_gain for one in alone if one.case.size == size and one.expected_gain is not None]
+        for size in (1.0, 0.3)
     }
     known = {
-        size: [one.known_worth for one in alone if one.case.size == size and one.known_worth is not None]
+        size: [one.known_gain for one in alone if one.case.size == size and one.known_gain is not None]
         for size in (1.0, 0.3)
     }
     return [
@@ -209,16 +206,16 @@ def table(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int, str]]:
         ("right cause first, ENR 0.3", *_share(_group(outcomes, "single", "sensor", size=0.3), _first_right), ">= .85"),
         *(
             (
-                f"right cause first, worth {low:g} to {high:g}",
-                *_share(_worth_between(alone, low, high), _first_right),
+                f"right cause first, expected gain {low:g} to {high:g}",
+                *_share(_gain_between(alone, low, high), _first_right),
                 "-",
             )
-            for low, high in itertools.pairwise(WORTHS)
+            for low, high in itertools.pairwise(GAIN_CLASSES)
         ),
         ("right cause first, where something was claimed", *_share(claims, _first_right), "-"),
         *(
-            (f"  log-likelihood that ENR {size:g} is worth, {what}median", float(np.median(values)), len(values), "-")
-            for what, sizes_of in (("", worth), ("parameters known, ", known))
+            (f"  expected gain of ENR {size:g}, {what}median", float(np.median(values)), len(values), "-")
+            for what, sizes_of in (("", expected), ("parameters known, ", known))
             for size, values in sizes_of.items()
             if values
         ),

@@ -13,16 +13,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from igrow.core.agronomy.memory import LONG_AGO, Memory, at
 from igrow.core.agronomy.moment import TOMORROW, Moment, Place
+from igrow.core.arrays import Array
 
-Array = Any
-"""A float, or an array over candidates."""
 _EPSILON = 1e-9
 
 DARK, LIGHT, REST = "dark_hours", "light_sum_high", "rest"

@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from igrow.core.agronomy.moment import Moment, Place, moment
+from igrow.core.arrays import Array
 from igrow.core.sun import unix_seconds
 from igrow.core.telemetry import Telemetry, to_grid
 
-Array = Any
-"""A float, or an array over candidates."""
 Values = NDArray[np.float64]
 
 SWITCHED = ("lamp_on", "irrigation_on")

@@ -30,16 +30,15 @@ from igrow.core.bundle.manifest import (
     BundleError,
     EffectRecord,
     Estimate,
+    FittedParameter,
     GraphSignature,
     HeldOutError,
     Manifest,
     Onset,
-    Parameter,
     Span,
     Tensor,
-    manifest_from_json,
-    manifest_to_json,
 )
+from igrow.core.bundle.manifest_json import manifest_from_json, manifest_to_json
 from igrow.core.bundle.self_test import Deviation, self_test
 from igrow.core.bundle.session import new_session, open_session, run_graph
 
@@ -55,12 +54,12 @@ __all__ = [
     "Deviation",
     "EffectRecord",
     "Estimate",
+    "FittedParameter",
     "Golden",
     "GraphSignature",
     "HeldOutError",
     "Manifest",
     "Onset",
-    "Parameter",
     "Span",
     "Tensor",
     "default_bundle_folder",

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow.core.bundle.manifest import BundleError, Manifest, manifest_from_json, manifest_to_json
+from igrow.core.bundle.manifest import BundleError, Manifest
+from igrow.core.bundle.manifest_json import manifest_from_json, manifest_to_json
 from igrow.core.whole_files import sync_folder, write_through
 
 MANIFEST_FILE = "manifest.json"

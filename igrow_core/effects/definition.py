@@ -26,10 +26,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from igrow.core.arrays import Array
 from igrow.core.errors import IgrowError
 
-Array = Any
-"""An array of the namespace `xp`, or a float."""
 Drivers = Mapping[str, Array]
 """Quantities and derived drivers by name, all of one shape."""
 Values = Mapping[str, Array]

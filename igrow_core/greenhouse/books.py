@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from igrow.core.air import LATENT_HEAT
+from igrow.core.arrays import Array
 from igrow.core.greenhouse import climate, tomato
 from igrow.core.greenhouse.climate import Climate, Ledger
 from igrow.core.greenhouse.light import Light
-from igrow.core.greenhouse.namespace import Array
 from igrow.core.greenhouse.parameters import GreenhouseParameters
 from igrow.core.greenhouse.state import ACCUMULATED, PlantState, add
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from igrow.core.greenhouse.namespace import Array, sigmoid
+from igrow.core.arrays import Array
+from igrow.core.greenhouse.namespace import sigmoid
 from igrow.core.greenhouse.parameters import GreenhouseParameters
 
 GAS_CONSTANT = 8.314

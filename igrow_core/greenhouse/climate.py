@@ -23,8 +23,8 @@ from igrow.core.air import (
     saturation_concentration,
     vapour_concentration,
 )
+from igrow.core.arrays import Array
 from igrow.core.greenhouse.linear import ZERO, solve
-from igrow.core.greenhouse.namespace import Array
 from igrow.core.greenhouse.parameters import GreenhouseParameters
 from igrow.core.greenhouse.ventilation import past_screens
 

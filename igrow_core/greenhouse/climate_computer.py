@@ -14,7 +14,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from igrow.core.greenhouse.namespace import Array, clip, ramp
+from igrow.core.arrays import Array
+from igrow.core.greenhouse.namespace import clip, ramp
 from igrow.core.greenhouse.parameters import GreenhouseParameters
 
 SAFE_SETPOINTS: Mapping[str, float] = {

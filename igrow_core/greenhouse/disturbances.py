@@ -7,7 +7,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from igrow.core.greenhouse.namespace import Array, namespace
+from igrow.core.arrays import Array
+from igrow.core.greenhouse.namespace import namespace
 
 INTERVAL = 300.0
 """Seconds between two innovations."""

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from igrow.core.arrays import Array
 from igrow.core.effects import EFFECTS, Effect
 from igrow.core.errors import IgrowError
-from igrow.core.greenhouse.namespace import Array
 from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
 from igrow.core.sun import unix_seconds
 

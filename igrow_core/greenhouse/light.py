@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from igrow.core.greenhouse.namespace import Array
+from igrow.core.arrays import Array
 from igrow.core.greenhouse.parameters import GreenhouseParameters
 
 JOULE_PER_MICROMOLE = 1.0 / 4.6

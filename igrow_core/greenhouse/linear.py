@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from igrow.core.greenhouse.namespace import Array
+from igrow.core.arrays import Array
 
 
 def solve(matrix: list[list[Array]], right: list[Array]) -> list[Array]:

@@ -11,8 +11,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-Array = Any
-"""A float, or an array of shape (N,)."""
+from igrow.core.arrays import Array
 
 Value = TypeVar("Value")
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from igrow.core.air import co2_fraction, relative_humidity, vapour_pressure_deficit
+from igrow.core.arrays import Array
 from igrow.core.greenhouse import tomato
 from igrow.core.greenhouse.climate_computer import Readings
-from igrow.core.greenhouse.namespace import Array
 from igrow.core.greenhouse.parameters import GreenhouseParameters
 from igrow.core.greenhouse.state import ACCUMULATED, PlantState
 from igrow.core.greenhouse.weather_table import WeatherRow

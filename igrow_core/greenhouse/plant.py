@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from igrow.core.air import co2_fraction, saturation_pressure
+from igrow.core.arrays import Array
 from igrow.core.errors import IgrowError
 from igrow.core.greenhouse import books, canopy, climate, observation, tomato, ventilation
 from igrow.core.greenhouse.climate import Climate, Conditions
@@ -20,7 +21,7 @@ from igrow.core.greenhouse.climate_computer import ClimateComputer, at_rest, con
 from igrow.core.greenhouse.disturbances import Disturbances
 from igrow.core.greenhouse.hidden import EffectBank, HiddenEffect
 from igrow.core.greenhouse.light import distribute
-from igrow.core.greenhouse.namespace import Array, clip, namespace
+from igrow.core.greenhouse.namespace import clip, namespace
 from igrow.core.greenhouse.parameters import GreenhouseParameters
 from igrow.core.greenhouse.sensors import Sensors
 from igrow.core.greenhouse.state import PlantState, add

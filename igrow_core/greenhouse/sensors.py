@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from igrow.core.greenhouse.namespace import Array
+from igrow.core.arrays import Array
 
 DEFAULT_NOISE: Mapping[str, tuple[float, float]] = MappingProxyType(
     {

@@ -16,7 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow.core.greenhouse.namespace import Array, clip, ramp, sigmoid
+from igrow.core.arrays import Array
+from igrow.core.greenhouse.namespace import clip, ramp, sigmoid
 from igrow.core.greenhouse.parameters import GreenhouseParameters
 
 CARBOHYDRATE_PER_MOL = 0.030026

@@ -10,8 +10,9 @@ from types import MappingProxyType
 from typing import Any, Literal
 
 from igrow.core.air import LATENT_HEAT
+from igrow.core.arrays import Array
 from igrow.core.effects import Effect, Memory, Parameter
-from igrow.core.effects.definition import Array, Balance, Drivers, Values
+from igrow.core.effects.definition import Balance, Drivers, Values
 
 _SOURCE = "invented for tests"
 

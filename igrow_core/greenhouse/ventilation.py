@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from igrow.core.greenhouse.namespace import Array
+from igrow.core.arrays import Array
 from igrow.core.greenhouse.parameters import GreenhouseParameters
 
 GRAVITY = 9.81

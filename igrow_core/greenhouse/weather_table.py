@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from igrow.core.air import co2_concentration, vapour_concentration
+from igrow.core.arrays import Array
 from igrow.core.errors import IgrowError
-from igrow.core.greenhouse.namespace import Array
 from igrow.core.greenhouse.sky import sky_temperature
 from igrow.core.sun import unix_seconds
 from igrow.core.telemetry import Telemetry

@@ -18,7 +18,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-Array = Any
+from igrow.core.arrays import Array
+
 Genes = NDArray[np.float32]
 Fitness = NDArray[np.float32]
 

@@ -4,7 +4,7 @@ Parametric rules of Dutch climate computers (Bakker, Bot, Challa and van de Braa
 Control, ch. 4): a pipe temperature from the shortage of heat and the weather, vents on a proportional band above
 the heating setpoint with an influence of humidity and a limit by wind, screens by radiation and outdoor
 temperature, lamps on request below a radiation limit, CO2 on a proportional band in the light. The rules are
-fitted to the log of the very greenhouse (`igrow.trainer.calibration.actuation`), so they also stand for settings that
+fitted to the log of the very greenhouse (`igrow.trainer.fit.actuation`), so they also stand for settings that
 no log holds. Pure, elementwise, traceable: numpy, torch and ONNX graphs run the same code.
 
 Positions follow their targets with a lag, so the stage has a memory: the positions themselves.
@@ -17,7 +17,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
-from igrow.core.effects.definition import Array, Values
+from igrow.core.arrays import Array
+from igrow.core.effects.definition import Values
 
 POSITIONS = (
     "rail_pipe_temperature",

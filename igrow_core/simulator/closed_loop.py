@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow.core.effects.definition import Array, Values
+from igrow.core.arrays import Array
+from igrow.core.effects.definition import Values
 from igrow.core.quantities import SETPOINTS
 from igrow.core.simulator import actuation
 from igrow.core.simulator.hybrid import climate, measurement

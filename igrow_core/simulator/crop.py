@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow.core.effects.definition import Array
+from igrow.core.arrays import Array
 from igrow.core.simulator.network import Stage
 
 

@@ -14,7 +14,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
-from igrow.core.effects.definition import Array, Values
+from igrow.core.arrays import Array
+from igrow.core.effects.definition import Values
 from igrow.core.simulator.actuation import Rule
 
 _ROWS = (

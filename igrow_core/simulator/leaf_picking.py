@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = Any
-"""An array of the namespace `xp`."""
+from igrow.core.arrays import Array
 
 
 @dataclass(frozen=True)

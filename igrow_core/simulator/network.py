@@ -19,10 +19,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from igrow.core.arrays import Array
 from igrow.core.simulator.leaf_picking import LeafPicking
 
-Array = Any
-"""An array of the namespace `xp`."""
 Weights = NDArray[np.float32]
 
 HOURS = 24

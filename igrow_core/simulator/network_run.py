@@ -1,4 +1,4 @@
-"""Free runs of the network simulator: an hour of all stages, a day of them, and whole seasons side by side."""
+"""Free runs of the network simulator: an hour of climate and growth, a day's harvest, whole seasons side by side."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from igrow.core.arrays import Array
 from igrow.core.simulator.leaf_picking import pick
 from igrow.core.simulator.network import HOURS, NetworkSimulator, Stage, advance, initial_memory
 
 Values = NDArray[np.float64]
-Array = Any
-"""An array of the namespace `xp`."""
 
 
 @dataclass(frozen=True)
@@ -104,38 +103,6 @@ def grow_hour(
         pickings=pickings,
     )
     return following, values
-
-
-def run_day(
-    xp: Any, simulator: NetworkSimulator, carried: Carried, known: Mapping[str, Array], hour: Array
-) -> tuple[Carried, dict[str, Array]]:
-    """Run 24 hours of climate and growth and the day's harvest.
-
-    Parameters
-    ----------
-    known
-        Name -> (..., 24), see `run_hour`.
-    hour
-        (..., 24) hour of the day at each hour's end.
-
-    Returns
-    -------
-    (carried, values)
-        What the next day needs, and name -> (..., 24) as from `run_hour`; the states of the harvest are (..., 1), at
-        the end of the day.
-    """
-    hours: list[dict[str, Array]] = []
-    for row in range(HOURS):
-        now = {name: values[..., row : row + 1] for name, values in known.items()}
-        carried, values = run_hour(xp, simulator, carried, now, hour[..., row : row + 1])
-        hours.append(values)
-    names = [name for name in hours[0] if name not in known]
-    day = {name: xp.concat([values[name] for values in hours], axis=-1) for name in names}
-    stage = simulator.harvest
-    means = {name: xp.mean(day[name], axis=-1, keepdims=True) for name in stage.drivers}
-    state, memory = run_harvest(xp, stage, carried.harvest, carried.harvest_memory, means)
-    day |= _columns(stage, state)
-    return replace(carried, harvest=state, harvest_memory=memory), day
 
 
 def run_harvest(xp: Any, stage: Stage, state: Array, memory: Array, means: Mapping[str, Array]) -> tuple[Array, Array]:

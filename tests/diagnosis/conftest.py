@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from igrow.core.simulator.hybrid.nominal import nominal
-from igrow.core.telemetry import Telemetry
-from igrow.trainer.diagnosis import Deployed
+from igrow.trainer.data import Log, prepare_log
+from igrow.trainer.fit import FittedModel, Gaussian
 from tests.virtual_log import SITE, virtual_log, weather
 
 Floats = NDArray[np.float64]
@@ -31,35 +31,36 @@ def disturbances(days: int, step: float, seed: int) -> dict[str, Floats]:
     }
 
 
-def greenhouse_log(seed: int, added: Mapping[str, Floats] | None = None, days: int = DAYS) -> Telemetry:
+def greenhouse_log(seed: int, added: Mapping[str, Floats] | None = None, days: int = DAYS) -> Log:
     """A log with disturbances, sensor noise, and whatever is added to the fluxes."""
     fluxes = disturbances(days, STEP, seed)
     for channel, flux in (added or {}).items():
         fluxes[channel] = fluxes.get(channel, 0.0) + flux
-    return virtual_log(days, seed=seed, step=STEP, added=fluxes)
+    return prepare_log(virtual_log(days, seed=seed, step=STEP, added=fluxes), SITE)
 
 
-def deployed_model() -> Deployed:
-    """A model that knows the greenhouse's parameters within five per cent."""
+def model_in_force() -> FittedModel:
+    """A model that knows the greenhouse's parameters within five per cent, and not what it misses there."""
     values = nominal(SITE)
-    return Deployed(values, {name: 0.05 * abs(value) + 1e-6 for name, value in values.items()}, shift=0.0)
+    deviation = {name: 0.05 * abs(value) + 1e-6 for name, value in values.items()}
+    return FittedModel(SITE, Gaussian.independent(values, deviation), SITE.name, alignment=0.0)
 
 
 @pytest.fixture(scope="session")
-def quiet_log() -> Telemetry:
+def quiet_log() -> Log:
     """Nothing is missing."""
     return greenhouse_log(1)
 
 
 @pytest.fixture(scope="session")
-def leaky_log() -> Telemetry:
+def leaky_log() -> Log:
     """Wind presses 0.12 air changes per hour and m/s more through the envelope than the model knows."""
     wind = weather(DAYS, STEP, 2)["wind_speed"]
     return greenhouse_log(2, {"air_exchange": 0.12 * wind * SITE.greenhouse.mean_height / 3600.0})
 
 
 @pytest.fixture(scope="session")
-def door_log() -> Telemetry:
+def door_log() -> Log:
     """A door stands open from 7 to 16 h on working days: no effect of the catalogue."""
     count = round(DAYS * 86_400 / STEP)
     hours = np.arange(count) * STEP / 3600.0

@@ -12,7 +12,7 @@ from igrow.core.exchange import ExchangeError, FolderPlace, Place
 from igrow.core.exchange.address import parse_address
 from igrow.edge.exchange.places import open_place as open_at_gateway
 from igrow.edge.exchange.sftp import SftpPlace
-from igrow.trainer.publishing import create_keys, publish
+from igrow.trainer.publishing import create_keys, publish_in
 from igrow.trainer.service.places import open_place as open_at_trainer
 from tests.exchange.gateway_and_trainer import DAY, SITE, START, World
 from tests.exchange.peers import Sftp, s3_server, sftp_server
@@ -81,7 +81,7 @@ def test_a_log_arrives_once_is_receipted_and_a_bundle_comes_back(sides: tuple[Pl
     done = world.collect(START + 3 * DAY, trainer)
     assert (done.segments, done.notes) == (3, [])
     create_keys(tmp_path / "keys")
-    made = publish(
+    made = publish_in(
         write_tiny_bundle(tmp_path / "made", site=SITE).folder, Below(trainer, f"{SITE}/bundles"), tmp_path / "keys"
     )
     status = world.round(START + 3 * DAY + 900)

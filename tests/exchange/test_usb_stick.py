@@ -12,7 +12,7 @@ from igrow.core.exchange import Below, FolderPlace
 from igrow.edge.cli import main
 from igrow.edge.image import Quality, Value
 from igrow.edge.store import SqliteStore, StoreLimits
-from igrow.trainer.publishing import create_keys, publish
+from igrow.trainer.publishing import create_keys, publish_in
 from igrow.trainer.service.archive import Archive
 from igrow.trainer.service.collecting import collect
 
@@ -46,7 +46,7 @@ def test_a_stick_goes_to_the_trainer_and_back(
     assert done.rows == 24
     create_keys(tmp_path / "keys")
     bundle = write_tiny_bundle(tmp_path / "made", site="bleiswijk")
-    publish(bundle.folder, Below(FolderPlace(stick), "bleiswijk/bundles"), tmp_path / "keys")
+    publish_in(bundle.folder, Below(FolderPlace(stick), "bleiswijk/bundles"), tmp_path / "keys")
     assert main(sync) == 0
     assert "0 segments wait for a receipt" in capsys.readouterr().out
     assert len(list((tmp_path / "state" / "exchange" / "bundles" / "targets").iterdir())) == 1

@@ -12,9 +12,9 @@ from igrow.core.effects import EFFECTS
 from igrow.core.simulator.hybrid import climate
 from igrow.core.simulator.hybrid.measurement import PREDICTED, measured
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
-from igrow.trainer.export.blocks import open_model
-from igrow.trainer.export.climate import ClimateBlocks, climate_blocks, effect_parameter
-from igrow.trainer.export.hindcast import hindcast_model
+from igrow.trainer.exporting.blocks import open_model
+from igrow.trainer.exporting.climate import ClimateBlocks, climate_blocks, effect_parameter
+from igrow.trainer.exporting.hindcast import hindcast_model
 
 SECONDS, ROWS, BATCH = 300.0, 288, 3
 HEIGHT, EFFICACY = 5.0, 1.3

@@ -90,7 +90,7 @@ def test_better_candidates_have_more_children() -> None:
 
 @pytest.fixture(scope="module")
 def graph(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from igrow.trainer.export.optimizer import export_optimizer
+    from igrow.trainer.exporting.optimizer import export_optimizer
 
     path = tmp_path_factory.mktemp("optimizer") / "optimizer.onnx"
     model = export_optimizer(EvolutionSettings())

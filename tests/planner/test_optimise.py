@@ -55,7 +55,7 @@ def test_the_search_comes_near_the_best_that_a_full_search_of_one_setpoint_finds
 
 
 def test_the_same_seed_gives_the_same_plan_in_numpy_and_from_the_graph(site, state, weather, recipe, tmp_path) -> None:
-    from igrow.trainer.export.optimizer import export_optimizer
+    from igrow.trainer.exporting.optimizer import export_optimizer
 
     path: Path = tmp_path / "optimizer.onnx"
     path.write_bytes(export_optimizer(NumpyGeneration().settings).SerializeToString())

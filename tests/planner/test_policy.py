@@ -42,8 +42,8 @@ def test_every_action_is_within_the_limits(site) -> None:
 def test_the_graph_does_what_the_network_does(site, weather, tmp_path: Path) -> None:
     import torch
 
-    from igrow.trainer.policies.sac import Actor
-    from igrow.trainer.policies.train import export
+    from igrow.trainer.research.policies.sac import Actor
+    from igrow.trainer.research.policies.train import export
 
     torch.manual_seed(0)
     actor = Actor((32, 16))
@@ -61,7 +61,7 @@ def test_the_graph_does_what_the_network_does(site, weather, tmp_path: Path) -> 
 
 def test_a_file_that_is_no_policy_is_refused(tmp_path: Path) -> None:
     from igrow.core.planner import EvolutionSettings
-    from igrow.trainer.export.optimizer import export_optimizer
+    from igrow.trainer.exporting.optimizer import export_optimizer
 
     (tmp_path / "a.onnx").write_bytes(export_optimizer(EvolutionSettings()).SerializeToString())
     with pytest.raises(IgrowError, match="is no policy of 76 observations"):
@@ -71,7 +71,7 @@ def test_a_file_that_is_no_policy_is_refused(tmp_path: Path) -> None:
 def test_the_learner_finds_the_action_that_is_paid() -> None:
     import torch
 
-    from igrow.trainer.policies.sac import SacSettings, SoftActorCritic
+    from igrow.trainer.research.policies.sac import SacSettings, SoftActorCritic
 
     settings = replace(SacSettings(), hidden=(32,), batch=64, learning_rate=5e-3, discount=0.0)
     learner = SoftActorCritic(settings, seed=1)
@@ -96,8 +96,8 @@ def test_the_learner_finds_the_action_that_is_paid() -> None:
 
 
 def test_greenhouses_of_an_environment_are_the_same_for_the_same_seed(site) -> None:
-    from igrow.trainer.policies.environment import DailyGreenhouses, Scenario
-    from igrow.trainer.policies.train import first_actions
+    from igrow.trainer.research.policies.environment import DailyGreenhouses, Scenario
+    from igrow.trainer.research.policies.train import first_actions
 
     actions = first_actions(np.random.default_rng(0), 2)
     worth = []
@@ -113,7 +113,7 @@ def test_greenhouses_of_an_environment_are_the_same_for_the_same_seed(site) -> N
 
 
 def test_trials_of_one_course_share_what_they_see_and_the_first_is_followed(site) -> None:
-    from igrow.trainer.policies.environment import Scenario, SimulatedDays
+    from igrow.trainer.research.policies.environment import Scenario, SimulatedDays
 
     world = SimulatedDays(site, Scenario(START, 2, 6, seed=1), ToySimulator(), trials=3)
     seen = world.observe()

@@ -14,7 +14,7 @@ from tiny_bundle import write_tiny_bundle
 
 from igrow.core.bundle import BundleError
 from igrow.edge.updates import Shelf, SignedSource, UpdateError
-from igrow.trainer.publishing import Lifetimes, PublishingError, create_keys, initialise, publish, refresh
+from igrow.trainer.publishing import Lifetimes, PublishingError, create_keys, initialise, publish_in, refresh
 
 
 class World:
@@ -34,7 +34,7 @@ class World:
     def publish(self, offset: float = 5.0, **options):
         self.count += 1
         bundle = write_tiny_bundle(self.folder / f"made-{self.count}", offset=offset)
-        return publish(bundle.folder, self.repository, self.keys, **options)
+        return publish_in(bundle.folder, self.repository, self.keys, **options)
 
     def metadata(self, name: str) -> Path:
         return self.repository / "metadata" / name
@@ -256,7 +256,7 @@ def test_a_bundle_of_another_site_is_refused_from_the_exchange_but_not_from_the_
 def test_the_trainer_does_not_publish_a_bundle_that_fails_its_self_test(world: World) -> None:
     bundle = write_tiny_bundle(world.folder / "bad", golden_offset=9.0)
     with pytest.raises(BundleError, match="self-test failed"):
-        publish(bundle.folder, world.repository, world.keys)
+        publish_in(bundle.folder, world.repository, world.keys)
 
 
 def test_keys_and_repositories_are_never_overwritten(world: World) -> None:

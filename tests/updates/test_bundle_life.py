@@ -35,7 +35,7 @@ def make(gateway: Gateway, name: str, offset: float):
 
 
 def send(gateway: Gateway, name: str, offset: float):
-    return publish(make(gateway, name, offset).folder, gateway.repository, gateway.keys)
+    return publish(make(gateway, name, offset).folder, gateway.exchange_root, gateway.keys)
 
 
 def test_the_first_bundle_comes_from_the_configuration(gateway: Gateway) -> None:
@@ -104,7 +104,7 @@ def test_a_bundle_that_gets_worse_than_its_predecessor_is_taken_back_by_itself(g
 
 def test_a_bundle_that_fails_its_self_test_is_refused_reported_and_marked(gateway: Gateway) -> None:
     bad = make(gateway, "bad", 5.0)
-    publish(bad.folder, gateway.repository, gateway.keys)
+    publish(bad.folder, gateway.exchange_root, gateway.keys)
     # The archive is right but this machine computes something else: played by a stricter manifest check.
     gateway.updates._shelf._site = "other"
     gateway.run(3)

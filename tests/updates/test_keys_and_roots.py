@@ -11,7 +11,7 @@ from tiny_bundle import write_tiny_bundle
 
 from igrow.edge.updates import SignedSource, UpdateError
 from igrow.trainer.cli import main
-from igrow.trainer.publishing import PublishingError, create_keys, publish, refresh
+from igrow.trainer.publishing import PublishingError, create_keys, publish_in, refresh
 from igrow.trainer.publishing.keys import renew_root, replace_key, status, take_offline
 
 
@@ -25,7 +25,7 @@ class Fleet:
 
     def publish(self, offset: float = 5.0) -> str:
         bundle = write_tiny_bundle(self.folder / f"made-{offset}", offset=offset)
-        return publish(bundle.folder, self.repository, self.keys).identity
+        return publish_in(bundle.folder, self.repository, self.keys).identity
 
     def fetched(self) -> str:
         found = self.source.fetch("demo", ())
@@ -63,7 +63,7 @@ def test_a_stolen_key_is_replaced_with_two_sticks_and_the_gateway_follows(fleet:
     assert fleet.publish(6.0) == fleet.fetched()
 
     evil = write_tiny_bundle(tmp_path / "evil", offset=1.0)
-    publish(evil.folder, fleet.repository, tmp_path / "stolen")
+    publish_in(evil.folder, fleet.repository, tmp_path / "stolen")
     with pytest.raises(UpdateError, match="not signed by the keys"):
         fleet.source.fetch("demo", ())
     with pytest.raises(PublishingError, match="not signed by our present key"):

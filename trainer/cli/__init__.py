@@ -15,12 +15,12 @@ COMMANDS = {
     "collect": ("igrow.trainer.cli.collect", "bring what gateways left in the exchange into the archive"),
     "recalibrate": ("igrow.trainer.cli.recalibrate", "diagnose every site of an exchange and publish what passed"),
     "export": ("igrow.trainer.cli.export", "write a bundle from a fitted simulator"),
-    "policy": ("igrow.trainer.policies.train", "train a policy by soft actor-critic"),
+    "policy": ("igrow.trainer.research.policies.train", "train a policy by soft actor-critic"),
     "publish": ("igrow.trainer.cli.publish", "sign a bundle and put it into the exchange"),
+    "reproduce": ("igrow.trainer.research.paper.command", "reproduce the tables and figures of the iGrow paper"),
+    "evaluate": ("igrow.trainer.cli.evaluate", "score a bundle on a log that it has not seen, beside persistence"),
     "fleet": ("igrow.trainer.cli.fleet", "collect, diagnose and publish for many sites; one page for all of them"),
     "keys": ("igrow.trainer.cli.keys", "make, keep and replace the signing keys"),
-    "reproduce": ("igrow.trainer.reproduce.command", "reproduce the tables and figures of the iGrow paper"),
-    "evaluate": ("igrow.trainer.reproduce.evaluate", "run a bundle on logged or virtual seasons and print its errors"),
     "bundle": ("igrow.trainer.cli.bundle", "build the default bundle from the mechanistic greenhouse"),
 }
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from igrow.core.bundle import BUILT_IN
 from igrow.core.site import Site, load_site
 from igrow.trainer.default_bundle import CREATED, default_model
-from igrow.trainer.export.bundle import write_hybrid_bundle
+from igrow.trainer.exporting import export
 
 EXAMPLE = "igrow-trainer bundle --out igrow_core/default_bundle"
 
@@ -27,7 +27,7 @@ def run(arguments: argparse.Namespace) -> int:
     model = default_model(site, seed=arguments.seed)
     fresh = arguments.out.with_name(f"{arguments.out.name}.new")
     shutil.rmtree(fresh, ignore_errors=True)
-    bundle = write_hybrid_bundle(fresh, model, created=CREATED, seed=arguments.seed)
+    bundle = export(model, fresh, created=CREATED, seed=arguments.seed)
     shutil.rmtree(arguments.out, ignore_errors=True)
     bundle.folder.rename(arguments.out)
     print(f"wrote {arguments.out} ({bundle.label})")

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 
-from igrow.core.bundle import default_bundle_folder, read_bundle, self_test
+from igrow.core.bundle import default_bundle_folder, self_test
 from igrow.core.errors import IgrowError
 from igrow.core.site import load_site
 from igrow.trainer.default_bundle import equipped
-from igrow.trainer.export.bundle import read_hybrid_model, write_hybrid_bundle
+from igrow.trainer.exporting import export, read_model
 
 EXAMPLE = "igrow-trainer export --site config/site.yaml --out out/first-bundle"
 
@@ -33,12 +32,12 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.out.exists():
         raise IgrowError(f"{arguments.out} exists already; name a new folder")
     site = load_site(arguments.site)
-    model = read_hybrid_model(read_bundle(arguments.bundle or default_bundle_folder()), site)
+    model = read_model(arguments.bundle or default_bundle_folder(), site)
     if arguments.bundle is None:
         model = equipped(model)
     if arguments.same_greenhouse:
         model = replace(model, calibrated_on=site.name)
-    bundle = write_hybrid_bundle(arguments.out, model, created=datetime.now(UTC))
+    bundle = export(model, arguments.out)
     worst = max(self_test(bundle), key=lambda deviation: deviation.relative)
     print(f"wrote {bundle.folder} ({bundle.label}); self-test: {worst.graph} {worst.output} {worst.relative:.1e}")
     return 0

@@ -5,11 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from igrow.core.bundle import read_bundle
 from igrow.core.errors import IgrowError
-from igrow.core.exchange import Below
 from igrow.trainer.cli.common import add_exchange, exchange_of
-from igrow.trainer.publishing import publish, refresh
+from igrow.trainer.publishing import publish, refresh, repository_of
 
 EXAMPLE = (
     "igrow-trainer publish out/bundle --keys keys --exchange /srv/igrow\n"
@@ -33,10 +31,9 @@ def run(arguments: argparse.Namespace) -> int:
         raise IgrowError("name the bundle to publish, or the site to --refresh")
     place = exchange_of(arguments)
     for site in arguments.refresh:
-        refresh(Below(place, f"{site}/bundles"), arguments.keys)
+        refresh(repository_of(place, site), arguments.keys)
         print(f"signed the bundles of {site} again")
     if arguments.bundle is not None:
-        site = read_bundle(arguments.bundle).manifest.site
-        bundle = publish(arguments.bundle, Below(place, f"{site}/bundles"), arguments.keys)
-        print(f"published {bundle.label} for site {site} in {arguments.exchange}")
+        bundle = publish(arguments.bundle, place, arguments.keys)
+        print(f"published {bundle.label} for site {bundle.manifest.site} in {arguments.exchange}")
     return 0

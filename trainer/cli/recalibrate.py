@@ -7,7 +7,6 @@ from functools import partial
 from pathlib import Path
 
 from igrow.core.errors import IgrowError
-from igrow.core.exchange import Below
 from igrow.core.site import load_site
 from igrow.trainer.cli.common import add_exchange, exchange_of
 from igrow.trainer.publishing import publish
@@ -42,12 +41,11 @@ def run(arguments: argparse.Namespace) -> int:
             print(f"{path.stem}: error; {error}", flush=True)
             failed = True
             continue
-        repository = Below(place, f"{site.name}/bundles")
         turn = recalibrate(
             site,
             archive,
             site_folder(arguments.state, site.name),
-            partial(publish, repository=repository, keys=arguments.keys),
+            partial(publish, exchange=place, keys=arguments.keys),
             now=utc_now(),
             days=arguments.days,
             force=arguments.force,

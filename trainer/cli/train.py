@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 
-from igrow.core.bundle import default_bundle_folder, read_bundle
+from igrow.core.bundle import default_bundle_folder
 from igrow.core.errors import IgrowError
 from igrow.core.simulator.crop import CropStages
 from igrow.core.simulator.hybrid.nominal import site_record
 from igrow.core.site import load_site
 from igrow.trainer.data import read_log
-from igrow.trainer.export.bundle import read_hybrid_model, write_hybrid_bundle
+from igrow.trainer.exporting import export, read_model
 from igrow.trainer.training.crop import fit_net_growth, train_networks
 
 EXAMPLE = "igrow-trainer train out/virtual/*.csv.gz --site config/site.yaml --out out/trained"
@@ -33,12 +32,12 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.out.exists():
         raise IgrowError(f"{arguments.out} exists already; name a new folder")
     site = load_site(arguments.site)
-    model = read_hybrid_model(read_bundle(arguments.bundle or default_bundle_folder()), site)
+    model = read_model(arguments.bundle or default_bundle_folder(), site)
     seasons = [read_log(path, site).telemetry for path in arguments.seasons]
     growth, harvest = train_networks(seasons, seed=arguments.seed, report=lambda line: print(line, flush=True))
     records = [site_record(season, site, max(300.0, season.step)) for season in seasons]
     conversion, maintenance = fit_net_growth(records, model.posterior.values, seasons)
     crop = CropStages(growth, harvest, conversion, maintenance)
-    bundle = write_hybrid_bundle(arguments.out, replace(model, crop=crop), created=datetime.now(UTC))
+    bundle = export(replace(model, crop=crop), arguments.out)
     print(f"wrote {bundle.folder} ({bundle.label})")
     return 0

@@ -1,25 +1,29 @@
 """Diagnosis: from the residual of a log to the cause that the model lacks, and the corrected model.
 
-    log --> screen --> recalibrate (parameters, colour of the disturbances) --> search over effects, shapes, beginnings
-        --> what remains? --> size, interval, rivals --> does it improve unseen days? --> verdict, corrected model
+    result = diagnose(log, model)
+    print(result.summary())
 
-`diagnose` runs it all; docs/diagnosis.md tells why each step is there and how well it does.
+In the order in which they are read: `knowledge` (what is known before the log), `sensitivity` (day runs of the model,
+and how they depend on everything), `candidates`, `noise`, `recalibration`, `design` (errors and candidates in named
+blocks), `search` (a scan of all candidates), `compare` (the best of them beside their own noise), `estimate`, `refit`
+(size, beginning, confounded causes), `correction` (what stands on unseen days), `wording`, `result`. `rules` holds
+every threshold, `nuisance` what greenhouses show though nothing is missing. docs/method.md tells why.
 """
 
-from igrow.trainer.diagnosis.deployed import Deployed, from_manifest, from_posterior, from_site, learn_misfit
-from igrow.trainer.diagnosis.diagnose import CorrectedModel, Evidence, diagnose
+from igrow.trainer.diagnosis.diagnose import diagnose, discrepancy_of
+from igrow.trainer.diagnosis.nuisance import NuisanceSubspace, read_nuisance
 from igrow.trainer.diagnosis.result import EXIT_CODES, Diagnosis, Finding
+from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules, read_rules
 
 __all__ = [
+    "DEFAULT",
     "EXIT_CODES",
-    "CorrectedModel",
-    "Deployed",
+    "DecisionRules",
     "Diagnosis",
-    "Evidence",
     "Finding",
+    "NuisanceSubspace",
     "diagnose",
-    "from_manifest",
-    "from_posterior",
-    "from_site",
-    "learn_misfit",
+    "discrepancy_of",
+    "read_nuisance",
+    "read_rules",
 ]

@@ -1,4 +1,9 @@
-"""The candidates of a diagnosis: every effect of the catalogue at every shape worth trying."""
+"""What may be missing: every effect of the catalogue at every shape worth trying, and patterns of outside drivers.
+
+A cause without a name may hang on exogenous drivers only: clock, calendar, weather and schedules. Feedback control
+reveals disturbances, so that a learner who sees states or what the PLC controls by them (heat, vents, CO2) finds
+structure in pure noise. No pattern reads either.
+"""
 
 from __future__ import annotations
 
@@ -7,20 +12,22 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.signal import lfilter
 
+from igrow.core.arrays import Floats
 from igrow.core.effects import EFFECTS, Effect
 from igrow.core.effects.definition import Parameter
 from igrow.core.quantities import WEATHER
-from igrow.trainer.diagnosis.linearisation import (
-    Floats,
+from igrow.core.simulator.hybrid.record import SWITCHES, Record
+from igrow.trainer.diagnosis.sensitivity import (
     Linearisation,
-    flux_columns,
+    flux_sensitivities,
     is_measured,
-    sensor_column,
+    sensor_sensitivity,
     unit_fluxes,
 )
 
-SHAPE_GRID: Mapping[tuple[str, str], tuple[float, ...]] = {
+NONLINEAR_GRID: Mapping[tuple[str, str], tuple[float, ...]] = {
     ("wind_infiltration", "exponent"): (0.7, 1.0, 1.5, 2.0),
     ("cover_condensation", "cover_share"): (0.2, 0.35, 0.5),
     ("soil_heat_storage", "time_constant"): (2.0, 4.0, 8.0),
@@ -38,9 +45,23 @@ SHAPE_GRID: Mapping[tuple[str, str], tuple[float, ...]] = {
     ("soil_respiration", "time_constant"): (24.0,),
     ("air_temperature_lag", "time_constant"): (8.0, 15.0, 30.0),
 }
-"""Shape values tried first; refitting moves them. A shape without a row is tried at three values of its range."""
+"""Values of nonlinear parameters tried first; refitting moves them. One that is not here is tried at three values."""
 
-Shape = Mapping[str, float]
+UNIT_FLUX: Mapping[str, float] = {
+    "heat": 10.0,
+    "vapour": 2e-6,
+    "co2": 3e-7,
+    "air_exchange": 5e-4,
+    "light_loss": 0.1,
+}
+"""Size of one unit of a pattern in each channel: W m-2, kg m-2 s-1, kg m-2 s-1, m s-1, 1."""
+_WEEKDAYS = ("Monday", "Tuesday", "Wednesday", "Thursday", "Friday", "Saturday", "Sunday")
+_VISIBLE = 1e-9
+"""Sensitivity below which a log shows nothing of a candidate."""
+_PATTERN_DIFFERENCE = 0.1
+"""Finite difference of a pattern's amplitude, in its units."""
+_PROCESS_DIFFERENCE = 0.05
+"""The same of a process effect's, in typical amplitudes."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +78,7 @@ class Candidate:
 
     @property
     def values(self) -> dict[str, float]:
-        """Shape values by name."""
+        """Nonlinear parameters by name."""
         return dict(self.shape)
 
     @property
@@ -65,10 +86,30 @@ class Candidate:
         """The effect grows with the time since it began."""
         return "elapsed_days" in self.definition.drivers
 
+    @property
+    def key(self) -> str:
+        """Name of the column, ``effect:shape=value``."""
+        return ":".join([self.effect, *(f"{name}={value:g}" for name, value in self.shape)])
+
 
 @dataclass(frozen=True)
-class CandidateColumns:
-    """Sensitivities of the equation errors to the amplitudes of all testable candidates."""
+class Pattern:
+    """A course in time that exogenous drivers alone determine, in one channel."""
+
+    channel: str
+    when: str
+    """For people: at which hours, days or weather."""
+    drivers: tuple[str, ...]
+
+    @property
+    def key(self) -> str:
+        """Name of the column, ``channel:when``."""
+        return f"{self.channel}:{self.when}"
+
+
+@dataclass(frozen=True)
+class EffectColumns:
+    """Sensitivities of the errors to the amplitudes of all testable effects."""
 
     candidates: tuple[Candidate, ...]
     columns: Floats
@@ -79,35 +120,116 @@ class CandidateColumns:
     """Effects whose drivers the log lacks, or never moves."""
 
 
-def grid(effect: Effect) -> list[Shape]:
+def nonlinear_grid(effect: Effect) -> list[dict[str, float]]:
     """Return the shapes at which an effect is tried."""
-    axes = [SHAPE_GRID.get((effect.name, shape.name)) or _default_axis(shape) for shape in effect.shapes]
+    axes = [NONLINEAR_GRID.get((effect.name, shape.name)) or _default_axis(shape) for shape in effect.shapes]
     names = [shape.name for shape in effect.shapes]
     return [dict(zip(names, values, strict=True)) for values in itertools.product(*axes)]
 
 
-def candidate_columns(line: Linearisation, without: Collection[str] = ()) -> CandidateColumns:
+def effect_columns(line: Linearisation, without: Collection[str] = ()) -> EffectColumns:
     """Return the sensitivities to all effects but those in `without` and those already active."""
-    one = _with_elapsed_one(line)
     effects = [effect for effect in EFFECTS.values() if effect.name not in without and effect.name not in line.effects]
     testable = [effect for effect in effects if not _is_blind(line, effect) and is_measured(line.record, effect)]
-    found = [Candidate(effect.name, tuple(shape.items())) for effect in testable for shape in grid(effect)]
+    found = [Candidate(effect.name, tuple(shape.items())) for effect in testable for shape in nonlinear_grid(effect)]
     columns = _columns(line, found)
     ageing = np.zeros_like(columns)
     old = [index for index, candidate in enumerate(found) if candidate.ages]
-    ageing[old] = _columns(one, [found[index] for index in old])
-    moved = [
-        index
-        for index, column in enumerate(columns)
-        if np.isfinite(column).all() and np.any(np.abs(column[line.runs.weight]) > 1e-9)
-    ]
-    names = {found[index].effect for index in moved}
-    return CandidateColumns(
-        tuple(found[index] for index in moved),
-        columns[moved],
-        ageing[moved],
+    ageing[old] = _columns(_with_elapsed_one(line), [found[index] for index in old])
+    seen = [index for index, column in enumerate(columns) if np.isfinite(column).all() and _is_visible(line, column)]
+    names = {found[index].effect for index in seen}
+    return EffectColumns(
+        tuple(found[index] for index in seen),
+        columns[seen],
+        ageing[seen],
         tuple(effect.name for effect in effects if effect.name not in names),
     )
+
+
+def patterns(record: Record, longitude: float) -> list[tuple[str, tuple[str, ...], Floats]]:
+    """Return (when, drivers, course (n,)) of every pattern, without the channel."""
+    hour = np.asarray(record.inputs["hour"])
+    seconds = record.time.astype("datetime64[s]").astype(np.int64) + int(240.0 * longitude)
+    weekday = (seconds // 86_400 + 3) % 7
+    working: Floats = (weekday < 5).astype(np.float64)
+    table: list[tuple[str, tuple[str, ...], Floats]] = []
+
+    def window(first: float, last: float) -> Floats:
+        inside = (hour >= first) & (hour < last) if first < last else (hour >= first) | (hour < last)
+        return inside.astype(np.float64)
+
+    for first, last in [(h, h + 2) for h in range(0, 24, 2)] + [(5, 9), (7, 16), (11, 14), (11, 17), (19, 5), (19, 11)]:
+        text = f"{first:02d} to {last:02d} h"
+        table.append((text, ("hour",), window(first, last)))
+        if (first, last) in {(5, 9), (7, 16), (11, 14)}:
+            table.append((f"{text} on working days", ("hour", "weekday"), window(first, last) * working))
+    table.append(("working days", ("weekday",), working))
+    for index, name in enumerate(_WEEKDAYS):
+        for first, last in ((0, 6), (6, 10), (10, 14), (14, 19), (19, 24)):
+            course: Floats = window(first, last) * (weekday == index).astype(np.float64)
+            table.append((f"{first:02d} to {last:02d} h on {name}s", ("hour", "weekday"), course))
+    outdoor = np.asarray(record.inputs["outdoor_temperature"], dtype=np.float64)
+    cold: Floats = np.maximum(8.0 - outdoor, 0.0) / 8.0
+    table.append(("cold weather", ("outdoor_temperature",), cold))
+    table.append(("outdoor temperature", ("outdoor_temperature",), (outdoor - 10.0) / 10.0))
+    for first, last in ((5, 9), (9, 15), (19, 5), (19, 11)):
+        text = f"cold weather, {first:02d} to {last:02d} h"
+        table.append((text, ("outdoor_temperature", "hour"), cold * window(first, last)))
+    for name, scale in (("wind_speed", 5.0), ("global_radiation", 300.0), ("rain", 1.0)):
+        if name not in record.unknown:
+            weather: Floats = np.asarray(record.inputs[name], dtype=np.float64) / scale
+            table.append((name.replace("_", " "), (name,), weather))
+    if "outdoor_humidity" not in record.unknown:
+        table.append(
+            ("dry weather", ("outdoor_humidity",), (80.0 - np.asarray(record.inputs["outdoor_humidity"])) / 20.0)
+        )
+    if "rain" not in record.unknown:
+        fallen = np.cumsum(np.asarray(record.inputs["rain"])) * record.step / 72_000.0
+        table.append(("until rain has fallen", ("rain",), np.exp(-fallen)))
+    # Lamps and irrigation follow the clock and the light, not the climate that they are to be blamed for.
+    for name, usual in (("lamp_power", 80.0), ("irrigation", 1.0)):
+        driver, scale = (SWITCHES[name], 1.0) if name in record.unknown else (name, usual)
+        if np.any(record.inputs.get(driver, 0.0)):
+            running: Floats = np.asarray(record.inputs[driver], dtype=np.float64) / scale
+            text = driver.replace("_", " ")
+            table.append((text if driver == SWITCHES[name] else f"{text} on", (driver,), running))
+            keep = float(np.exp(-record.step / 3600.0))
+            late: Floats = lfilter([1.0 - keep], [1.0, -keep], running)
+            table.append((f"an hour after {text}", (driver,), late))
+    days = np.arange(len(record)) * record.step / 86_400.0
+    month: Floats = np.asarray(days / 30.0, dtype=np.float64)
+    table.append(("from day to day", ("time",), month))
+    table.append(("all the time", (), np.ones(len(record))))
+    return table
+
+
+def pattern_fluxes(record: Record, longitude: float, amplitudes: Mapping[Pattern, float]) -> dict[str, Floats]:
+    """Return the fluxes of patterns by channel, (n,); amplitudes are in units of `UNIT_FLUX`."""
+    courses = {when: course for when, _, course in patterns(record, longitude)}
+    fluxes: dict[str, Floats] = {}
+    for pattern, amplitude in amplitudes.items():
+        flux = amplitude * UNIT_FLUX[pattern.channel] * courses[pattern.when]
+        fluxes[pattern.channel] = fluxes.get(pattern.channel, 0.0) + flux
+    return fluxes
+
+
+def pattern_columns(line: Linearisation, longitude: float) -> tuple[tuple[Pattern, ...], Floats]:
+    """Return every pattern in every channel, and their columns of the errors, (p, 3, r, steps)."""
+    found: list[Pattern] = []
+    fluxes: list[tuple[Mapping[str, Floats], float]] = []
+    for when, drivers, course in patterns(line.record, longitude):
+        if not np.any(course):
+            continue
+        for channel, size in UNIT_FLUX.items():
+            found.append(Pattern(channel, when, drivers))
+            fluxes.append(({channel: size * course}, _PATTERN_DIFFERENCE))
+    columns = flux_sensitivities(line, fluxes)
+    kept = [index for index, column in enumerate(columns) if _is_visible(line, column)]
+    return tuple(found[index] for index in kept), columns[kept]
+
+
+def _is_visible(line: Linearisation, column: Floats) -> bool:
+    return bool(np.any(np.abs(column[line.runs.weight]) > _VISIBLE))
 
 
 def _is_blind(line: Linearisation, effect: Effect) -> bool:
@@ -126,14 +248,14 @@ def _columns(line: Linearisation, candidates: Sequence[Candidate]) -> Floats:
     fluxes = [
         (
             unit_fluxes(line, candidates[index].definition, candidates[index].values),
-            0.05 * abs(candidates[index].definition.amplitude.typical),
+            _PROCESS_DIFFERENCE * abs(candidates[index].definition.amplitude.typical),
         )
         for index in process
     ]
-    columns[process] = flux_columns(line, fluxes)
+    columns[process] = flux_sensitivities(line, fluxes)
     for index, one in enumerate(candidates):
         if one.definition.kind == "sensor":
-            columns[index] = sensor_column(line, one.definition, one.values)
+            columns[index] = sensor_sensitivity(line, one.definition, one.values)
     return columns
 
 

@@ -1,55 +1,221 @@
-"""The corrected simulator as a model ready for export: parameters, effects with intervals, errors before and after."""
+"""The corrected model: each cause put into it in turn, and kept where it stands on days that no fit has seen."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from igrow.core.bundle import Bundle, EffectRecord, Estimate, HeldOutError, Onset, Span
+from igrow.core.arrays import Floats
+from igrow.core.bundle import EffectRecord, Estimate, HeldOutError, Onset, Span
+from igrow.core.effects import EFFECTS
 from igrow.core.local_time import utc_datetime
 from igrow.core.quantities import QUANTITIES
-from igrow.core.site import Site
-from igrow.trainer.calibration.posterior import Posterior
-from igrow.trainer.diagnosis.diagnose import Evidence
-from igrow.trainer.diagnosis.result import Diagnosis, Finding
-from igrow.trainer.export.bundle import read_hybrid_model
-from igrow.trainer.model import HybridModel
+from igrow.core.simulator.hybrid.record import Record
+from igrow.trainer.data.splits import DaySplit
+from igrow.trainer.diagnosis import freerun
+from igrow.trainer.diagnosis.candidates import Pattern, pattern_fluxes
+from igrow.trainer.diagnosis.estimate import Estimated
+from igrow.trainer.diagnosis.freerun import FreeRuns
+from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, activate
+from igrow.trainer.diagnosis.refit import REGIMES
+from igrow.trainer.diagnosis.result import Finding, Interval
+from igrow.trainer.diagnosis.rules import DecisionRules
+from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.diagnosis.sensitivity import DayRuns
+from igrow.trainer.fit.gaussian import Gaussian
+from igrow.trainer.fit.model import FittedModel
+from igrow.trainer.fit.solver import DivergenceError
 
 
-def corrected_model(bundle: Bundle, site: Site, diagnosis: Diagnosis, evidence: Evidence) -> HybridModel:
-    """Return the model of a bundle with what a diagnosis found."""
-    model = read_hybrid_model(bundle, site)
-    corrected = evidence.corrected
-    names = model.posterior.names
-    known = model.posterior.values
-    mean = np.array([corrected.parameters.get(name, known[name]) for name in names])
-    before = dict(zip(names, map(float, model.posterior.standard_deviation), strict=True))
-    deviation = np.array([corrected.standard_deviation.get(name, before[name]) for name in names])
-    found = tuple(effect_record(one) for one in diagnosis.findings if one.kind != "remainder")
-    replaced = {one.name for one in found}
-    kept = tuple(one for one in model.effects if one.name not in replaced)
-    errors = tuple(
-        HeldOutError(quantity, horizon, stages["deployed"], stages["corrected"], QUANTITIES[quantity].unit)
-        for quantity, horizons in diagnosis.errors.items()
-        for horizon, stages in horizons.items()
+@dataclass(frozen=True)
+class Stage:
+    """One model of the tables: deployed, recalibrated, corrected."""
+
+    posterior: Gaussian
+    terms: tuple[ActiveTerm, ...]
+    patterns: Mapping[Pattern, float] = field(default_factory=dict)
+    """Amplitude of what no cause explains, in units of a pattern."""
+    added: Mapping[str, Floats] = field(default_factory=dict)
+    """Its fluxes by channel, (n,)."""
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """The stages of a correction, and what became of each cause."""
+
+    stages: Mapping[str, Stage]
+    kept: tuple[Estimated, ...]
+    estimates: tuple[Estimated, ...]
+    """All causes with their size and skill on unseen days, kept or not."""
+
+
+@dataclass(frozen=True)
+class LogDays:
+    """A record with its split and runs: what stages are fitted to and judged on."""
+
+    record: Record
+    split: DaySplit
+    runs: DayRuns
+
+    def fit(
+        self,
+        prior: Gaussian,
+        terms: Sequence[ActiveTerm],
+        start: Mapping[str, float] | None = None,
+        added: Mapping[str, Floats] | None = None,
+    ) -> Gaussian:
+        """Return parameters fitted to the fit days beside terms."""
+        effects = activate(self.record, terms)
+        return freerun.fit_parameters(self.record, self.runs, self.split, prior, effects, start, added)
+
+    def run(self, stage: Stage, horizon: str = "24_h") -> FreeRuns | None:
+        """Run a stage freely on held-out days."""
+        effects = activate(self.record, stage.terms)
+        return freerun.run(self.record, self.split, stage.posterior.values, effects, horizon, added=stage.added)
+
+
+def correct(
+    log: LogDays,
+    knowledge: Knowledge,
+    found: Sequence[Estimated],
+    patterns: Sequence[Hypothesis],
+    longitude: float,
+    rules: DecisionRules,
+) -> Corrected:
+    """Fit the model with each cause in turn, and keep those that stand on unseen days.
+
+    Args:
+        log: of the diagnosis.
+        knowledge: of the model in force.
+        found: causes, in the order in which they were found.
+        patterns: what no cause explains.
+        longitude: degrees east.
+        rules: what a cause must show.
+    """
+    current = recalibrated = Stage(log.fit(knowledge.prior, knowledge.terms), knowledge.terms)
+    kept: list[Estimated] = []
+    estimates: list[Estimated] = []
+    for one in found:
+        # Where the effect takes over what recalibration had put into the parameters, the fit starts there.
+        begin = {name: value + one.shift.get(name, 0.0) for name, value in current.posterior.values.items()}
+        terms = (*current.terms, one.term)
+        try:
+            trial = Stage(log.fit(knowledge.prior, terms, begin), terms)
+        except DivergenceError:
+            estimates.append(one)
+            continue
+        judged = _judged(log, one, current, trial)
+        estimates.append(judged)
+        if stands(judged, kept, rules):
+            kept.append(judged)
+            current = trial
+    if patterns:
+        current = _with_patterns(log, knowledge, current, patterns, longitude, rules)
+    stages = {
+        "deployed": Stage(knowledge.posterior, knowledge.terms),
+        "recalibrated": recalibrated,
+        "corrected": current,
+    }
+    return Corrected(stages, tuple(kept), tuple(estimates))
+
+
+def stands(one: Estimated, kept: Sequence[Estimated], rules: DecisionRules) -> bool:
+    """Tell whether a cause is large enough, and holds on unseen days; one beside others must do more."""
+    if one.effect_to_noise < rules.least_effect_to_noise or not same_in_all_regimes(one.regimes, rules):
+        return False
+    if not kept:
+        likelier = one.bootstrap_p <= rules.largest_bootstrap_p
+        return one.skill >= rules.clear_skill or (one.skill >= rules.least_skill and likelier)
+    return (
+        one.skill >= rules.further_skill
+        and one.bootstrap_p <= rules.further_bootstrap_p
+        and one.gain >= rules.further_gain_share * sum(other.gain for other in kept)
     )
-    span = Span(utc_datetime(diagnosis.start), utc_datetime(diagnosis.end))
-    fitted = model.corrected(Posterior(names, mean, np.diag(deviation**2)), (*kept, *found))
-    own = replace(fitted, calibrated_on=site.name, known_misfit=corrected.known_misfit)
-    return own.trained(span, model.training_range, errors)
+
+
+def same_in_all_regimes(regimes: Mapping[str, Interval], rules: DecisionRules) -> bool:
+    """Tell whether a cause's size is about the same by day and by night, in calm and in wind, and so on.
+
+    A regime in which the effect hardly shows has no size of its own.
+    """
+    pairs = ([regimes[name].value for name in pair] for pair in REGIMES if all(name in regimes for name in pair))
+    return all(a * b > 0.0 and min(a / b, b / a) >= rules.regime_share for a, b in pairs)
+
+
+def _judged(log: LogDays, one: Estimated, current: Stage, trial: Stage) -> Estimated:
+    """Return the cause with its size and skill on unseen days."""
+    before, after = log.run(current), log.run(trial)
+    plain = log.run(replace(trial, terms=current.terms))
+    if before is None or after is None or plain is None:
+        return one
+    return replace(one, effect_to_noise=freerun.effect_to_noise(plain, after), skill=freerun.skill(before, after))
+
+
+def _with_patterns(
+    log: LogDays,
+    knowledge: Knowledge,
+    current: Stage,
+    patterns: Sequence[Hypothesis],
+    longitude: float,
+    rules: DecisionRules,
+) -> Stage:
+    """Return the stage with bounded fluxes on outside drivers, if they help on unseen days."""
+    amplitudes = {
+        one.cause: float(np.clip(one.amplitude, -rules.largest_pattern, rules.largest_pattern))
+        for one in patterns
+        if isinstance(one.cause, Pattern)
+    }
+    added = pattern_fluxes(log.record, longitude, amplitudes)
+    try:
+        fitted = log.fit(knowledge.prior, current.terms, current.posterior.values, added)
+    except DivergenceError:
+        return current
+    trial = Stage(fitted, current.terms, amplitudes, added)
+    before, after = log.run(current), log.run(trial)
+    return trial if before is not None and after is not None and freerun.skill(before, after) > 0.0 else current
+
+
+def corrected_model(
+    model: FittedModel,
+    result: Corrected,
+    findings: Sequence[Finding],
+    errors: Mapping[str, Mapping[str, Mapping[str, float]]],
+    discrepancy: Mapping[str, float],
+    span: tuple[np.datetime64, np.datetime64],
+) -> FittedModel:
+    """Return a model with what a diagnosis found, ready to export.
+
+    Args:
+        model: in force.
+        result: of the correction.
+        findings: of the diagnosis.
+        errors: quantity -> horizon -> stage -> mean absolute error.
+        discrepancy: of the calibration, which goes on.
+        span: of the log.
+    """
+    found = tuple(effect_record(one) for one in findings if one.kind != "discrepancy")
+    replaced = {one.name for one in found}
+    return model.corrected(
+        result.stages["corrected"].posterior,
+        (*(one for one in model.effects if one.name not in replaced), *found),
+        span=Span(*map(utc_datetime, span)),
+        errors=[
+            HeldOutError(quantity, horizon, stages["deployed"], stages["corrected"], QUANTITIES[quantity].unit)
+            for quantity, horizons in errors.items()
+            for horizon, stages in horizons.items()
+        ],
+        discrepancy=discrepancy,
+    )
 
 
 def effect_record(finding: Finding) -> EffectRecord:
-    """Return a finding as the manifest's record of an effect."""
-    onset = finding.onset
-    return EffectRecord(
-        finding.effect,
-        finding.kind,
-        {
-            name: Estimate(float(one.value), float(one.low), float(one.high), one.unit)
-            for name, one in finding.parameters.items()
-        },
-        finding.balances,
-        None if onset is None else Onset(utc_datetime(onset.time), utc_datetime(onset.low), utc_datetime(onset.high)),
-    )
+    """Return a finding of the catalogue as the manifest's record of an effect."""
+    estimates = {
+        name: Estimate(float(one.value), float(one.low), float(one.high), one.unit)
+        for name, one in finding.parameters.items()
+    }
+    began = finding.onset
+    onset = None if began is None else Onset(*map(utc_datetime, (began.time, began.low, began.high)))
+    return EffectRecord(finding.effect, EFFECTS[finding.effect].kind, estimates, finding.balances, onset)

@@ -1,26 +1,33 @@
-"""What a diagnosis says: the verdict, its findings, errors before and after; and its JSON."""
+"""What a diagnosis says: verdict, findings, errors before and after, the corrected model; in words, plots, JSON."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from igrow.core.quantities import QUANTITIES
 from igrow.trainer.data.screening import Screened
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from igrow.trainer.diagnosis.evidence import Evidence
+    from igrow.trainer.fit.model import FittedModel
+
 Verdict = Literal["nothing", "named", "ambiguous", "unexplained", "data_fault"]
 EXIT_CODES: Mapping[str, int] = {"nothing": 0, "named": 10, "ambiguous": 11, "unexplained": 12, "data_fault": 13}
 """Exit code of each verdict; 2 is a mistake of use."""
-HORIZONS = ("1_step", "24_h", "7_d")
 STAGES = ("deployed", "recalibrated", "corrected")
+DISCREPANCY = "discrepancy"
+"""Effect and kind of a finding that no effect of the catalogue explains: what the model lacks, by outside drivers."""
 
 
 @dataclass(frozen=True)
 class Interval:
-    """A value with its 90 % interval."""
+    """A value with its confidence interval."""
 
     value: float
     low: float
@@ -30,7 +37,7 @@ class Interval:
 
 @dataclass(frozen=True)
 class OnsetInterval:
-    """When something began, UTC, with a 90 % interval."""
+    """When something began, UTC, with its confidence interval."""
 
     time: np.datetime64
     low: np.datetime64
@@ -42,13 +49,14 @@ class Finding:
     """One cause."""
 
     effect: str
-    """Name in the catalogue, or ``remainder``."""
-    kind: Literal["process", "sensor", "remainder"]
+    """Name in the catalogue, or ``discrepancy``."""
+    kind: Literal["process", "sensor", "discrepancy"]
     balances: tuple[str, ...]
     parameters: Mapping[str, Interval]
     onset: OnsetInterval | None
     p_value: float
     rivals: tuple[str, ...]
+    """Effects that fit as well, itself first: confounded in this log."""
     drivers: tuple[str, ...]
     separating_test: str
     sentence: str = ""
@@ -59,9 +67,14 @@ class Finding:
     """The coefficient refitted by regime."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Diagnosis:
-    """The whole answer."""
+    """The whole answer.
+
+    >>> result = diagnose(log, model)
+    >>> print(result.summary())
+    >>> bundle = export(result.corrected, folder)
+    """
 
     site: str
     verdict: Verdict
@@ -73,16 +86,72 @@ class Diagnosis:
     errors: Mapping[str, Mapping[str, Mapping[str, float]]]
     """Quantity -> horizon -> stage -> mean absolute error on held-out days."""
     screened: tuple[Screened, ...]
+    """Stretches of readings that were set aside."""
+    model: FittedModel
+    """The model in force."""
+    corrected: FittedModel
+    """The same, recalibrated and with the causes found in it: ready to export. Unchanged after a data fault."""
     untestable: tuple[str, ...] = ()
     """Effects that this log cannot tell."""
     unknown: tuple[str, ...] = ()
     """Inputs that the log lacks."""
     notes: tuple[str, ...] = ()
+    evidence: Evidence | None = None
+    """What the verdict rests on; None for a data fault."""
 
     @property
     def exit_code(self) -> int:
         """Of the command."""
         return EXIT_CODES[self.verdict]
+
+    def __repr__(self) -> str:
+        causes = ", ".join(one.effect for one in self.findings)
+        return f"Diagnosis({self.site!r}, {self.verdict}{': ' if causes else ''}{causes})"
+
+    def summary(self) -> str:
+        """Return the verdict in a few lines for people."""
+        lines = [f"{self.site}: {self.verdict}"]
+        lines += [f"  {one.sentence}" for one in self.findings]
+        lines += [f"  as well it could be {', '.join(one.rivals[1:])}" for one in self.findings if one.rivals[1:]]
+        if self.unknown:
+            lines.append(f"  the log lacks {', '.join(self.unknown)}: usual values stand in")
+        lines += [f"  {note}" for note in self.notes]
+        for quantity, horizons in self.errors.items():
+            day = horizons.get("24_h")
+            if day:
+                stages = ", ".join(f"{stage} {value:.3g}" for stage, value in day.items())
+                lines.append(f"  {quantity}, 24 h ahead on unseen days: {stages}")
+        return "\n".join(lines)
+
+    def plot_errors(self, quantity: str = "air_temperature") -> Figure:
+        """Return a figure of the worst unseen day: measured, and predicted by each stage.
+
+        Raises:
+            IgrowError: there is nothing to plot.
+        """
+        from igrow.trainer.diagnosis import plots  # noqa: PLC0415  (matplotlib is slow to import)
+
+        return plots.worst_day(plots.needed(self.evidence), quantity)
+
+    def plot_evidence(self) -> Figure:
+        """Return a figure of how the evidence adds up from day to day; raises as `plot_errors` does."""
+        from igrow.trainer.diagnosis import plots  # noqa: PLC0415
+
+        return plots.evidence_by_day(plots.needed(self.evidence))
+
+    def plot_residual(self, driver: str) -> Figure:
+        """Return a figure of what is missing against one of the model's drivers; raises as `plot_errors` does."""
+        from igrow.trainer.diagnosis import plots  # noqa: PLC0415
+
+        return plots.residual_against_driver(plots.needed(self.evidence), driver)
+
+    def plot_regimes(self, finding: Finding) -> Figure:
+        """Return a figure of a finding's coefficient by regime; raises as `plot_errors` does."""
+        from igrow.trainer.diagnosis import plots  # noqa: PLC0415
+
+        return plots.coefficient_by_regime(
+            {name: (one.value, one.low, one.high) for name, one in finding.regimes.items()}
+        )
 
     def to_json(self) -> dict[str, Any]:
         """Return the document of `diagnosis.json`."""
@@ -112,6 +181,12 @@ class Diagnosis:
         }
 
 
+def plain(value: float) -> str:
+    """Return a number with two significant digits, as people write it."""
+    rounded = float(f"{value:.2g}")
+    return f"{rounded:.0f}" if abs(rounded) >= 10.0 else f"{rounded:.10f}".rstrip("0").rstrip(".")
+
+
 def _finding(finding: Finding) -> dict[str, Any]:
     onset = finding.onset
     return {
@@ -139,8 +214,3 @@ def _number(value: float) -> float:
 
 def _time(time: np.datetime64) -> str:
     return f"{np.datetime_as_string(time.astype('datetime64[s]'))}Z"
-
-
-def causes(findings: Sequence[Finding]) -> tuple[str, ...]:
-    """Return the names of what was found."""
-    return tuple(one.effect for one in findings)

@@ -1,7 +1,7 @@
-"""The search: which term, from which day on, explains most of the innovations, and how surely.
+"""The search: which candidate, from which day on, explains most of the innovations, and how surely.
 
-Every column is scored against the residual after the parameters (and what has been accepted before) have taken
-their share under their priors. The score of a day is one number; under the hypothesis that nothing is missing its
+Every column is scored against the residual after the null (and what has been accepted before) has taken its share
+under its priors. The score of a day is one number; under the hypothesis that nothing is missing its
 sign is a coin's. Flipping the signs of whole days and taking the largest statistic over all columns and all
 beginnings gives the price of having searched (max-T: Westfall and Young 1993, Resampling-Based Multiple Testing;
 day scores centred at each column's own fit, as in a wild bootstrap: Liu 1988, Ann. Statist. 16).
@@ -13,70 +13,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from igrow.trainer.diagnosis.gram import RESIDUAL, DailyGrams, Floats, Solution, Term, solve
+from igrow.core.arrays import Floats, Integers, Mask
+from igrow.trainer.diagnosis.candidates import Candidate, Pattern
+from igrow.trainer.diagnosis.design import Design
+from igrow.trainer.diagnosis.linear import RESIDUAL, DailyGrams, Fit, Term
 
-FLIPS = 999
-
-
-@dataclass(frozen=True)
-class Model:
-    """Base columns under their prior, and free terms."""
-
-    base: tuple[int, ...]
-    precision: Floats
-    """Of the base, (b, b)."""
-    shift: Floats
-    """Where the base stands against its prior's mean, (b,)."""
-    terms: tuple[Term, ...] = ()
-
-    def with_term(self, term: Term) -> Model:
-        """Return the model with one term more."""
-        return Model(self.base, self.precision, self.shift, (*self.terms, term))
-
-
-@dataclass(frozen=True)
-class Fit:
-    """A model fitted to the fit days."""
-
-    model: Model
-    solution: Solution
-    products: Floats
-    """Of [residual, base, terms], by day, (days, p, p)."""
-
-    @property
-    def amplitudes(self) -> Floats:
-        """Fitted amplitudes of the terms."""
-        return self.solution.coefficients[len(self.model.base) :]
-
-    @property
-    def deviations(self) -> Floats:
-        """Their standard deviations were the innovations white and of unit variance."""
-        return np.sqrt(np.diag(self.solution.inverse)[len(self.model.base) :])
-
-
-def fit(grams: DailyGrams, model: Model) -> Fit:
-    """Fit a model to the fit days."""
-    products = grams.of(model.base, model.terms)
-    total = products[grams.fit].sum(axis=0)
-    size = len(model.base)
-    precision = np.zeros((size + len(model.terms),) * 2)
-    precision[:size, :size] = model.precision
-    # The prior pulls towards its mean, from which the linearisation may stand away.
-    pull = np.zeros(len(total))
-    pull[1 : size + 1] = model.precision @ model.shift
-    total = total.copy()
-    total[0, :] += pull
-    total[:, 0] += pull
-    return Fit(model, solve(total, precision), products)
+_EXPLAINED = 1e-6
+"""Share of a column's curvature below which the null explains it altogether."""
+_UNBOUNDED = 1e9
 
 
 @dataclass(frozen=True)
 class Scan:
     """Scores of many columns at many beginnings against one fit."""
 
-    columns: NDArray[np.int64]
+    columns: Integers
     """(c,)."""
     onsets: tuple[int | None, ...]
     """(o,)."""
@@ -100,24 +52,26 @@ class Scan:
 def scan(
     grams: DailyGrams,
     current: Fit,
-    columns: Sequence[int] | NDArray[np.int64],
+    chosen: Sequence[int],
     ageing: Sequence[int | None],
     onsets: Sequence[int | None],
     bounds: Floats,
     rng: np.random.Generator,
+    flips: int,
 ) -> Scan:
     """Score columns at beginnings.
 
     Args:
-        grams: of the problem.
+        grams: of the design.
         current: the fit so far.
-        columns: to score, (c,).
+        chosen: columns to score, (c,).
         ageing: for each column, the one to subtract per day before its beginning, or None.
         onsets: days of beginning; None is always.
         bounds: smallest and largest amplitude of each column, (c, 2).
         rng: for the flips.
+        flips: how many.
     """
-    columns = np.asarray(columns)
+    columns = np.asarray(chosen)
     model = current.model
     active = [RESIDUAL, *model.base]
     days = np.flatnonzero(grams.fit)
@@ -136,7 +90,7 @@ def scan(
     shift_cross = _cross(grams, active, model.terms, shift_columns)[days] * shifted[None, :, None]
     shift_own = grams.products[days][:, shift_columns, shift_columns] * shifted
     shift_mixed = grams.products[days][:, columns, shift_columns] * shifted
-    for row, onset in enumerate(onsets):
+    for place, onset in enumerate(onsets):
         begun = (days >= (onset or 0)).astype(np.float64)
         first = float(onset or 0)
         part = (cross - first * shift_cross) * begun[:, None, None]
@@ -148,26 +102,26 @@ def scan(
             - 2.0 * np.einsum("dcp,cp->dc", part[:, :, 1:], weights)
             + np.einsum("cp,dpq,cq->dc", weights, joint[:, 1:, 1:], weights, optimize=True)
         )
-        score[row] = (part @ coefficients).sum(axis=0)
-        curvature[row] = square.sum(axis=0) - np.einsum("cp,cp->c", part.sum(axis=0)[:, 1:], weights)
+        score[place] = (part @ coefficients).sum(axis=0)
+        curvature[place] = square.sum(axis=0) - np.einsum("cp,cp->c", part.sum(axis=0)[:, 1:], weights)
         # A column that the base explains altogether has no curvature left, and no slope.
-        left = curvature[row] > 1e-6 * np.maximum(square.sum(axis=0), 1e-300)
-        slope = np.where(left, score[row] / np.where(left, curvature[row], 1.0), 0.0)
-        centred[:, row] = day_score - day_curvature * slope
-        spread[row] = np.sqrt(np.sum(centred[:, row] ** 2, axis=0))
-    usable = curvature > 1e-6 * np.maximum(own.sum(axis=0), 1e-300)
+        left = curvature[place] > _EXPLAINED * np.maximum(square.sum(axis=0), 1e-300)
+        slope = np.where(left, score[place] / np.where(left, curvature[place], 1.0), 0.0)
+        centred[:, place] = day_score - day_curvature * slope
+        spread[place] = np.sqrt(np.sum(centred[:, place] ** 2, axis=0))
+    usable = curvature > _EXPLAINED * np.maximum(own.sum(axis=0), 1e-300)
     amplitude = -score / np.maximum(curvature, 1e-300)
     allowed = usable & (amplitude >= bounds[:, 0]) & np.where(bounds[:, 0] >= 0.0, amplitude > 0.0, True)
     bounded = np.clip(amplitude, bounds[:, 0], bounds[:, 1])
     gain = np.where(allowed, -bounded * score - 0.5 * bounded**2 * curvature, 0.0)
     spread = np.maximum(spread, 1e-12)
     statistic = np.where(usable, np.abs(score) / spread, 0.0)
-    largest = _largest_flipped(centred.reshape(len(days), -1), spread.reshape(-1), usable.reshape(-1), rng)
+    largest = _largest_flipped(centred.reshape(len(days), -1), spread.reshape(-1), usable.reshape(-1), rng, flips)
     p_value = (1.0 + np.sum(largest[:, None, None] >= statistic[None], axis=0)) / (len(largest) + 1.0)
     return Scan(columns, tuple(onsets), score, curvature, gain, np.where(allowed, statistic, 0.0), p_value)
 
 
-def _cross(grams: DailyGrams, active: Sequence[int], terms: Sequence[Term], columns: NDArray[np.int64]) -> Floats:
+def _cross(grams: DailyGrams, active: Sequence[int], terms: Sequence[Term], columns: Integers) -> Floats:
     """Return products of `columns` with [active, terms] by day, (days, c, p)."""
     plain = grams.products[:, columns[:, None], np.array(active)[None, :]]
     if not terms:
@@ -183,9 +137,95 @@ def _cross(grams: DailyGrams, active: Sequence[int], terms: Sequence[Term], colu
     return np.concatenate([plain, extra], axis=2)
 
 
-def _largest_flipped(centred: Floats, spread: Floats, usable: NDArray[np.bool_], rng: np.random.Generator) -> Floats:
-    """Return the largest statistic over all columns for each draw of day signs, (FLIPS,)."""
-    signs = rng.choice(np.array([-1.0, 1.0]), size=(FLIPS, len(centred)))
+def _largest_flipped(centred: Floats, spread: Floats, usable: Mask, rng: np.random.Generator, flips: int) -> Floats:
+    """Return the largest statistic over all columns for each draw of day signs, (flips,)."""
+    signs = rng.choice(np.array([-1.0, 1.0]), size=(flips, len(centred)))
     scaled = centred[:, usable] / spread[usable]
     largest: Floats = np.max(np.abs(signs @ scaled), axis=1, initial=0.0)
     return largest
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """One candidate (or pattern) as a term, with what it would gain in the model it was scored against."""
+
+    cause: Candidate | Pattern
+    term: Term
+    gain: float
+    amplitude: float
+    statistic: float
+    p_value: float
+
+    @property
+    def effect(self) -> str:
+        """Name of the effect; a pattern has none."""
+        return self.cause.effect if isinstance(self.cause, Candidate) else ""
+
+
+def onset_days(design: Design) -> list[int | None]:
+    """Return the days of beginning worth trying; None is always."""
+    first, last = design.rules.first_onset_days, design.split.days - design.rules.first_onset_days
+    step = max(1, -(-(last - first) // design.rules.most_onsets))
+    return [None, *range(first, last + 1, step)]
+
+
+def score_candidates(
+    design: Design, current: Fit, onsets: Sequence[int | None], rng: np.random.Generator
+) -> list[Hypothesis]:
+    """Return the best hypothesis of every effect, the likeliest first."""
+    ageing = [
+        shift if candidate.ages else None
+        for shift, candidate in zip(design.block("ageing").columns, design.candidates, strict=True)
+    ]
+    bounds = np.array([(one.definition.amplitude.low, one.definition.amplitude.high) for one in design.candidates])
+    columns, rules = design.block("effect").columns, design.rules
+    scanned = scan(design.grams, current, columns, ageing, onsets, bounds, rng, rules.flips)
+    return _best(scanned, design.candidates, ageing, [one.effect for one in design.candidates], rules.onset_price)
+
+
+def middle_of_best(gains: Floats) -> int:
+    """Return the position of the largest gain, the middle one of several.
+
+    Held-out days tell nothing: within a block of them all beginnings are as likely, and the middle is the least wrong.
+    """
+    ties = np.flatnonzero(gains >= gains.max() - 1e-9)
+    return int(ties[len(ties) // 2])
+
+
+def score_patterns(
+    design: Design, current: Fit, onsets: Sequence[int | None], rng: np.random.Generator
+) -> list[Hypothesis]:
+    """Return every pattern as a hypothesis, the likeliest first."""
+    count, rules = len(design.patterns), design.rules
+    bounds = np.tile([-_UNBOUNDED, _UNBOUNDED], (count, 1))
+    none: list[int | None] = [None] * count
+    scanned = scan(design.grams, current, design.block("pattern").columns, none, onsets, bounds, rng, rules.flips)
+    return _best(scanned, design.patterns, none, list(range(count)), rules.onset_price)
+
+
+def _best(
+    scanned: Scan,
+    causes: Sequence[Candidate] | Sequence[Pattern],
+    ageing: Sequence[int | None],
+    groups: Sequence[object],
+    onset_price: float,
+) -> list[Hypothesis]:
+    """Return the best hypothesis of every group, the likeliest first."""
+    price = np.array([0.0 if onset is None else onset_price for onset in scanned.onsets])
+    merit = scanned.gain - price[:, None]
+    found: dict[object, Hypothesis] = {}
+    places = np.array([middle_of_best(column) for column in merit.T], dtype=np.int64)
+    for column in np.argsort(-merit[places, np.arange(merit.shape[1])]):
+        place = places[column]
+        if groups[column] in found or merit[place, column] <= 0.0:
+            continue
+        onset = scanned.onsets[place]
+        found[groups[column]] = Hypothesis(
+            causes[column],
+            Term(int(scanned.columns[column]), onset, ageing[column] if onset is not None else None),
+            float(merit[place, column]),
+            float(scanned.amplitude[place, column]),
+            float(scanned.statistic[place, column]),
+            float(scanned.p_value[place, column]),
+        )
+    return list(found.values())

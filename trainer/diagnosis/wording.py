@@ -1,12 +1,15 @@
-"""Findings in words: for the grower, and for what would separate the rivals."""
+"""Findings in words: for the grower, and for what would separate confounded causes."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from igrow.core.effects import EFFECTS
-from igrow.trainer.diagnosis.adequacy import Adequacy
-from igrow.trainer.diagnosis.drivers import BALANCES_OF, UNIT_FLUX, Pattern
-from igrow.trainer.diagnosis.estimate import Estimated
-from igrow.trainer.diagnosis.result import Finding, Interval
+from igrow.trainer.diagnosis.candidates import UNIT_FLUX, Pattern
+from igrow.trainer.diagnosis.estimate import Estimated, normal_quantile
+from igrow.trainer.diagnosis.result import DISCREPANCY, Finding, Interval, plain
+from igrow.trainer.diagnosis.rules import DecisionRules
+from igrow.trainer.diagnosis.search import Hypothesis
 
 UNITS = {"heat": "W m-2", "vapour": "kg m-2 s-1", "co2": "kg m-2 s-1", "air_exchange": "m s-1", "light_loss": "1"}
 NAMES = {
@@ -16,17 +19,25 @@ NAMES = {
     "air_exchange": "air exchange",
     "light_loss": "loss of light",
 }
+BALANCES_OF = {
+    "heat": ("heat",),
+    "vapour": ("vapour",),
+    "co2": ("co2",),
+    "air_exchange": ("heat", "vapour", "co2"),
+    "light_loss": ("light", "heat"),
+}
+MOST_TESTS = 3
+"""Separating tests that are told at most."""
 
 
 def finding(one: Estimated) -> Finding:
-    """Return the finding of an estimated term."""
+    """Return the finding of an estimated cause."""
     effect = EFFECTS[one.effect]
-    parameters = {effect.amplitude.name: one.amplitude, **one.shapes}
     return Finding(
         one.effect,
         effect.kind,
         tuple(effect.balances),
-        parameters,
+        {effect.amplitude.name: one.amplitude, **one.shapes},
         one.onset,
         one.hypothesis.p_value,
         one.rivals,
@@ -48,47 +59,39 @@ def sentence(one: Estimated) -> str:
     return f"{text[0].upper()}{text[1:]}."
 
 
-def plain(value: float) -> str:
-    """Return a number with two significant digits, as people write it."""
-    rounded = float(f"{value:.2g}")
-    return f"{rounded:.0f}" if abs(rounded) >= 10.0 else f"{rounded:.10f}".rstrip("0").rstrip(".")
-
-
-def separating_test(rivals: tuple[str, ...]) -> str:
-    """Return the cheapest tests that would tell rivals apart."""
+def separating_test(rivals: Sequence[str]) -> str:
+    """Return the cheapest tests that would separate confounded causes."""
     if len(rivals) == 1:
         return EFFECTS[rivals[0]].separating_test
-    return "; or ".join(dict.fromkeys(EFFECTS[name].separating_test for name in rivals[:3]))
+    return "; or ".join(dict.fromkeys(EFFECTS[name].separating_test for name in rivals[:MOST_TESTS]))
 
 
-def remainder(judged: Adequacy) -> Finding:
+def discrepancy(patterns: Sequence[Hypothesis], rules: DecisionRules) -> Finding:
     """Return the finding for what no candidate explains."""
-    assert judged.remainder is not None
     balances: dict[str, None] = {}
     drivers: dict[str, None] = {}
     parameters: dict[str, Interval] = {}
     words: list[str] = []
-    for one in judged.remainder:
+    for one in patterns:
         pattern = one.cause
         assert isinstance(pattern, Pattern)
         balances |= dict.fromkeys(BALANCES_OF[pattern.channel])
         drivers |= dict.fromkeys(pattern.drivers)
         size = UNIT_FLUX[pattern.channel]
-        deviation = abs(one.amplitude) / max(one.statistic, 1e-9)
-        low, high = (size * (one.amplitude + side * 1.645 * deviation) for side in (-1.0, 1.0))
+        reach = normal_quantile(rules) * abs(one.amplitude) / max(one.statistic, 1e-9)
         parameters[f"{pattern.channel}: {pattern.when}"] = Interval(
-            size * one.amplitude, low, high, UNITS[pattern.channel]
+            size * one.amplitude, size * (one.amplitude - reach), size * (one.amplitude + reach), UNITS[pattern.channel]
         )
         words.append(f"{NAMES[pattern.channel]} ({'more' if one.amplitude > 0 else 'less'}, {pattern.when})")
     return Finding(
-        "remainder",
-        "remainder",
+        DISCREPANCY,
+        "discrepancy",
         tuple(balances),
         parameters,
         None,
-        min((one.p_value for one in judged.remainder), default=1.0),
-        ("remainder",),
+        min((one.p_value for one in patterns), default=1.0),
+        (DISCREPANCY,),
         tuple(drivers),
-        "look at what happens in the house at these times and in this weather, and write it down for two weeks",
+        "look at what happens in the greenhouse at these times and in this weather, and write it down for two weeks",
         f"Something that the model does not know changes {'; '.join(words)}.",
     )

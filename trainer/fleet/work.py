@@ -64,7 +64,7 @@ def recalibrate_site(
     days: int,
 ) -> dict[str, Any]:
     """Diagnose one site, and publish what is better where `publish` says so."""
-    from igrow.trainer.publishing import publish as publish_bundle  # noqa: PLC0415  (collecting needs no signatures)
+    from igrow.trainer.publishing import publish_in as publish_bundle  # noqa: PLC0415  (collecting needs no signatures)
 
     site = load_site(file)
     turn = recalibrate(
@@ -85,7 +85,7 @@ def publish_site(
     site: str, state: str, exchange: dict[str, str | None], keys: str, now: float, *, again: bool
 ) -> dict[str, Any]:
     """Sign a site's bundles again where the signatures expire soon; with `again` publish its bundle once more."""
-    from igrow.trainer.publishing import publish, refresh  # noqa: PLC0415
+    from igrow.trainer.publishing import publish_in, refresh  # noqa: PLC0415
     from igrow.trainer.service.recalibration import bundle_in_force  # noqa: PLC0415
 
     repository, moment = _repository(exchange, site), datetime.fromtimestamp(now, UTC)
@@ -96,7 +96,7 @@ def publish_site(
         bundle, _ = bundle_in_force(folder, reports)
         if bundle.manifest.site != site:
             return {"site": site, "note": "nothing was published for it yet"}
-        publish(bundle.folder, repository, Path(keys), now=moment)
+        publish_in(bundle.folder, repository, Path(keys), now=moment)
         return {"site": site, "note": f"published {bundle.label} again"}
     if stamp is None:
         return {"site": site, "note": "nothing was published for it yet"}

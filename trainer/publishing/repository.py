@@ -64,7 +64,7 @@ def initialise(
     _write_chain(place, keys, 1, now, lifetimes)
 
 
-def publish(
+def publish_in(
     bundle: Path,
     repository: Place | Path,
     keys: Path,

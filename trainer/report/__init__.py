@@ -1,5 +1,5 @@
 """The report of a diagnosis: one page that a grower understands first, then the engineer's tables and plots."""
 
-from igrow.trainer.report.page import render_report, write_report
+from igrow.trainer.report.page import render_report, write_diagnosis
 
-__all__ = ["render_report", "write_report"]
+__all__ = ["render_report", "write_diagnosis"]

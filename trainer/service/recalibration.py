@@ -158,19 +158,18 @@ class Outcome:
 
 def _diagnose(site: Site, log: SiteLog, bundle: Bundle, target: Path) -> Outcome:
     """Diagnose a log against a bundle, and write diagnosis and report to `target`."""
-    from igrow.trainer.cli.diagnose import write, write_corrected  # noqa: PLC0415  (torch and scipy are slow to import)
-    from igrow.trainer.data import prepare_log  # noqa: PLC0415
-    from igrow.trainer.diagnosis.deployed import from_manifest  # noqa: PLC0415
-    from igrow.trainer.diagnosis.diagnose import diagnose  # noqa: PLC0415
+    from igrow.trainer.data import prepare_log  # noqa: PLC0415  (scipy is slow to import)
+    from igrow.trainer.diagnosis import diagnose  # noqa: PLC0415
+    from igrow.trainer.exporting import export, read_model  # noqa: PLC0415
+    from igrow.trainer.report import write_diagnosis  # noqa: PLC0415
 
-    deployed = from_manifest(bundle.manifest, site)
-    diagnosis, evidence = diagnose(prepare_log(log.telemetry, site, name=site.name), site, deployed)
-    write(target, diagnosis, evidence, deployed)
+    diagnosis = diagnose(prepare_log(log.telemetry, site, name=site.name), read_model(bundle, site))
+    write_diagnosis(target, diagnosis)
     write_bundle = None
-    if evidence is not None:
+    if diagnosis.verdict != "data_fault":
 
         def write_bundle(folder: Path) -> None:
-            write_corrected(folder, bundle, site, diagnosis, evidence)
+            export(diagnosis.corrected, folder)
 
     causes = tuple(one.effect for one in diagnosis.findings)
     return Outcome(diagnosis.verdict, causes, relative_gain(diagnosis.errors), tuple(diagnosis.notes), write_bundle)

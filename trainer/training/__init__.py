@@ -1,1 +1,1 @@
-"""Training of the network stages in torch: many steps at a time, so that whole seasons can be run freely."""
+"""Training of the growth and yield stages in torch: many steps at a time, so that seasons can be run freely."""

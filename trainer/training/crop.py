@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from igrow.core import gaps
+from igrow.core.arrays import Floats
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import GROWTH, QUANTITIES, YIELD
 from igrow.core.simulator.crop import GROWTH_DRIVERS, HARVEST_DRIVERS
@@ -17,8 +17,6 @@ from igrow.core.simulator.hybrid.record import Record, observe
 from igrow.core.simulator.network import Stage
 from igrow.core.telemetry import Telemetry, to_grid
 from igrow.trainer.training.stage import StageData, StageLayout, TrainingPlan, train_stage, untrained
-
-Values = NDArray[np.float64]
 
 GROWTH_PLAN = TrainingPlan(updates=((8, 600), (24, 500), (96, 250)), batch=128, learning_rate=3e-3)
 HARVEST_PLAN = TrainingPlan(updates=((4, 500), (14, 400)), batch=64, learning_rate=3e-3)
@@ -83,8 +81,8 @@ def fit_net_growth(
         days = len(record) // day
         hours = record.step / 3600.0
 
-        def total(values: Values, day: int = day, days: int = days, hours: float = hours) -> Values:
-            summed: Values = values[: day * days].reshape(days, day).sum(axis=1) * hours
+        def total(values: Floats, day: int = day, days: int = days, hours: float = hours) -> Floats:
+            summed: Floats = values[: day * days].reshape(days, day).sum(axis=1) * hours
             return summed
 
         cumulative = to_grid(season, int(record.step))["net_growth"]
@@ -113,23 +111,23 @@ def _layout(name: str, states: tuple[str, ...], drivers: tuple[str, ...], cumula
     )
 
 
-def _stacked(tables: Sequence[Telemetry], names: Sequence[str]) -> Values:
+def _stacked(tables: Sequence[Telemetry], names: Sequence[str]) -> Floats:
     """Return columns as (seasons, hours, names); gaps are bridged linearly."""
     return np.stack([np.stack([_bridged(table, name) for name in names], axis=-1) for table in tables])
 
 
-def _bridged(table: Telemetry, name: str) -> Values:
+def _bridged(table: Telemetry, name: str) -> Floats:
     if not np.isfinite(table[name]).any():
         raise IgrowError(f"a season to train on has no {name}")
     return gaps.interpolated(table[name])
 
 
-def _by_day(values: Values, days: int) -> Values:
+def _by_day(values: Floats, days: int) -> Floats:
     """Return the means of whole days, (seasons, days)."""
-    means: Values = values[:, : days * 24].reshape(len(values), days, 24).mean(axis=-1)
+    means: Floats = values[:, : days * 24].reshape(len(values), days, 24).mean(axis=-1)
     return means
 
 
-def _last(values: Values, days: int) -> Values:
+def _last(values: Floats, days: int) -> Floats:
     """Return the values at the end of whole days, (seasons, days)."""
     return values[:, 23 : days * 24 : 24]

@@ -12,12 +12,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from igrow.core.arrays import Floats, Integers, Mask
 from igrow.core.simulator.network import HOURS, Stage, Weights, hour_features
 
-Values = NDArray[np.float64]
 Report = Callable[[str], None]
 
 
@@ -59,21 +58,21 @@ class TrainingPlan:
 class StageData:
     """Runs of equal length for one stage."""
 
-    drivers: Values
+    drivers: Floats
     """(runs, steps, n); those at index t act over the step from t - 1 to t."""
-    states: Values
+    states: Floats
     """(runs, steps, s), NaN where unknown."""
-    hour: Values
+    hour: Floats
     """(steps,) hour of the day."""
-    valid: NDArray[np.bool_]
+    valid: Mask
     """(runs, steps); a false one counts neither as target nor as a window's start."""
-    weight: Values = field(default_factory=lambda: np.ones(1))
+    weight: Floats = field(default_factory=lambda: np.ones(1))
     """(runs,) or (1,): how often a run is drawn, relative to the others."""
-    jumps: Values | None = None
+    jumps: Floats | None = None
     """(runs, steps, s) by which a hand moved the states in each step (leaves picked); not learned, but added."""
 
 
-def filtered(stage: Stage | StageLayout, drivers: Values) -> Values:
+def filtered(stage: Stage | StageLayout, drivers: Floats) -> Floats:
     """Return the filters (runs, steps, n * k) along runs whose first drivers had stood for ever."""
     parts = []
     for constant in stage.time_constants:
@@ -82,7 +81,7 @@ def filtered(stage: Stage | StageLayout, drivers: Values) -> Values:
     return np.concatenate(parts, axis=-1) if parts else drivers[..., :0]
 
 
-def raw_features(stage: Stage | StageLayout, drivers: Values, hour: Values) -> Values:
+def raw_features(stage: Stage | StageLayout, drivers: Floats, hour: Floats) -> Floats:
     """Return all inputs but the state, unscaled, (runs, steps, features)."""
     parts = [drivers, filtered(stage, drivers)]
     if stage.clock:
@@ -106,7 +105,7 @@ def untrained(layout: StageLayout, data: StageData, seed: int) -> Stage:
         biases.append(np.zeros(width, dtype=np.float32))
         count = width
 
-    def single(values: Values) -> Weights:
+    def single(values: Floats) -> Weights:
         return values.astype(np.float32)
 
     # A constant feature must not be blown up: its scale is then its own size, or one.
@@ -137,12 +136,12 @@ class StageModule(torch.nn.Module):
         self.high = (torch.tensor(stage.high) - torch.tensor(stage.state_offset)) / scale
         self.cumulative = torch.tensor(stage.cumulative)
 
-    def scaled_features(self, features: Values) -> torch.Tensor:
+    def scaled_features(self, features: Floats) -> torch.Tensor:
         """Return raw features as the network's first inputs."""
         stage = self.stage
         return torch.tensor(((features - stage.feature_offset) / stage.feature_scale).astype(np.float32))
 
-    def scaled_states(self, states: Values) -> torch.Tensor:
+    def scaled_states(self, states: Floats) -> torch.Tensor:
         """Return states in units of their spread."""
         return torch.tensor(((states - self.stage.state_offset) / self.stage.state_scale).astype(np.float32))
 
@@ -228,7 +227,7 @@ def train_stage(stage: Stage, data: StageData, plan: TrainingPlan, report: Repor
     return module.trained_stage()
 
 
-def run_stage(stage: Stage, drivers: Values, hour: Values, start: Values) -> Values:
+def run_stage(stage: Stage, drivers: Floats, hour: Floats, start: Floats) -> Floats:
     """Run one stage freely under known drivers (runs, steps, n) from `start` (runs, s); (runs, steps, s)."""
     module = StageModule(stage)
     with torch.no_grad():
@@ -238,7 +237,7 @@ def run_stage(stage: Stage, drivers: Values, hour: Values, start: Values) -> Val
     return np.concatenate([start[:, None], states], axis=1)
 
 
-def run_windows(stage: Stage, data: StageData, starts: NDArray[np.int64], length: int) -> Values:
+def run_windows(stage: Stage, data: StageData, starts: Integers, length: int) -> Floats:
     """Run freely for `length` steps from each start (run, step), filters knowing all that went before.
 
     Returns states (windows, length, s); `starts` is (windows, 2).

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from igrow.core.effects.definition import Array, Drivers, Effect, Parameter, Values, lagged
+from igrow.core.arrays import Array
+from igrow.core.effects.definition import Drivers, Effect, Parameter, Values, lagged
 
 
 def _contribution(xp: Any, drivers: Drivers, parameters: Values, memory: Array) -> Mapping[str, Array]:

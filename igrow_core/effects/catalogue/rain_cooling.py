@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from igrow.core.effects.definition import Array, Drivers, Effect, Parameter, Values
+from igrow.core.arrays import Array
+from igrow.core.effects.definition import Drivers, Effect, Parameter, Values
 
 
 def _contribution(xp: Any, drivers: Drivers, parameters: Values, _memory: Array) -> Mapping[str, Array]:

@@ -18,8 +18,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from igrow.core import air
+from igrow.core.arrays import Array
 from igrow.core.effects import EFFECTS
-from igrow.core.effects.definition import Array, Drivers, Values
+from igrow.core.effects.definition import Drivers, Values
 
 STATES = ("air_temperature", "vapour_concentration", "co2_concentration", "mass_temperature")
 """The states without the memories of effects."""
@@ -57,6 +58,8 @@ _PASCAL_PER_CONTENT = 1.36e5
 _DRYING_SHARE = 0.6
 """Share of the evaporation's answer to warmer air that lasts over a step; moister air takes back the rest. It is what
 brings steps of 5 to 30 minutes closest to those of one (tests/simulator/test_step_length.py)."""
+_LEAST_CO2 = 1e-6
+"""kg m-3, half a part per million: less is a sensor that reads nothing, and must not divide."""
 _SLOWEST = 1e-7
 """Rate at which a state is pulled back at least, s-1; in single precision a smaller one would be lost."""
 _STOMATA_HALF_OPEN = 6.0
@@ -235,7 +238,7 @@ def balances(
         + respiration
         + added.get("co2", 0.0)
     )
-    co2_conductance = exchange + 0.5 * drivers["assimilation"] / co2
+    co2_conductance = exchange + 0.5 * drivers["assimilation"] / xp.maximum(co2, 0.0 * co2 + _LEAST_CO2)
 
     mass_flux = to_mass + parameters["mass_solar_share"] * sun
     mass_capacity = 1000.0 * parameters["mass_heat_capacity"]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from igrow.core.arrays import Array
 from igrow.core.effects import EFFECTS
-from igrow.core.effects.definition import Array, Drivers, Values
+from igrow.core.effects.definition import Drivers, Values
 from igrow.core.simulator.hybrid.climate import ActiveEffects, memory_name
 
 PREDICTED = ("air_temperature", "air_humidity", "air_co2")

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from igrow.core import gaps, sun
+from igrow.core.arrays import Array
 from igrow.core.effects import EFFECTS
-from igrow.core.effects.definition import Array, Values
+from igrow.core.effects.definition import Values
 from igrow.core.simulator.hybrid import climate, measurement
 from igrow.core.simulator.hybrid.climate import ActiveEffects, memory_name
 from igrow.core.telemetry import Telemetry, to_grid

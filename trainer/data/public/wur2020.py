@@ -17,7 +17,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from igrow.core.errors import IgrowError
-from igrow.trainer.training.leaf_picking import smooth
+from igrow.trainer.research.network.leaf_picking import smooth
 
 FAULTY_DAYS = (15, 75)
 """Days of 24 rows, counted from 0, on which the settings that worked differ from the requested ones."""

@@ -1,0 +1,81 @@
+"""The greenhouses of the benchmark, and when their logs begin."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from benchmarks.diagnosis.cases import SEASONS
+from igrow.core.greenhouse import GreenhouseParameters, generate_weather
+from igrow.core.greenhouse.weather import WeatherClimate
+from igrow.core.site import Greenhouse, Lamps, Site
+from igrow.core.telemetry import Telemetry
+
+OTHERS_SEED, LEARNING_SEED, PLACES_SEED = 60_000, 80_000, 90_000
+"""Of greenhouses that cases are drawn for, of those that the nuisance subspace is learned from, and of places at which
+it is learned how the built-in bundle fares."""
+OTHERS_SPREAD = 0.25
+"""How far other greenhouses lie from the usual one in each of their parameters, relative."""
+
+
+@dataclass(frozen=True)
+class VirtualGreenhouse:
+    """A greenhouse, and the day on which its logs begin; its model is calibrated on the eight weeks before."""
+
+    site: Site
+    plant: GreenhouseParameters
+    start: np.datetime64
+    seed: int
+    """Of the log that it is calibrated on."""
+
+    def weather(self, start: np.datetime64, end: np.datetime64, seed: int) -> Telemetry:
+        """Return weather under the sun of this place."""
+        return generate_weather(start, end, seed=seed, climate=WeatherClimate(self.site.latitude, self.site.longitude))
+
+
+def of_seasons() -> dict[str, VirtualGreenhouse]:
+    """Return the one greenhouse that most of the benchmark is about, by season."""
+    site = Site(name="benchmark", latitude=52.0, longitude=4.5, greenhouse=Greenhouse(mean_height=5.8))
+    return {
+        season: VirtualGreenhouse(site, GreenhouseParameters(), np.datetime64(f"{day}T00:00:00"), 77 + number)
+        for number, (season, day) in enumerate(SEASONS.items())
+    }
+
+
+def others(count: int, first: int = OTHERS_SEED) -> dict[str, VirtualGreenhouse]:
+    """Draw other greenhouses: each a quarter off in every parameter, half of them unlit, at any time of the year.
+
+    Args:
+        count: of greenhouses.
+        first: seed of the first one.
+    """
+    greenhouses = {}
+    for number in range(count):
+        rng = np.random.default_rng(first + number)
+        usual = GreenhouseParameters(latitude=float(rng.uniform(42.0, 60.0)))
+        plant = usual.varied(rng, OTHERS_SPREAD)
+        if number % 2:
+            plant = replace(plant, lamp_capacity=0.0)
+        day = np.datetime64("2020-03-01T00:00:00") + np.timedelta64(int(rng.integers(0, 300)), "D")
+        name = f"greengreenhouse-{number}"
+        greenhouses[name] = VirtualGreenhouse(_site(name, plant), plant, day, first + 500 + number)
+    return greenhouses
+
+
+def neighbours(greenhouse: VirtualGreenhouse, count: int) -> list[VirtualGreenhouse]:
+    """Draw greenhouses beside one: as different as those elsewhere are, under the same sun, lit if it is."""
+    usual = GreenhouseParameters(latitude=greenhouse.plant.latitude, lamp_capacity=greenhouse.plant.lamp_capacity)
+    found = []
+    for number in range(count):
+        seed = greenhouse.seed + 1000 * (1 + number)
+        plant = usual.varied(np.random.default_rng(seed), OTHERS_SPREAD)
+        found.append(VirtualGreenhouse(_site(f"{greenhouse.site.name}-{number}", plant), plant, greenhouse.start, seed))
+    return found
+
+
+def _site(name: str, plant: GreenhouseParameters) -> Site:
+    """Return what a grower would write down of a greenhouse."""
+    lamps = Lamps() if plant.lamp_capacity > 0.0 else None
+    described = Greenhouse(mean_height=float(np.mean(plant.air_height)), lamps=lamps)
+    return Site(name=name, latitude=plant.latitude, longitude=plant.longitude, greenhouse=described)

@@ -1,0 +1,150 @@
+"""`make results`: run the commands whose figures the documentation shows, and write each one's print as a page.
+
+    python -m benchmarks.results [NAME ...]
+
+Without a name all quick ones are run; the long ones (an hour or more each) are run when they are named, or by `--long`.
+No table of the documentation is typed: each page says by which command, on which day and of which commit it was made.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.provenance import ROOT, provenance
+
+FOLDER = ROOT / "docs" / "results"
+
+
+@dataclass(frozen=True)
+class Result:
+    """One page of results."""
+
+    title: str
+    command: tuple[str, ...]
+    """After ``python -m``."""
+    about: str
+    seeds: str
+    long: bool = False
+
+
+RESULTS = {
+    "decision-rules": Result(
+        "Every threshold of the diagnosis",
+        ("benchmarks.diagnosis", "thresholds"),
+        "Its value, whether it was chosen or fitted, and what it means.",
+        "none",
+    ),
+    "diagnosis-scoring": Result(
+        "The diagnosis on logs of known truth",
+        ("benchmarks.diagnosis", "scoring"),
+        "Greenhouses 8 % off in every parameter, something hidden in three quarters of them.",
+        "26000 and on",
+        long=True,
+    ),
+    "diagnosis-season": Result(
+        "The same over 84 days",
+        ("benchmarks.diagnosis", "scoring", "--days", "84", "--cases", "52"),
+        "The model was calibrated in winter and is judged in spring.",
+        "26000 and on",
+        long=True,
+    ),
+    "diagnosis-autumn": Result(
+        "The same in autumn",
+        ("benchmarks.diagnosis", "scoring", "--season", "autumn", "--cases", "104"),
+        "A season that nothing was learned in.",
+        "26000 and on",
+        long=True,
+    ),
+    "diagnosis-others": Result(
+        "Greenhouses that nothing was learned from",
+        ("benchmarks.diagnosis", "others", "--cases", "104"),
+        "Each with a model that was calibrated on its own eight weeks before.",
+        "26000 and on; greenhouses from 60000",
+        long=True,
+    ),
+    "diagnosis-transferred": Result(
+        "The same with the built-in bundle",
+        ("benchmarks.diagnosis", "transferred", "--cases", "104"),
+        "Of these greenhouses only the site file is known.",
+        "26000 and on; greenhouses from 60000",
+        long=True,
+    ),
+    "diagnosis-matched": Result(
+        "Greenhouses of the simulator's own structure",
+        ("benchmarks.diagnosis", "matched"),
+        "What silence is the model's, and what is the log's.",
+        "9500 and on",
+        long=True,
+    ),
+    "diagnosis-real": Result(
+        "Real logs",
+        ("benchmarks.diagnosis", "real", "../shared/data"),
+        "Calibrated on eight weeks, diagnosed on the four that follow; columns withheld, terms lost, a placebo.",
+        "none",
+        long=True,
+    ),
+}
+
+
+def page(result: Result, output: str, seconds: float) -> str:
+    """Return the page of a result."""
+    made = provenance(" ".join(("python -m", *(shlex.quote(part) for part in result.command))))
+    return (
+        f"# {result.title}\n\n{result.about}\n\n"
+        f"| command | date | commit | seeds | took |\n|---|---|---|---|---|\n"
+        f"| `{made['command']}` | {made['date']} | {made['commit']} | {result.seeds} | {seconds / 60.0:.0f} min |\n\n"
+        f"```\n{output.rstrip()}\n```\n"
+    )
+
+
+def index(names: list[str]) -> str:
+    """Return the page that lists all results, and how those that are not there are made."""
+    lines = [
+        "# Results",
+        "",
+        "Written by `make results`, each by the command that it names; nothing here is typed.",
+        "",
+    ]
+    for name, result in RESULTS.items():
+        there = f"[{result.title}]({name}.md)" if name in names else f"{result.title}: not made here yet"
+        lines.append(f"* {there}: {result.about} (`python -m benchmarks.results {name}`)")
+    return "\n".join(lines) + "\n"
+
+
+def main() -> int:
+    """Run what was asked for; returns 1 if a command failed, whose page then stays as it was."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.results", description=__doc__.split("\n")[0])
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(RESULTS)}")
+    parser.add_argument("--long", action="store_true", help="run the long ones too")
+    options = parser.parse_args()
+    unknown = [name for name in options.names if name not in RESULTS]
+    if unknown:
+        parser.error(f"no result is called {', '.join(unknown)}; there are {', '.join(RESULTS)}")
+    wanted = options.names or [name for name, result in RESULTS.items() if options.long or not result.long]
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    failed = False
+    for name in wanted:
+        result = RESULTS[name]
+        print(f"{name}: python -m {' '.join(result.command)}", file=sys.stderr, flush=True)
+        begun = time.monotonic()
+        run = subprocess.run(
+            [sys.executable, "-m", *result.command], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False
+        )
+        if run.returncode != 0:
+            print(f"{name}: failed with {run.returncode}; its page stays as it was", file=sys.stderr)
+            failed = True
+            continue
+        (FOLDER / f"{name}.md").write_text(page(result, run.stdout, time.monotonic() - begun), encoding="utf-8")
+    made = [path.stem for path in Path(FOLDER).glob("*.md")]
+    (FOLDER / "README.md").write_text(index(made), encoding="utf-8")
+    return int(failed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

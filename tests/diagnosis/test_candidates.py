@@ -1,0 +1,162 @@
+"""Effects at their shapes, and patterns that outside drivers alone determine."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from igrow.core.arrays import Floats
+from igrow.core.effects import EFFECTS
+from igrow.core.simulator.hybrid.nominal import nominal
+from igrow.core.simulator.hybrid.record import Record
+from igrow.trainer.data import Log
+from igrow.trainer.data.splits import split_days
+from igrow.trainer.diagnosis import candidates, sensitivity
+from igrow.trainer.diagnosis.candidates import UNIT_FLUX, Candidate, Pattern
+from igrow.trainer.diagnosis.sensitivity import Linearisation
+from igrow.trainer.fit.solver import DivergenceError
+from tests.virtual_log import SITE
+
+DAY = 96
+
+
+@pytest.fixture(scope="module")
+def record(quiet_log: Log) -> Record:
+    return quiet_log.record(0.0)
+
+
+@pytest.fixture(scope="module")
+def line(record: Record) -> Linearisation:
+    runs = sensitivity.day_runs(record, split_days(record, SITE.longitude).day)
+    return sensitivity.linearise(record, runs, nominal(SITE), {})
+
+
+@pytest.fixture(scope="module")
+def courses(record: Record) -> dict[str, Floats]:
+    return {when: course for when, _, course in candidates.patterns(record, SITE.longitude)}
+
+
+def test_a_window_of_the_clock_follows_the_sun_and_may_pass_midnight(
+    courses: dict[str, Floats], record: Record
+) -> None:
+    hour = np.asarray(record.inputs["hour"])
+    np.testing.assert_array_equal(courses["05 to 09 h"], ((hour >= 5) & (hour < 9)).astype(float))
+    np.testing.assert_array_equal(courses["19 to 05 h"], ((hour >= 19) | (hour < 5)).astype(float))
+
+
+def test_weekdays_are_those_of_the_calendar(courses: dict[str, Floats]) -> None:
+    # The log begins on Saturday, 1 February 2020, 18 minutes after local solar midnight.
+    working = courses["working days"]
+    assert working[: 2 * DAY - 4].max() == 0.0
+    assert working[2 * DAY : 7 * DAY - 4].min() == 1.0
+    monday = courses["06 to 10 h on Mondays"]
+    assert monday[: 2 * DAY].max() == 0.0
+    assert monday[2 * DAY + 24 : 2 * DAY + 38].min() == 1.0
+
+
+def test_weather_enters_in_round_units(courses: dict[str, Floats], record: Record) -> None:
+    outdoor = np.asarray(record.inputs["outdoor_temperature"])
+    np.testing.assert_allclose(courses["cold weather"], np.maximum(8.0 - outdoor, 0.0) / 8.0)
+    np.testing.assert_allclose(courses["wind speed"], record.inputs["wind_speed"] / 5.0)
+    assert courses["from day to day"][30 * 60] == pytest.approx(30 * 60 * 900.0 / 86_400.0 / 30.0)
+
+
+def test_what_follows_an_hour_late_settles_at_what_it_follows(courses: dict[str, Floats]) -> None:
+    lamps, late = courses["lamp power on"], courses["an hour after lamp power"]
+    begun = int(np.flatnonzero(np.diff(lamps) > 0.3)[0]) + 1
+    level = lamps[begun]
+    # A first-order lag of an hour: 1 - exp(-1) after four quarters of an hour.
+    assert late[begun + 3] - late[begun - 1] * np.exp(-1.0) == pytest.approx(level * (1.0 - np.exp(-1.0)), rel=1e-6)
+
+
+def test_nothing_that_control_answers_to_drives_a_pattern(record: Record) -> None:
+    drivers = {driver for _, names, _ in candidates.patterns(record, SITE.longitude) for driver in names}
+    assert not drivers & {
+        "air_temperature",
+        "air_humidity",
+        "air_co2",
+        "rail_pipe_temperature",
+        "vent_lee",
+        "vent_wind",
+    }
+
+
+def test_lamps_without_a_power_are_followed_by_their_switch(quiet_log: Log) -> None:
+    dark = quiet_log.without("lamp_power").record(0.0)
+    drivers = [names for _, names, _ in candidates.patterns(dark, SITE.longitude)]
+    assert ("lamp_on",) in drivers
+    assert ("lamp_power",) not in drivers
+
+
+def test_fluxes_of_patterns_add_up_by_channel(record: Record, courses: dict[str, Floats]) -> None:
+    cold, clock = Pattern("heat", "cold weather", ()), Pattern("heat", "05 to 09 h", ())
+    rain = Pattern("co2", "all the time", ())
+    fluxes = candidates.pattern_fluxes(record, SITE.longitude, {cold: 0.5, clock: -2.0, rain: 1.0})
+    assert set(fluxes) == {"heat", "co2"}
+    exact = UNIT_FLUX["heat"] * (0.5 * courses["cold weather"] - 2.0 * courses["05 to 09 h"])
+    np.testing.assert_allclose(fluxes["heat"], exact)
+
+
+def test_a_column_is_what_a_small_flux_changes(line: Linearisation, courses: dict[str, Floats]) -> None:
+    flux = UNIT_FLUX["heat"] * courses["05 to 09 h"]
+    (column,) = sensitivity.flux_sensitivities(line, [({"heat": flux}, 0.1)])
+    moved = sensitivity.linearise(line.record, line.runs, line.parameters, {}, {"heat": 0.1 * flux})
+    np.testing.assert_allclose(
+        0.1 * column[line.runs.weight], (moved.errors - line.errors)[line.runs.weight], atol=1e-10
+    )
+
+
+def test_many_fluxes_at_once_are_those_of_one_at_a_time(line: Linearisation, courses: dict[str, Floats]) -> None:
+    fluxes = [
+        ({"heat": courses["cold weather"]}, 0.1),
+        ({"vapour": 1e-6 * courses["05 to 09 h"], "heat": np.ones(len(line.record))}, 0.2),
+    ]
+    together = sensitivity.flux_sensitivities(line, fluxes)
+    for one, column in zip(fluxes, together, strict=True):
+        np.testing.assert_array_equal(sensitivity.flux_sensitivities(line, [one])[0], column)
+
+
+def test_a_flux_into_no_balance_moves_nothing(line: Linearisation) -> None:
+    assert not sensitivity.flux_sensitivities(line, [({}, 0.1)]).any()
+    assert sensitivity.flux_sensitivities(line, []).shape[0] == 0
+
+
+def test_an_offset_of_a_sensor_leaves_the_plant_alone(line: Linearisation) -> None:
+    column = sensitivity.sensor_sensitivity(line, EFFECTS["co2_offset"], {})
+    # The start of a run is corrected by the offset, and with the hours the air forgets its start.
+    assert np.median(column[2][:, -1]) == pytest.approx(-1.0, abs=0.1)
+    assert np.abs(column[2][:, 0]).max() < 0.5
+    assert np.abs(column[0]).max() < 1e-3
+
+
+def test_parameters_move_the_errors_as_a_run_at_another_value_does(line: Linearisation) -> None:
+    names = ("leakage_wind", "transmissivity")
+    spread = np.array([0.1 * line.parameters[name] for name in names])
+    columns = sensitivity.parameter_sensitivities(line, names, spread)
+    for name, change, column in zip(names, spread, columns, strict=True):
+        small = 0.05 * change
+        moved = sensitivity.linearise(
+            line.record, line.runs, {**line.parameters, name: line.parameters[name] + small}, {}
+        )
+        np.testing.assert_allclose(
+            (column * line.runs.weight) * small, (moved.errors - line.errors) * line.runs.weight, atol=1e-8
+        )
+
+
+def test_an_effect_is_tried_at_every_shape_of_its_grid_and_has_a_key_for_each(line: Linearisation) -> None:
+    found = candidates.effect_columns(line)
+    asked = {one.key for one in found.candidates}
+    assert len(asked) == len(found.candidates)
+    assert {f"wind_infiltration:exponent={value:g}" for value in (0.7, 1.0, 1.5, 2.0)} <= asked
+    assert Candidate("co2_drift", ()).ages
+    ageing = {one.effect for one, column in zip(found.candidates, found.ageing, strict=True) if column.any()}
+    assert ageing == {one.effect for one in found.candidates if one.ages}
+    # The log has no rain and no irrigation to speak of, and says so.
+    assert "rain_cooling" in found.untestable
+    assert asked.isdisjoint(found.untestable)
+
+
+def test_a_model_that_runs_out_of_all_bounds_says_so(line: Linearisation) -> None:
+    absurd = {"lamp_heat": {"share": 1e300}}
+    with pytest.raises(DivergenceError, match="lamp_heat runs out of all bounds"):
+        sensitivity.linearise(line.record, line.runs, line.parameters, absurd)

@@ -1,0 +1,109 @@
+"""What stands on unseen days, and the model that comes of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime
+
+import numpy as np
+import pytest
+
+from igrow.core.bundle import EffectRecord, Estimate
+from igrow.trainer.diagnosis.candidates import Candidate, Pattern
+from igrow.trainer.diagnosis.correction import Corrected, Stage, corrected_model, same_in_all_regimes, stands
+from igrow.trainer.diagnosis.estimate import Estimated
+from igrow.trainer.diagnosis.knowledge import ActiveTerm
+from igrow.trainer.diagnosis.linear import Term
+from igrow.trainer.diagnosis.result import Interval, OnsetInterval
+from igrow.trainer.diagnosis.rules import DEFAULT
+from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.diagnosis.wording import discrepancy, finding
+from igrow.trainer.fit import Gaussian
+from tests.diagnosis.conftest import model_in_force
+
+DAY = np.datetime64("2020-03-14T00:00:00", "s")
+
+
+def cause(**values: float) -> Estimated:
+    """A leak that stands: large, certain, and useful."""
+    hypothesis = Hypothesis(Candidate("co2_valve_leak", ()), Term(0), 40.0, 1.0, 5.0, 0.001)
+    one = Estimated(
+        hypothesis, ActiveTerm("co2_valve_leak", 1.0, {}), Interval(1.0, 0.6, 1.4, "g m-2 h-1"), 40.0, None,
+        ("co2_valve_leak",), bootstrap_p=0.1, effect_to_noise=1.0, skill=0.1,
+    )  # fmt: skip
+    return replace(one, **values)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("values", "stays"),
+    [
+        ({}, True),
+        ({"effect_to_noise": 0.14}, False),
+        ({"skill": 0.02}, True),
+        ({"skill": 0.02, "bootstrap_p": 0.6}, False),
+        ({"skill": 0.04, "bootstrap_p": 0.6}, True),
+        ({"skill": 0.005}, False),
+        ({"skill": -0.1}, False),
+    ],
+)
+def test_a_cause_stands_if_it_is_large_and_helps_on_unseen_days(values: dict[str, float], stays: bool) -> None:
+    assert stands(cause(**values), [], DEFAULT) is stays
+
+
+@pytest.mark.parametrize(
+    ("values", "stays"),
+    [
+        ({}, True),
+        ({"skill": 0.02}, False),
+        ({"bootstrap_p": 0.3}, False),
+        ({"gain": 7.0}, False),
+        ({"gain": 9.0}, True),
+    ],
+)
+def test_beside_another_a_cause_must_do_more(values: dict[str, float], stays: bool) -> None:
+    assert stands(cause(**values), [cause()], DEFAULT) is stays
+
+
+@pytest.mark.parametrize(
+    ("values", "same"),
+    [
+        ({}, True),
+        ({"night": 0.1}, True),
+        ({"day": 0.8, "night": 1.2, "calm": 0.5, "windy": 1.1}, True),
+        ({"day": 0.1, "night": 1.2}, False),
+        ({"day": -0.9, "night": 1.2}, False),
+        ({"day": -0.9, "night": -1.2}, True),
+        ({"day": 1.0, "night": 1.0, "vents shut": 3.0, "vents open": 0.4}, False),
+    ],
+)
+def test_a_cause_is_the_same_by_day_and_by_night_in_calm_and_in_wind(values: dict[str, float], same: bool) -> None:
+    regimes = {name: Interval(value, value - 0.1, value + 0.1, "1") for name, value in values.items()}
+    assert same_in_all_regimes(regimes, DEFAULT) is same
+    assert stands(replace(cause(), regimes=regimes), [], DEFAULT) is same
+
+
+def test_the_corrected_model_keeps_correlations_adds_causes_and_remembers_where_it_was_fitted() -> None:
+    model = model_in_force()
+    old = EffectRecord("lamp_heat", "process", {"share": Estimate(0.1, 0.0, 0.2, "1")}, ("heat",))
+    same = EffectRecord("co2_valve_leak", "process", {"rate": Estimate(9.0, 8.0, 10.0, "g m-2 h-1")}, ("co2",))
+    model = replace(model, effects=(old, same), discrepancy={"heat:cold weather": 0.1}, calibrated_on="")
+    covariance = model.posterior.covariance.copy()
+    covariance[0, 1] = covariance[1, 0] = 0.5 * np.sqrt(covariance[0, 0] * covariance[1, 1])
+    posterior = Gaussian(model.posterior.names, 1.01 * model.posterior.mean, covariance)
+    began = OnsetInterval(DAY, DAY - np.timedelta64(1, "D"), DAY + np.timedelta64(2, "D"))
+    found = (
+        finding(replace(cause(), onset=began)),
+        discrepancy([Hypothesis(Pattern("heat", "rain", ("rain",)), Term(1), 50.0, 0.5, 4.0, 0.001)], DEFAULT),
+    )
+    errors = {"air_temperature": {"24_h": {"deployed": 2.0, "recalibrated": 1.0, "corrected": 0.5}}}
+    result = Corrected({"corrected": Stage(posterior, ())}, (), ())
+    corrected = corrected_model(model, result, found, errors, {}, (DAY, DAY + np.timedelta64(28, "D")))
+    assert corrected.posterior.correlation[0, 1] == pytest.approx(0.5)
+    assert [one.name for one in corrected.effects] == ["lamp_heat", "co2_valve_leak"]
+    leak = corrected.effects[1]
+    assert leak.parameters["rate"] == Estimate(1.0, 0.6, 1.4, "g m-2 h-1")
+    assert leak.onset is not None
+    assert (leak.onset.low, leak.onset.time) == (datetime(2020, 3, 13, tzinfo=UTC), datetime(2020, 3, 14, tzinfo=UTC))
+    assert corrected.calibrated_on == model.site.name
+    assert corrected.discrepancy == {}
+    assert [(one.before, one.after) for one in corrected.errors] == [(2.0, 0.5)]

@@ -1,0 +1,69 @@
+"""Free runs: parameters that come back, and scores of runs whose errors are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from igrow.core.simulator.hybrid.nominal import nominal
+from igrow.trainer.data import prepare_log
+from igrow.trainer.data.splits import split_days
+from igrow.trainer.diagnosis import freerun, sensitivity
+from igrow.trainer.diagnosis.freerun import FreeRuns
+from igrow.trainer.fit import Gaussian
+from tests.virtual_log import SITE, virtual_log
+
+
+def runs(errors: list[list[float]], shown: float = 0.0, days: tuple[int, ...] = (3, 4)) -> FreeRuns:
+    table = np.array(errors)
+    return FreeRuns({"air_temperature": np.full(table.shape, shown)}, {"air_temperature": table}, np.array(days))
+
+
+def test_skill_is_the_share_of_the_squared_error_that_falls_mean_over_days() -> None:
+    before = runs([[2.0, 2.0], [2.0, 2.0]])
+    # Nothing is left on the first day, all of it on the second.
+    assert freerun.skill(before, runs([[0.0, 2.0], [0.0, 2.0]])) == pytest.approx(0.5)
+    assert freerun.skill(before, before) == 0.0
+    assert freerun.skill(before, runs([[2.0, 4.0], [2.0, 4.0]])) == pytest.approx(-1.5)
+
+
+def test_what_was_not_measured_does_not_count() -> None:
+    nan = float("nan")
+    assert freerun.skill(runs([[2.0, nan], [2.0, 2.0]]), runs([[1.0, nan], [1.0, 2.0]])) == pytest.approx(0.375)
+    assert freerun.mean_absolute_errors(runs([[1.0, -3.0], [nan, 2.0]])) == {"air_temperature": pytest.approx(2.0)}
+    assert freerun.mean_absolute_errors(runs([[nan, nan]])) == {}
+    assert freerun.mean_absolute_errors(None) == {}
+
+
+def test_the_size_of_an_effect_is_what_it_moves_over_what_stays() -> None:
+    corrected = runs([[0.5, -0.5], [0.5, -0.5]], shown=20.0)
+    assert freerun.effect_to_noise(runs([[1.0, 1.0], [1.0, 1.0]], shown=21.0), corrected) == pytest.approx(2.0)
+
+
+@pytest.fixture(scope="module")
+def moved() -> tuple[dict[str, float], Gaussian]:
+    """Parameters of a greenhouse that has changed, and the fit to its log from what was known before."""
+    known = nominal(SITE)
+    truth = known | {"leakage_wind": 1.5 * known["leakage_wind"], "transmissivity": 0.9 * known["transmissivity"]}
+    record = prepare_log(virtual_log(16, seed=8, step=900.0, parameters=truth), SITE).record(0.0)
+    split = split_days(record, SITE.longitude)
+    prior = Gaussian.independent(known, {name: 0.6 * abs(value) + 1e-9 for name, value in known.items()})
+    days = sensitivity.day_runs(record, split.day)
+    return truth, freerun.fit_parameters(record, days, split, prior, {})
+
+
+def test_parameters_that_moved_are_found_within_their_intervals(moved: tuple[dict[str, float], Gaussian]) -> None:
+    truth, found = moved
+    for name in ("leakage_wind", "transmissivity"):
+        assert abs(found.values[name] - truth[name]) < 2.0 * found.deviations[name]
+    assert found.values["leakage_wind"] == pytest.approx(truth["leakage_wind"], rel=0.1)
+    assert found.values["transmissivity"] == pytest.approx(truth["transmissivity"], rel=0.05)
+
+
+def test_the_posterior_tells_how_parameters_hang_together(moved: tuple[dict[str, float], Gaussian]) -> None:
+    _, found = moved
+    np.testing.assert_allclose(found.covariance, found.covariance.T)
+    assert (np.linalg.eigvalsh(found.correlation) > 0.0).all()
+    place = [found.names.index(name) for name in ("assimilation_maximum", "assimilation_light")]
+    # What the canopy takes up at most and in weak light show in the same hours.
+    assert abs(found.correlation[place[0], place[1]]) > 0.2

@@ -1,0 +1,84 @@
+"""Every threshold stands in one place, says what it means, and whether it was chosen or fitted."""
+
+from __future__ import annotations
+
+import ast
+import json
+from dataclasses import FrozenInstanceError, fields, replace
+from pathlib import Path
+
+import pytest
+
+import benchmarks.diagnosis.nuisance
+import igrow.trainer.diagnosis
+from igrow.trainer.diagnosis import rules
+from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules, fitted_names, read_rules, write_rules
+
+FOLDER = Path(igrow.trainer.diagnosis.__file__).parent
+
+
+def test_every_rule_has_a_meaning_and_is_used() -> None:
+    learned = Path(benchmarks.diagnosis.nuisance.__file__).read_text().replace("DEFAULT.", "rules.")
+    sources = learned + "".join(path.read_text() for path in FOLDER.glob("*.py") if path.name != "rules.py")
+    own = (FOLDER / "rules.py").read_text()
+    for name, _, how, meaning in rules.table(DEFAULT):
+        assert len(meaning) > 5
+        assert how in {"chosen", "fitted"}
+        assert f"rules.{name}" in sources or f"self.{name}" in own, f"{name} is not used"
+
+
+def test_rules_cannot_be_changed_but_replaced() -> None:
+    with pytest.raises(FrozenInstanceError):
+        DEFAULT.least_gain = 1.0  # type: ignore[misc]
+    assert replace(DEFAULT, least_gain=1.0).least_gain == 1.0
+
+
+def test_fitted_rules_are_stored_each_with_where_it_comes_from() -> None:
+    stored = read_rules()
+    assert stored.rules == DEFAULT
+    assert set(stored.provenance) == set(fitted_names())
+    for one in stored.provenance.values():
+        assert {"value", "command", "date"} <= set(one)
+
+
+def test_rules_are_read_as_they_were_written(tmp_path: Path) -> None:
+    values = {name: 10.0 + number for number, name in enumerate(fitted_names())}
+    write_rules(tmp_path / "rules.json", values, {"command": "make them", "date": "2026-01-01", "seeds": 3})
+    stored = read_rules(tmp_path / "rules.json")
+    assert all(getattr(stored.rules, name) == value for name, value in values.items())
+    assert stored.provenance["least_gain"]["command"] == "make them"
+    assert json.loads((tmp_path / "rules.json").read_text())["least_gain"]["meaning"] == DEFAULT.meaning("least_gain")
+
+
+def test_a_fit_that_leaves_a_rule_out_or_fits_a_chosen_one_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="fitted rules are"):
+        write_rules(tmp_path / "rules.json", {"least_gain": 1.0}, {})
+    everything = dict.fromkeys((one.name for one in fields(DecisionRules)), 1.0)
+    with pytest.raises(ValueError, match="fitted rules are"):
+        write_rules(tmp_path / "rules.json", everything, {})
+
+
+def test_what_a_cause_must_gain_follows_from_what_is_known() -> None:
+    assert DEFAULT.gain_of_cause(time_steps=True, transferred=True) == DEFAULT.least_gain_steps
+    assert DEFAULT.gain_of_cause(time_steps=False, transferred=False) == DEFAULT.least_gain
+    assert DEFAULT.gain_of_cause(time_steps=False, transferred=True) == DEFAULT.least_gain_transferred
+    assert DEFAULT.gain_of_pattern(transferred=True) > DEFAULT.gain_of_pattern(transferred=False)
+
+
+def test_no_stage_keeps_a_threshold_of_its_own() -> None:
+    """Numbers in comparisons of the deciding stages are 0, 1 or tiny: all others are rules."""
+    for name in ("compare", "correction", "estimate", "search", "diagnose"):
+        tree = ast.parse((FOLDER / f"{name}.py").read_text())
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Compare):
+                numbers = [
+                    part.value
+                    for part in ast.walk(node)
+                    if isinstance(part, ast.Constant) and isinstance(part.value, int | float)
+                ]
+                # A parabola needs three points, a likelihood ratio is half of chi-squared; guards are tiny.
+                assert all(abs(number) <= 1e-5 or number in (0.5, 1, 3) for number in numbers), (
+                    name,
+                    node.lineno,
+                    numbers,
+                )

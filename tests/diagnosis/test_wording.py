@@ -1,0 +1,76 @@
+"""What a finding says to the grower."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from igrow.core.effects import EFFECTS
+from igrow.trainer.diagnosis import wording
+from igrow.trainer.diagnosis.candidates import Candidate, Pattern
+from igrow.trainer.diagnosis.estimate import Estimated
+from igrow.trainer.diagnosis.knowledge import ActiveTerm
+from igrow.trainer.diagnosis.linear import Term
+from igrow.trainer.diagnosis.result import Interval, OnsetInterval, plain
+from igrow.trainer.diagnosis.rules import DEFAULT
+from igrow.trainer.diagnosis.search import Hypothesis
+
+BEGAN = np.datetime64("2020-03-14T06:00:00", "s")
+
+
+def leak(rivals: tuple[str, ...] = ("wind_infiltration",)) -> Estimated:
+    cause = Hypothesis(Candidate("wind_infiltration", ()), Term(0), 40.0, 0.118, 5.0, 0.001)
+    shapes = {"exponent": Interval(1.1, 0.9, 1.3, "1")}
+    size = Interval(0.118, 0.08, 0.15, "h-1 (m s-1)-1")
+    term = ActiveTerm("wind_infiltration", 0.118, {"exponent": 1.1})
+    return Estimated(cause, term, size, 40.0, None, rivals, shapes=shapes)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.11777, "0.12"), (12.4, "12"), (0.0, "0"), (3.0, "3"), (-0.00051, "-0.00051"), (1234.0, "1200")],
+)
+def test_numbers_have_two_significant_digits(value: float, text: str) -> None:
+    assert plain(value) == text
+
+
+def test_the_sentence_names_the_size_and_the_day_on_which_it_began() -> None:
+    always = wording.sentence(leak())
+    assert always.startswith("More air leaks in when the wind blows")
+    assert "0.12" in always
+    assert always.endswith(".")
+    late = wording.sentence(replace(leak(), onset=OnsetInterval(BEGAN, BEGAN, BEGAN)))
+    assert late.startswith("Since 14 March more air leaks in")
+
+
+def test_a_finding_holds_size_shapes_balances_and_test_of_its_effect() -> None:
+    found = wording.finding(leak())
+    assert (found.effect, found.kind, found.balances) == ("wind_infiltration", "process", ("heat", "vapour", "co2"))
+    assert set(found.parameters) == {"air_changes", "exponent"}
+    assert found.separating_test == EFFECTS["wind_infiltration"].separating_test
+
+
+def test_confounded_causes_get_the_tests_that_separate_them_each_once() -> None:
+    names = ("co2_valve_leak", "soil_respiration", "co2_offset", "co2_drift")
+    text = wording.separating_test(names)
+    told = text.split("; or ")
+    assert told == list(dict.fromkeys(EFFECTS[name].separating_test for name in names[:3]))
+
+
+def test_a_discrepancy_is_told_by_its_hours_weather_and_channels() -> None:
+    cold = Hypothesis(Pattern("heat", "cold weather", ("outdoor_temperature",)), Term(1), 50.0, 0.5, 10.0, 0.001)
+    door = Hypothesis(Pattern("air_exchange", "07 to 16 h", ("hour", "weekday")), Term(2), 50.0, -2.0, 4.0, 0.003)
+    found = wording.discrepancy([cold, door], DEFAULT)
+    assert (found.effect, found.kind, found.rivals) == ("discrepancy", "discrepancy", ("discrepancy",))
+    assert found.sentence == (
+        "Something that the model does not know changes heat (more, cold weather); air exchange (less, 07 to 16 h)."
+    )
+    assert found.balances == ("heat", "vapour", "co2")
+    assert found.drivers == ("outdoor_temperature", "hour", "weekday")
+    size = found.parameters["heat: cold weather"]
+    # Half of 10 W m-2, its standard error a tenth of it.
+    assert (size.value, size.unit) == (5.0, "W m-2")
+    assert size.high == pytest.approx(5.0 * (1.0 + 1.6449 / 10.0), rel=1e-4)
+    assert found.p_value == 0.001

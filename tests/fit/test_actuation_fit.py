@@ -1,0 +1,66 @@
+"""The actuation stage fitted to a log that known rules made."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from virtual_log import SITE, virtual_log
+
+from igrow.core.simulator import actuation
+from igrow.core.simulator.hybrid.nominal import nominal, site_record
+from igrow.trainer.fit.actuation import fit_actuation, setpoint_columns
+from igrow.trainer.fit.climate import site_prior
+from igrow.trainer.research.forecasts.forecaster import fit_forecaster
+from igrow.trainer.research.forecasts.totals import daily_totals
+
+
+def test_rules_fitted_to_a_log_do_what_its_computer_did() -> None:
+    log = virtual_log(10, seed=8)
+    record = site_record(log, SITE, 300.0)
+    setpoints, inferred = setpoint_columns(log, record)
+    assert inferred == ()
+    rules = fit_actuation([(record, setpoints, None)], nominal(SITE))
+    usual = actuation.default_rules()
+    seen = record.inputs | record.measured | {"par": np.zeros(len(record))}
+    for name, size in (("vent_lee", 3.0), ("rail_pipe_temperature", 4.0), ("energy_screen", 10.0)):
+        wanted = actuation.targets(np, setpoints, seen, seen, seen, usual)[name]
+        got = actuation.targets(np, setpoints, seen, seen, seen, rules)[name]
+        assert np.abs(got - wanted).mean() < size, name
+    assert rules["lamp_capacity"] == usual["lamp_capacity"]
+
+
+@pytest.mark.parametrize(("limit", "found"), [(150.0, (130.0, 170.0)), (1500.0, (1500.0, 1500.0))])
+def test_the_radiation_above_which_lamps_stay_dark_is_read_off_the_log(
+    limit: float, found: tuple[float, float]
+) -> None:
+    log = virtual_log(10, seed=8)
+    asked = np.ones(len(log))
+    power = np.where(log["global_radiation"] < limit, 80.0, 0.0)
+    assert limit > 1000.0 or (power == 0.0).sum() > 50
+    lit = log.with_columns({"lamp_on": asked, "lamp_power": power})
+    record = site_record(lit, SITE, 300.0)
+    rules = fit_actuation([(record, setpoint_columns(lit, record)[0], None)], nominal(SITE))
+    assert rules["lamp_capacity"] == 80.0
+    assert found[0] <= rules["lamp_radiation"] <= found[1]
+
+
+def test_a_log_without_setpoints_has_them_inferred_and_says_which() -> None:
+    log = virtual_log(4, seed=9)
+    bare = log.only([name for name in log.columns if name not in {"heating_setpoint", "co2_setpoint"}])
+    record = site_record(bare, SITE, 300.0)
+    setpoints, inferred = setpoint_columns(bare, record)
+    assert inferred == ("heating_setpoint", "co2_setpoint")
+    assert np.isfinite(setpoints["heating_setpoint"]).all()
+
+
+@pytest.mark.soak
+def test_daily_totals_of_heat_and_co2_follow_from_setpoints() -> None:
+    log = virtual_log(14, seed=10)
+    record = site_record(log, SITE, 300.0)
+    setpoints, _ = setpoint_columns(log, record)
+    day = np.arange(len(record)) // 288
+    model = fit_forecaster([(record, setpoints, day < 8, (day >= 8) & (day < 10))], site_prior(SITE), {})
+    totals = daily_totals(record, setpoints, model, day >= 10)
+    for name in ("heat (MJ m-2)", "lamp electricity (kWh m-2)", "CO2 (kg m-2)"):
+        predicted, measured = totals[name]
+        assert abs(predicted.sum() / measured.sum() - 1.0) < 0.15, name

@@ -1,0 +1,274 @@
+"""The design of a diagnosis: the log's errors, and in named blocks how they depend on all that may be missing.
+
+    block          one column each                                          prior of its coefficients
+    residual       the errors themselves
+    parameter      physical parameter                                       the model's posterior, and a drift
+    discrepancy    what the model misses on its calibration log             about one
+    nuisance       a direction in which greenhouses differ                  standard normal
+    drift          a parameter's change along a long log                    standard normal
+    effect         an effect of the catalogue at one shape                  none: a candidate
+    ageing         what shifts the beginning of an effect that ages
+    pattern        a course of clock, calendar or weather in one channel    none: a candidate
+
+The blocks with a prior are the null: the model under which nothing is missing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from igrow.core.arrays import Floats, Integers, Mask
+from igrow.core.simulator.hybrid.climate import ActiveEffects
+from igrow.core.simulator.hybrid.record import Record
+from igrow.trainer.data.splits import DaySplit
+from igrow.trainer.diagnosis import candidates, linear, sensitivity
+from igrow.trainer.diagnosis.candidates import Candidate, Pattern
+from igrow.trainer.diagnosis.knowledge import drift
+from igrow.trainer.diagnosis.linear import DailyGrams, LinearModel
+from igrow.trainer.diagnosis.noise import Whitening
+from igrow.trainer.diagnosis.recalibration import averaging, recalibrate
+from igrow.trainer.diagnosis.rules import HOUR, DecisionRules
+from igrow.trainer.diagnosis.sensitivity import Linearisation
+from igrow.trainer.fit.gaussian import Gaussian
+
+NULL = ("parameter", "discrepancy", "nuisance", "drift")
+"""Blocks of the model under which nothing is missing."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """Columns of one kind."""
+
+    labels: tuple[str, ...]
+    """Of its columns, (k,)."""
+    columns: range
+    """Where they stand in the design."""
+    mean: Floats
+    """Of the prior of their coefficients, (k,)."""
+    precision: Floats | None
+    """Of that prior, (k, k); None for candidates, which have none."""
+
+    def __len__(self) -> int:
+        return len(self.columns)
+
+
+@dataclass(frozen=True)
+class Design:
+    """Everything that the search works on."""
+
+    line: Linearisation
+    """At the recalibrated parameters."""
+    split: DaySplit
+    prior: Gaussian
+    """Of the parameters."""
+    rules: DecisionRules
+    interval: float
+    """Seconds over which errors are averaged."""
+    blocks: Mapping[str, Block]
+    values: Floats
+    """All columns as means over intervals, 0 where they do not count, before whitening, (q, b, r, intervals)."""
+    observed: Mask
+    """Intervals that count, (r, intervals)."""
+    whitening: Whitening
+    grams: DailyGrams
+    """Of `values`, whitened."""
+    candidates: tuple[Candidate, ...]
+    """Of the block of effects."""
+    patterns: tuple[Pattern, ...]
+    """Of the block of patterns."""
+    untestable: tuple[str, ...]
+    usual_size: Mapping[str, float]
+    """Amplitude, by effect, that a log with nothing missing usually shows."""
+
+    def block(self, name: str) -> Block:
+        """Return a block by name.
+
+        Raises:
+            KeyError: the design has none of that name.
+        """
+        return self.blocks[name]
+
+    def columns(self, label: str) -> list[int]:
+        """Return the columns of a block ("nuisance"), or of what a label begins with ("effect:wind_infiltration")."""
+        name, _, wanted = label.partition(":")
+        block = self.block(name)
+        return [
+            column
+            for column, own in zip(block.columns, block.labels, strict=True)
+            if not wanted or own == wanted or own.startswith(f"{wanted}:")
+        ]
+
+    def null_model(self) -> LinearModel:
+        """Return the model under which nothing is missing."""
+        blocks = [self.blocks[name] for name in NULL]
+        size = sum(len(block) for block in blocks)
+        precision, first = np.zeros((size, size)), 0
+        for block in blocks:
+            inside = slice(first, first + len(block))
+            assert block.precision is not None
+            precision[inside, inside] = block.precision
+            first += len(block)
+        mean = np.concatenate([block.mean for block in blocks])
+        return LinearModel(tuple(column for block in blocks for column in block.columns), precision, mean)
+
+    @property
+    def time_steps(self) -> bool:
+        """Errors count time step by time step: the model's structure is the greenhouse's own."""
+        return self.interval < HOUR
+
+    @property
+    def transferred(self) -> bool:
+        """What the model misses of this greenhouse when all is well is not known."""
+        return len(self.blocks["discrepancy"]) == 0
+
+    @property
+    def fitted(self) -> Mask:
+        """Runs on days for fitting, (r, 1)."""
+        runs: Mask = self.split.fit[self.line.runs.day][:, None]
+        return runs
+
+    def whitened(self, whitening: Whitening) -> Design:
+        """Return the design as another noise shows it."""
+        products = linear.daily_products(whitening(self.values), self.line.runs.day, self.split.days)
+        return replace(self, whitening=whitening, grams=DailyGrams(products, self.split.fit))
+
+
+def prepare(
+    record: Record,
+    split: DaySplit,
+    prior: Gaussian,
+    effects: ActiveEffects,
+    longitude: float,
+    rules: DecisionRules,
+    *,
+    discrepancy: Mapping[str, float],
+    directions: Sequence[Mapping[str, float]] = (),
+    usual_size: Mapping[str, float] | None = None,
+    without: Collection[str] = (),
+    interval: float = HOUR,
+) -> Design:
+    """Recalibrate, then linearise everything that may be missing.
+
+    Args:
+        record: of the log.
+        split: its days.
+        prior: of the parameters.
+        effects: active already.
+        longitude: degrees east, for the calendar.
+        rules: thresholds.
+        discrepancy: of the calibration, amplitude by key of an effect or a pattern (empty: not known).
+        directions: the nuisance subspace, each direction in amplitudes by key.
+        usual_size: amplitude, by effect, that a log with nothing missing usually shows.
+        without: effects that are no candidates.
+        interval: seconds over which errors are averaged.
+    """
+    runs = sensitivity.day_runs(record, split.day)
+    first = sensitivity.linearise(record, runs, prior.values, effects)
+    average = averaging(first, interval, rules)
+    known = _combined(first, longitude, [discrepancy] if discrepancy else [])
+    nuisance = _combined(first, longitude, directions)
+    misfit = average(known).sum(axis=0)
+    line, whitening = recalibrate(first, split, prior, misfit, average, rules)
+    slopes = sensitivity.parameter_sensitivities(line, prior.names, prior.standard_deviation)
+    drifting = _drifting(slopes, prior, runs.day, rules) if split.days > rules.long_days else slopes[:0]
+    found = candidates.effect_columns(line, without)
+    patterns, pattern = candidates.pattern_columns(line, longitude)
+    stand = np.array([line.parameters[name] for name in prior.names])
+    none, effect_keys = np.zeros(0), tuple(one.key for one in found.candidates)
+    spread = rules.discrepancy_spread
+    parts: list[tuple[str, Sequence[str], Floats, Floats, Floats | None]] = [
+        ("residual", ("residual",), line.errors[None], none, None),
+        ("parameter", prior.names, slopes, prior.mean - stand, prior.precision),
+        ("effect", effect_keys, found.columns, none, None),
+        ("ageing", effect_keys, found.ageing, none, None),
+        ("pattern", [one.key for one in patterns], pattern, none, None),
+        # The linearisation has none of the known discrepancy yet: one is to come.
+        ("discrepancy", ["calibration"] * len(known), known, np.ones(len(known)), np.eye(len(known)) * spread**-2.0),
+        ("nuisance", list(map(str, range(len(nuisance)))), nuisance, np.zeros(len(nuisance)), np.eye(len(nuisance))),
+        ("drift", prior.names[: len(drifting)], drifting, np.zeros(len(drifting)), np.eye(len(drifting))),
+    ]
+    blocks: dict[str, Block] = {}
+    place = 0
+    for name, labels, columns, mean, precision in parts:
+        blocks[name] = Block(tuple(labels), range(place, place + len(columns)), mean, precision)
+        place += len(columns)
+    values = np.concatenate([average(columns) for _, _, columns, _, _ in parts])
+    products = linear.daily_products(whitening(values), runs.day, split.days)
+    return Design(
+        line=line,
+        split=split,
+        prior=prior,
+        rules=rules,
+        interval=interval,
+        blocks=blocks,
+        values=values,
+        observed=average.observed,
+        whitening=whitening,
+        grams=DailyGrams(products, split.fit),
+        candidates=found.candidates,
+        patterns=patterns,
+        untestable=found.untestable,
+        usual_size=usual_size or {},
+    )
+
+
+def _combined(line: Linearisation, longitude: float, lists: Sequence[Mapping[str, float]]) -> Floats:
+    """Return the columns of lists of amplitudes by key, (lists, 3, r, steps)."""
+    if not lists:
+        return np.zeros((0, *line.shown.shape))
+    found = candidates.effect_columns(line)
+    patterns, columns = candidates.pattern_columns(line, longitude)
+    keys = [*(one.key for one in found.candidates), *(one.key for one in patterns)]
+    amplitudes = np.array([[one.get(key, 0.0) for key in keys] for one in lists])
+    combined: Floats = np.tensordot(amplitudes, np.concatenate([found.columns, columns]), axes=1)
+    return combined
+
+
+def _drifting(slopes: Floats, prior: Gaussian, day: Integers, rules: DecisionRules) -> Floats:
+    """Return d(error)/d(drift) of every parameter, (p, 3, r, steps): linear in time, at the size that it may have.
+
+    Args:
+        slopes: d(error)/d(parameter), (p, 3, r, steps).
+        prior: of the parameters.
+        day: of each run, (r,).
+        rules: how fast parameters drift.
+    """
+    middle = 0.5 * (day[0] + day[-1])
+    course = (day - middle) / (0.5 * rules.drift_days)
+    size = drift(prior.values, rules.parameter_drift, rules)
+    drifting: Floats = slopes * size[:, None, None, None] * course[:, None]
+    return drifting
+
+
+def disagreement(hours: Design, steps: Design) -> float:
+    """Return how far parameters fitted to hours and to time steps lie apart, over what chance makes.
+
+    Where the model's structure is the greenhouse's, both agree within their doubt; where masses are missing that answer
+    within the hour, the fast errors pull the parameters elsewhere. The specification test of Hausman (1978,
+    Econometrica 46, 1251-1271): the difference of both estimates against the difference of their covariances; mean
+    squared over the directions in which the time steps tell more, infinite where nothing tells.
+
+    Args:
+        hours: the log with errors averaged to hours.
+        steps: the same log with errors time step by time step.
+    """
+    slow, slow_covariance = _parameters(hours)
+    fast, fast_covariance = _parameters(steps)
+    gained, directions = np.linalg.eigh(slow_covariance - fast_covariance)
+    told = gained > hours.rules.least_gained_variance
+    if not told.any():
+        return float("inf")
+    apart = directions.T @ (slow - fast)
+    return float(np.mean(apart[told] ** 2 / gained[told]))
+
+
+def _parameters(design: Design) -> tuple[Floats, Floats]:
+    """Return the fitted parameters and their covariance, in prior standard deviations, (p,) and (p, p)."""
+    fitted = linear.fit(design.grams, design.null_model()).solution
+    count, spread = len(design.block("parameter")), design.prior.standard_deviation
+    stand = np.array([design.line.parameters[name] for name in design.prior.names])
+    covariance = fitted.inverse[:count, :count] / np.outer(spread, spread)
+    return (stand + fitted.coefficients[:count]) / spread, covariance

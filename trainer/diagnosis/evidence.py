@@ -1,0 +1,44 @@
+"""What a verdict rests on: the log as it was split, what the search found first, and the free runs on unseen days."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from igrow.core.arrays import Floats
+from igrow.trainer.diagnosis.compare import Round
+from igrow.trainer.diagnosis.correction import LogDays, Stage
+from igrow.trainer.diagnosis.estimate import Estimated
+from igrow.trainer.diagnosis.freerun import FreeRuns, mean_absolute_errors
+from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What supports a diagnosis."""
+
+    log: LogDays
+    knowledge: Knowledge
+    """Of the greenhouse before this log."""
+    first: Round
+    """What the search found first."""
+    estimates: tuple[Estimated, ...]
+    """Every cause with its size and skill on unseen days, kept or not."""
+    stages: Mapping[str, Stage]
+    runs: Mapping[str, FreeRuns]
+    """24 h free runs on held-out days by stage."""
+
+
+def errors_with(
+    evidence: Evidence, terms: Sequence[ActiveTerm], added: Mapping[str, Floats] | None = None
+) -> dict[str, float]:
+    """Return the 24 h errors on unseen days of the model with given causes, its parameters refitted: the oracle's.
+
+    Args:
+        evidence: of a diagnosis.
+        terms: causes that are known to be there.
+        added: further fluxes that are known to be there, by channel, (n,).
+    """
+    log, causes = evidence.log, (*evidence.knowledge.terms, *terms)
+    fitted = log.fit(evidence.knowledge.prior, causes, added=added)
+    return mean_absolute_errors(log.run(Stage(fitted, causes, {}, added or {})))

@@ -1,0 +1,109 @@
+"""What is known of a greenhouse before the log: the model in force, and how far a greenhouse may have moved since.
+
+A model that was calibrated on this very greenhouse knows its parameters, give or take a drift, and its own discrepancy.
+One that was calibrated on another greenhouse is a transferred model: its parameters may lie further off, and what it
+missed at home says nothing here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from igrow.core.arrays import Array, Floats
+from igrow.core.bundle import EffectRecord
+from igrow.core.effects import EFFECTS
+from igrow.core.simulator.hybrid.parameters import PARAMETERS
+from igrow.core.simulator.hybrid.record import Record
+from igrow.core.site import Site
+from igrow.trainer.diagnosis.rules import DecisionRules
+from igrow.trainer.fit.climate import bounds
+from igrow.trainer.fit.gaussian import Gaussian
+from igrow.trainer.fit.model import FittedModel
+
+PARAMETER_PREFIX = "parameter:"
+"""Key of a parameter's shift in a discrepancy: what short errors of the calibration log say beside the long ones."""
+
+
+@dataclass(frozen=True)
+class ActiveTerm:
+    """One effect at fitted values, from a time on."""
+
+    effect: str
+    amplitude: float
+    shape: Mapping[str, float]
+    """Nonlinear parameters by name."""
+    onset: np.datetime64 | None = None
+    """UTC; None is from before the log."""
+
+
+@dataclass(frozen=True)
+class Knowledge:
+    """What a model says of a site."""
+
+    posterior: Gaussian
+    """Of the parameters, as the model has it."""
+    prior: Gaussian
+    """Of the parameters in this log, about the calibration itself: for fits to free runs."""
+    short_prior: Gaussian
+    """The same about where the diagnosis of the calibration log put them: for the search."""
+    terms: tuple[ActiveTerm, ...]
+    discrepancy: Mapping[str, float]
+    """Empty for a transferred model."""
+    transferred: bool
+    """What the model misses of this greenhouse when all is well is not known."""
+
+
+def knowledge_of(model: FittedModel, site: Site, rules: DecisionRules) -> Knowledge:
+    """Return what a model says of a site."""
+    at_home = model.calibrated_on == site.name
+    posterior = model.posterior
+    discrepancy = model.discrepancy if at_home else {}
+    if not at_home:
+        posterior = posterior.widened(drift(posterior.values, rules.transferred_drift, rules))
+    prior = posterior.widened(drift(posterior.values, rules.parameter_drift, rules))
+    low, high = bounds(prior.names)
+    shift = np.array([discrepancy.get(PARAMETER_PREFIX + name, 0.0) for name in prior.names])
+    centred = prior.moved(np.clip(prior.mean + shift, low, high))
+    terms = tuple(active_term(one) for one in model.effects if one.name in EFFECTS)
+    return Knowledge(model.posterior, prior, centred, terms, discrepancy, not discrepancy)
+
+
+def active_term(record: EffectRecord) -> ActiveTerm:
+    """Return an effect of a bundle as a term."""
+    definition = EFFECTS[record.name]
+    values = {name: estimate.value for name, estimate in record.parameters.items()}
+    shape = {one.name: values.get(one.name, one.typical) for one in definition.shapes}
+    onset = None if record.onset is None else np.datetime64(record.onset.time.replace(tzinfo=None), "s")
+    return ActiveTerm(record.name, values.get(definition.amplitude.name, 0.0), shape, onset)
+
+
+def drift(mean: Mapping[str, float], share: float, rules: DecisionRules) -> Floats:
+    """Return the change to expect of every parameter at a relative `share`, (p,)."""
+    return np.array(
+        [share * max(abs(value), rules.least_drift_share * abs(PARAMETERS[name].value)) for name, value in mean.items()]
+    )
+
+
+def clipped(names: Sequence[str], values: Floats) -> dict[str, float]:
+    """Return values (p,) within their bounds, by name."""
+    return dict(zip(names, np.clip(values, *bounds(names)).tolist(), strict=True))
+
+
+def activate(record: Record, terms: Sequence[ActiveTerm]) -> dict[str, dict[str, Array]]:
+    """Return the active effects of a record; an effect with a beginning has an amplitude that is (n,)."""
+    active: dict[str, dict[str, Array]] = {}
+    for term in terms:
+        definition = EFFECTS[term.effect]
+        amplitude: Array = term.amplitude
+        if term.onset is not None:
+            age = (record.time - term.onset).astype("timedelta64[s]").astype(np.float64) / 86_400.0
+            share = (age >= 0.0).astype(np.float64)
+            if "elapsed_days" in definition.drivers:
+                # The record counts from its first instant; the effect counts from its own beginning.
+                share = np.maximum(age, 0.0) / np.maximum(np.asarray(record.inputs["elapsed_days"]), 1e-9)
+            amplitude = term.amplitude * share
+        active[term.effect] = {definition.amplitude.name: amplitude, **term.shape}
+    return active

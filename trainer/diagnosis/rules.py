@@ -1,0 +1,178 @@
+"""Every threshold of a diagnosis: what it means, and whether it was chosen or fitted, and by which command.
+
+Choices stand here. Bounds that were fitted to tuning logs have no value here: they come from `learned/rules.json`,
+which the command that fits them writes together with where they come from.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import Field, asdict, dataclass, field, fields
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+COMMAND = "python -m benchmarks.diagnosis rules"
+"""Fits what is fitted."""
+FILE = "learned/rules.json"
+HOUR = 3600.0
+
+
+def _chosen(value: float, meaning: str) -> Any:
+    return field(default=value, metadata={"meaning": meaning, "set": "chosen"})
+
+
+def _fitted(meaning: str) -> Any:
+    return field(metadata={"meaning": meaning, "set": "fitted"})
+
+
+@dataclass(frozen=True, kw_only=True)
+class DecisionRules:
+    """The thresholds of one diagnosis. Gains are log-likelihoods in nats, shares are fractions of one."""
+
+    # What a log must have.
+    least_days: float = _chosen(7.0, "days that a log must span")
+    least_balance_share: float = _chosen(0.2, "share of a day's time steps that a balance's sensor must show to count")
+    long_days: float = _chosen(42.0, "days from which on crop and season change within a log")
+
+    # What is known of the parameters before the log.
+    parameter_drift: float = _chosen(0.08, "relative change of a parameter between calibration and log")
+    transferred_drift: float = _chosen(0.25, "the same between the greenhouse of the calibration and another one")
+    least_drift_share: float = _chosen(0.3, "share of a parameter's usual value that the drift is at least taken of")
+    drift_days: float = _chosen(84.0, "days in which a parameter may drift so far to either side of its mean")
+    discrepancy_spread: float = _chosen(0.3, "relative change of the model discrepancy from the calibration to a log")
+    discrepancy_effect_ridge: float = _chosen(0.7, "prior deviation of an effect in it, in typical amplitudes")
+    discrepancy_pattern_ridge: float = _chosen(0.15, "prior deviation of a pattern in it, in its units")
+
+    # Time steps or hours.
+    largest_disagreement: float = _fitted(
+        "mean squared difference of parameters fitted to hours and to time steps, over what chance makes, up to which "
+        "the model's structure counts as the greenhouse's own"
+    )
+    least_gained_variance: float = _chosen(0.02, "share of the prior that time steps must tell more than hours")
+    noise_rounds: int = _chosen(3, "alternations between coefficients and the colour of the noise")
+
+    # The search.
+    flips: int = _chosen(999, "draws of day signs in the max-T test")
+    largest_p_value: float = _chosen(0.005, "of that test, the price of searching paid")
+    contenders: int = _chosen(8, "best causes of a scan that are compared, each beside its own noise")
+    first_onset_days: int = _chosen(3, "days at either end of a log in which no beginning is looked for")
+    most_onsets: int = _chosen(30, "beginnings tried in a log; then day by day around the best")
+    pattern_onset_stride: int = _chosen(4, "of the beginnings, every which one is tried for patterns")
+    onset_price: float = _chosen(9.0, "gain that a beginning within the log must add")
+    beyond_bound: float = _chosen(1.5, "how far a linear fit may go beyond a bound, as a multiple")
+
+    # What a cause must gain.
+    least_gain_steps: float = _fitted("gain of a cause where time steps count: more than chance and searching bring")
+    least_gain: float = _fitted("the same where hours count: more than a wrong structure brings in four weeks")
+    least_gain_transferred: float = _fitted("the same of a model that was calibrated on another greenhouse")
+    least_gain_beyond_usual: float = _chosen(9.0, "what must be left of it when an effect's usual size is allowed for")
+    bootstrap_draws: int = _chosen(2000, "of unseen days")
+
+    # What a pattern must gain to stand for an unexplained discrepancy.
+    pattern_gain: float = _fitted("gain below which a pattern is none in a log of `usual_days`")
+    pattern_gain_transferred: float = _fitted("the same of a model that was calibrated on another greenhouse")
+    clock_factor: float = _chosen(2.0, "times as much is asked of a pattern of the clock alone")
+    pattern_over_cause: float = _chosen(2.2, "times a cause's gain at which a pattern replaces it")
+    pattern_over_found: float = _chosen(1.0, "share of the gain of causes found before that a pattern must add")
+    pattern_further_gain: float = _chosen(8.0, "gain that each further pattern must add in a log of `usual_days`")
+    further_clock_factor: float = _chosen(4.0, "times as much is asked of a further pattern of the clock alone")
+    most_patterns: int = _chosen(3, "patterns of one unexplained discrepancy")
+    usual_days: float = _chosen(28.0, "length of the logs that gains were fitted on")
+    largest_bootstrap_p: float = _chosen(0.5, "bootstrap p-value of unseen days being no likelier")
+
+    # Sizes and confounded causes.
+    confidence: float = _chosen(0.90, "of every interval")
+    deviation_inflation: float = _chosen(1.3, "of a standard error, for structure that no covariance knows")
+    form_deviation: float = _chosen(0.3, "relative standard error for a truth that is not of the catalogue's form")
+    rival_gain: float = _chosen(6.0, "gain within which another cause fits as well")
+    rival_share: float = _chosen(0.25, "the same as a share of the cause's own gain")
+    nonlinear_spread: float = _chosen(0.12, "prior deviation of a nonlinear parameter, as a share of its range")
+    refit_rounds: int = _chosen(3, "alternations between a refit and its noise")
+    refit_evaluations: int = _chosen(10, "points that each refit may try")
+    refit_settled: float = _chosen(0.1, "move of every size, in its standard error, at which the alternations end")
+
+    # Regimes: a cause is the same in all of them.
+    regime_share: float = _chosen(0.25, "least ratio of a cause's sizes in two regimes")
+    regime_information: float = _chosen(0.02, "share of the information from which on a regime has a size")
+    daylight: float = _chosen(20.0, "global radiation in W m-2 above which it is day")
+    vents_open: float = _chosen(2.0, "sum of both vents in % from which on they are open")
+
+    # What stands on unseen days.
+    most_causes: int = _chosen(3, "causes of one log")
+    least_effect_to_noise: float = _chosen(0.15, "ENR below which a cause is not worth a name")
+    least_skill: float = _chosen(0.01, "share of the squared error of unseen days that a cause must remove")
+    clear_skill: float = _chosen(0.03, "share that needs no other proof")
+    further_skill: float = _chosen(0.03, "share that a second or third cause must remove")
+    further_bootstrap_p: float = _chosen(0.2, "largest bootstrap p-value of a second or third cause")
+    further_gain_share: float = _chosen(0.2, "gain of a second or third cause over that of those before it")
+    largest_pattern: float = _chosen(5.0, "bound of a pattern's amplitude in the corrected model, in its units")
+
+    # What is learned of greenhouses in which nothing is missing.
+    nuisance_directions: int = _chosen(8, "directions for models calibrated on the greenhouse itself")
+    nuisance_directions_transferred: int = _chosen(16, "directions for those calibrated on another one")
+    least_fitted_gain: float = _chosen(1.0, "gain in a scan from which on an effect's usual size is fitted")
+
+    def meaning(self, name: str) -> str:
+        """Return what a rule means."""
+        return str(_rule(name).metadata["meaning"])
+
+    def gain_of_cause(self, *, time_steps: bool, transferred: bool) -> float:
+        """Return what a cause must gain."""
+        if time_steps:
+            return self.least_gain_steps
+        return self.least_gain_transferred if transferred else self.least_gain
+
+    def gain_of_pattern(self, *, transferred: bool) -> float:
+        """Return what a pattern must gain in a log of `usual_days`."""
+        return self.pattern_gain_transferred if transferred else self.pattern_gain
+
+
+@dataclass(frozen=True)
+class StoredRules:
+    """Rules as a command wrote them."""
+
+    rules: DecisionRules
+    provenance: Mapping[str, Any]
+    """By fitted rule: the command, its date and seeds, and what it was fitted to."""
+
+
+def fitted_names() -> tuple[str, ...]:
+    """Return the names of the rules that are fitted."""
+    return tuple(one.name for one in fields(DecisionRules) if one.metadata["set"] == "fitted")
+
+
+def read_rules(path: Path | None = None) -> StoredRules:
+    """Return stored rules (None: those that came with the trainer)."""
+    file = files("igrow.trainer.diagnosis").joinpath(FILE) if path is None else path
+    document = json.loads(file.read_text(encoding="utf-8"))
+    values: dict[str, Any] = {name: float(one["value"]) for name, one in document.items()}
+    return StoredRules(DecisionRules(**values), document)
+
+
+def write_rules(path: Path, values: Mapping[str, float], provenance: Mapping[str, Any]) -> None:
+    """Write fitted rules, each with its provenance.
+
+    Raises:
+        ValueError: a fitted rule is missing, or a chosen one is among them.
+    """
+    if set(values) != set(fitted_names()):
+        raise ValueError(f"fitted rules are {', '.join(fitted_names())}; given were {', '.join(values)}")
+    document = {
+        name: {"value": values[name], "meaning": _rule(name).metadata["meaning"], **provenance} for name in values
+    }
+    path.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+
+
+def table(rules: DecisionRules) -> list[tuple[str, float, str, str]]:
+    """Return (name, value, chosen or fitted, meaning) of every rule."""
+    values = asdict(rules)
+    return [(one.name, values[one.name], one.metadata["set"], one.metadata["meaning"]) for one in fields(rules)]
+
+
+def _rule(name: str) -> Field[Any]:
+    return next(one for one in fields(DecisionRules) if one.name == name)
+
+
+DEFAULT = read_rules().rules

@@ -1,0 +1,247 @@
+"""Day-long free runs along a log: what the model misses, and how that depends on parameters and effects.
+
+From every local midnight the model runs freely for a day, driven by what the actuators did. Errors of one step
+would be cheaper, and they mislead: a simple model's fast dynamics are never quite right, the PLC answers every
+disturbance within minutes, and a fit to single steps then takes that answer for physics (on the mechanistic
+greenhouse it made the 24 h error five times as large). Over a day what matters is what the balances lack.
+
+The error of a run is the disturbance, passed through the plant: along a run it is coloured, and `noise` whitens it.
+Sensitivities to all parameters, effects and patterns come from batches of such runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from igrow.core.arrays import Array, Floats, Integers, Mask
+from igrow.core.effects import EFFECTS, Effect
+from igrow.core.simulator.hybrid import climate, measurement
+from igrow.core.simulator.hybrid.climate import ActiveEffects
+from igrow.core.simulator.hybrid.parameters import PARAMETERS
+from igrow.core.simulator.hybrid.record import SUBSTEP, Record, free_run, observe
+from igrow.trainer.fit.solver import DivergenceError
+
+BALANCES = ("heat", "vapour", "co2")
+"""In the order of `measurement.PREDICTED`, which shows each of them first."""
+PARAMETER_DIFFERENCE = 0.05
+"""Finite difference of a parameter, in prior standard deviations."""
+EFFECT_DIFFERENCE = 0.1
+"""The same of a sensor effect's amplitude, in typical ones."""
+_BATCH = 160
+"""Variants run at once: more do not fit into the cache."""
+
+
+@dataclass(frozen=True)
+class DayRuns:
+    """Where the runs of a record start, and what counts of them."""
+
+    starts: Integers
+    """Time steps of the record, (r,)."""
+    steps: int
+    day: Integers
+    """Index of each run's local day, (r,)."""
+    weight: Mask
+    """Steps with inputs since the start and a measurement at the end, by balance, (3, r, steps)."""
+
+    @property
+    def samples(self) -> Integers:
+        """Sample of the record that each step ends at, (r, steps)."""
+        return self.starts[:, None] + 1 + np.arange(self.steps)
+
+
+def day_runs(record: Record, day: Integers) -> DayRuns:
+    """Return one run a local day, from its first sample to the next day's.
+
+    Args:
+        record: of the log.
+        day: index of the local day of each sample, (n,).
+    """
+    steps = round(86_400.0 / record.step)
+    first = np.flatnonzero(np.diff(np.concatenate([[-1], day])) > 0)
+    starts = first[first + steps < len(record)]
+    ready = np.all(
+        [np.isfinite(values[starts]) for values in record.measured.values() if np.isfinite(values).any()], axis=0
+    )
+    starts = starts[ready]
+    samples = starts[:, None] + np.arange(steps)
+    driven = np.cumprod(record.usable[samples], axis=1).astype(bool)
+    shown = np.stack([np.isfinite(record.measured[name][samples + 1]) for name in measurement.PREDICTED])
+    return DayRuns(starts, steps, day[starts], shown & driven)
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """The model along a log at given parameters and active effects."""
+
+    record: Record
+    runs: DayRuns
+    parameters: Mapping[str, float]
+    effects: ActiveEffects
+    shown: Floats
+    """What the sensors would show, (3, r, steps), in degC, %, ppm."""
+    states: Mapping[str, Floats]
+    """From `observe`, (n,)."""
+    drivers: Mapping[str, Array]
+    """Along the measured climate, (n,)."""
+    added: Mapping[str, Floats] = field(default_factory=dict)
+    """Further fluxes by channel, (n,)."""
+
+    @property
+    def errors(self) -> Floats:
+        """Measured minus predicted, 0 where it does not count, (3, r, steps)."""
+        measured = np.stack([self.record.measured[name][self.runs.samples] for name in measurement.PREDICTED])
+        return np.where(self.runs.weight, np.nan_to_num(measured) - self.shown, 0.0)
+
+
+def linearise(
+    record: Record,
+    runs: DayRuns,
+    parameters: Mapping[str, float],
+    effects: ActiveEffects,
+    added: Mapping[str, Floats] | None = None,
+) -> Linearisation:
+    """Run the model once along a log; `added` are further fluxes by channel, (n,).
+
+    Raises:
+        DivergenceError: a prediction that counts is no finite number.
+    """
+    states = observe(record, parameters, effects)
+    with np.errstate(over="ignore", invalid="ignore"):
+        shown = free_run(record, states, runs.starts, runs.steps, parameters, effects, added)
+    drivers = climate.derive(np, states, record.inputs, parameters, record.lamp_efficacy)
+    line = Linearisation(record, runs, parameters, effects, _stacked(shown), states, drivers, added or {})
+    if not np.isfinite(line.errors).all():
+        active = f" with {', '.join(effects)}" if effects else ""
+        raise DivergenceError(
+            f"the model{active} runs out of all bounds on this log: calibrate it on this greenhouse first"
+        )
+    return line
+
+
+def parameter_sensitivities(line: Linearisation, names: Sequence[str], spread: Floats) -> Floats:
+    """Return d(error)/d(parameter), (len(names), 3, r, steps), by finite differences.
+
+    Args:
+        line: where to differentiate.
+        names: of the parameters.
+        spread: prior standard deviation of each, (len(names),).
+    """
+    value = np.array([line.parameters[name] for name in names])
+    step = PARAMETER_DIFFERENCE * spread
+    high = np.array([PARAMETERS[name].high for name in names])
+    step = np.where(value + step > high, -step, step)
+    variants = value + np.diag(step)
+    varied = {**line.parameters, **{name: variants[:, k : k + 1] for k, name in enumerate(names)}}
+    # Memories of processes run along the log as they are: one course of drivers, not one a variant.
+    plain = {name: values for name, values in line.effects.items() if not _remembers(name)}
+    states = dict(observe(line.record, varied, plain))
+    states |= {name: values for name, values in line.states.items() if name not in states}
+    shown = free_run(line.record, states, line.runs.starts, line.runs.steps, varied, line.effects, line.added)
+    return -(_batched(shown, len(names), line) - line.shown) / step[:, None, None, None]
+
+
+def sensor_sensitivity(line: Linearisation, effect: Effect, shape: Mapping[str, float]) -> Floats:
+    """Return d(error)/d(amplitude), (3, r, steps), of a sensor effect that is not active."""
+    small = EFFECT_DIFFERENCE * effect.amplitude.typical
+    active = {**line.effects, effect.name: {effect.amplitude.name: small, **shape}}
+    states = observe(line.record, line.parameters, active)
+    shown = free_run(line.record, states, line.runs.starts, line.runs.steps, line.parameters, active)
+    sensitivity: Floats = -(_stacked(shown) - line.shown) / small
+    return sensitivity
+
+
+def unit_fluxes(line: Linearisation, effect: Effect, shape: Mapping[str, float]) -> dict[str, Array]:
+    """Return what a process effect of amplitude one adds to each channel along the measured climate, (n,) each."""
+    values = {effect.amplitude.name: 1.0, **shape}
+    memory = run_memory(effect, values, line.drivers, line.record.step) if effect.memory is not None else None
+    count = len(line.record)
+    return {
+        channel: np.broadcast_to(np.asarray(flux, dtype=np.float64), (count,))
+        for channel, flux in effect.contribution(np, line.drivers, values, memory).items()
+    }
+
+
+def flux_sensitivities(line: Linearisation, fluxes: Sequence[tuple[Mapping[str, Array], float]]) -> Floats:
+    """Return d(error)/d(amplitude), (f, 3, r, steps), of fluxes into the balances.
+
+    Args:
+        line: where to linearise.
+        fluxes: for each, the flux by channel at amplitude one, (n,), and a small amplitude to run it at.
+    """
+    parts = [_flux_batch(line, fluxes[first : first + _BATCH]) for first in range(0, len(fluxes), _BATCH)]
+    count = len(line.runs.starts)
+    return np.concatenate(parts) if parts else np.zeros((0, 3, count, line.runs.steps))
+
+
+def _flux_batch(line: Linearisation, fluxes: Sequence[tuple[Mapping[str, Array], float]]) -> Floats:
+    record, runs = line.record, line.runs
+    channels = sorted({channel for flux, _ in fluxes for channel in flux})
+    zero = np.zeros(len(record))
+    samples = runs.starts + np.arange(runs.steps)[:, None]
+    added = {
+        channel: np.stack([small * flux.get(channel, zero)[samples] for flux, small in fluxes], axis=1)
+        for channel in channels
+    }
+    shown = free_run(record, line.states, runs.starts, runs.steps, line.parameters, line.effects, added)
+    small = np.array([size for _, size in fluxes])
+    sensitivities: Floats = -(_batched(shown, len(fluxes), line) - line.shown) / small[:, None, None, None]
+    return sensitivities
+
+
+def run_memory(effect: Effect, values: Mapping[str, float], drivers: Mapping[str, Array], step: float) -> Floats:
+    """Return the memory of an effect along the drivers, (n,)."""
+    memory = effect.memory
+    assert memory is not None
+    count = max(np.size(drivers[name]) for name in effect.drivers)
+    columns = [np.broadcast_to(drivers[name], (count,)).tolist() for name in effect.drivers]
+    substeps = max(1, round(step / SUBSTEP))
+    course = np.empty(count)
+    names = effect.drivers
+    now = dict(zip(names, (column[0] for column in columns), strict=True))
+    value = float(memory.start(_Scalars, now, values))
+    for k, cells in enumerate(zip(*columns, strict=True)):
+        course[k] = value
+        now = dict(zip(names, cells, strict=True))
+        for _ in range(substeps):
+            value = memory.advance(_Scalars, value, now, values, step / substeps)
+    return course
+
+
+class _Scalars:
+    """The few functions that memories use, for plain floats: ten times faster than numpy's on scalars."""
+
+    maximum = staticmethod(max)
+    minimum = staticmethod(min)
+    abs = staticmethod(abs)
+    exp = staticmethod(np.exp)
+    sqrt = staticmethod(np.sqrt)
+    tanh = staticmethod(np.tanh)
+
+
+def _remembers(name: str) -> bool:
+    return EFFECTS[name].kind == "process" and EFFECTS[name].memory is not None
+
+
+def _stacked(shown: Mapping[str, Floats]) -> Floats:
+    return np.stack([shown[name].T for name in measurement.PREDICTED])
+
+
+def _batched(shown: Mapping[str, Floats], count: int, line: Linearisation) -> Floats:
+    """Return what `count` variants show, (count, 3, r, steps)."""
+    shape = (line.runs.steps, count, len(line.runs.starts))
+    # What no variant moves has no axis of variants.
+    tables = [shown[name] if shown[name].ndim == 3 else shown[name][:, None] for name in measurement.PREDICTED]
+    stacked = np.stack([np.broadcast_to(table, shape) for table in tables])
+    batched: Floats = stacked.transpose(2, 0, 3, 1)
+    return batched
+
+
+def is_measured(record: Record, effect: Effect) -> bool:
+    """Tell whether the log has what a sensor effect falsifies."""
+    return all(
+        bool(np.isfinite(record.measured[name]).any()) if name in record.measured else name not in record.unknown
+        for name in EFFECTS[effect.name].measured
+    )

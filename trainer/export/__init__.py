@@ -1,1 +1,0 @@
-"""From fitted simulator to bundle: traces the shared formulas into ONNX blocks and puts the graphs together."""

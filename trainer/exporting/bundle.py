@@ -1,0 +1,200 @@
+"""The ends of the road at the bundle: a fitted model written as one, and read back from it."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from igrow import __version__
+from igrow.core.bundle import (
+    BUILT_IN,
+    Bundle,
+    BundleError,
+    FittedParameter,
+    Golden,
+    Manifest,
+    default_bundle_folder,
+    read_bundle,
+    run_graph,
+    write_bundle,
+)
+from igrow.core.effects import EFFECTS
+from igrow.core.planner.evolution import EvolutionSettings
+from igrow.core.simulator import actuation, holding
+from igrow.core.simulator.crop import CropStages
+from igrow.core.simulator.hybrid.nominal import as_described
+from igrow.core.simulator.hybrid.parameters import PARAMETERS
+from igrow.core.site import Site
+from igrow.trainer.exporting.blocks import OPSET, open_model
+from igrow.trainer.exporting.climate import climate_blocks, effect_parameter
+from igrow.trainer.exporting.golden import golden_inputs
+from igrow.trainer.exporting.hindcast import hindcast_model
+from igrow.trainer.exporting.optimizer import export_optimizer, optimizer_signature
+from igrow.trainer.exporting.plan import plan_blocks, plan_model
+from igrow.trainer.exporting.signatures import signatures
+from igrow.trainer.fit.climate import bounds, site_prior
+from igrow.trainer.fit.gaussian import Gaussian
+from igrow.trainer.fit.model import FittedModel
+from igrow.trainer.training.stage_file import stages_from_bytes, stages_to_bytes
+
+CROP_FILE = "crop.npz"
+MEMBERS = 3
+"""Draws from the posterior that a bundle carries beside the mean, for cautious plans."""
+
+
+def export(model: FittedModel, folder: Path | str, *, created: datetime | None = None, seed: int = 0) -> Bundle:
+    """Write a model as a bundle, its graphs run on golden inputs.
+
+        bundle = export(model, "out/bundle")
+
+    Args:
+        model: the fitted simulator.
+        folder: must not exist yet.
+        created: time of making, UTC; None: now.
+        seed: of the posterior's draws and the golden inputs.
+
+    Raises:
+        BundleError: the bundle cannot be written.
+    """
+    created = created or datetime.now(UTC)
+    crop = model.crop or _crop_of(read_bundle(default_bundle_folder()))
+    random = np.random.default_rng(seed)
+    blocks = climate_blocks([effect.name for effect in model.effects])
+    planning = plan_blocks(blocks, crop, model.training_range)
+    settings = EvolutionSettings()
+    graphs = {
+        "simulator": plan_model(planning),
+        "hindcast": hindcast_model(blocks),
+        "optimizer": export_optimizer(settings),
+    }
+    reference = model.training_span.start if model.training_span else created
+    values = _parameter_values(model, reference)
+    golden = {}
+    for name, inputs in golden_inputs(planning, values, settings, random).items():
+        session = open_model(graphs[name])
+        golden[name] = Golden(inputs, run_graph(session, inputs))
+    lamps = model.site.greenhouse.lamps
+    drawn = model.posterior.sample(random, MEMBERS, *bounds(model.posterior.names))
+    manifest = Manifest(
+        site=model.site.name,
+        created=created.astimezone(UTC),
+        igrow_version=__version__,
+        variant="hybrid",
+        opset=OPSET,
+        graphs=signatures(planning) | {"optimizer": optimizer_signature(graphs["optimizer"])},
+        training_span=model.training_span,
+        effects=model.effects,
+        parameters={
+            name: FittedParameter(float(mean), float(deviation), PARAMETERS[name].unit)
+            for name, mean, deviation in zip(
+                model.posterior.names, model.posterior.mean, model.posterior.standard_deviation, strict=True
+            )
+        },
+        covariance=tuple(tuple(float(value) for value in row) for row in model.posterior.covariance),
+        calibrated_on=model.calibrated_on,
+        alignment=model.alignment,
+        discrepancy=dict(model.discrepancy),
+        errors=model.errors,
+        training_range=model.training_range,
+        simulator={
+            "latitude": model.site.latitude,
+            "longitude": model.site.longitude,
+            "mean_height": model.site.greenhouse.mean_height,
+            "lamp_efficacy": lamps.efficacy if lamps else 0.0,
+            "leaf_area_index": 3.0,
+            "conversion": crop.conversion,
+            "maintenance": crop.maintenance,
+            "growth_covariance": None if crop.covariance is None else crop.covariance.tolist(),
+            "reference_time": reference.astimezone(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
+            "parameters": values,
+            "members": [
+                {f"parameter:{name}": float(draws[row, 0]) for name, draws in drawn.items()} for row in range(MEMBERS)
+            ],
+        },
+    )
+    files = {f"{name}.onnx": graph.SerializeToString() for name, graph in graphs.items()}
+    files[CROP_FILE] = stages_to_bytes({"growth": crop.growth, "harvest": crop.harvest})
+    return write_bundle(Path(folder), manifest, files, golden)
+
+
+def read_model(bundle: Bundle | Path | str, site: Site) -> FittedModel:
+    """Return the model that a bundle was made from, as the model of a site.
+
+    Raises:
+        BundleError: the bundle is of another variant, or lacks what a model needs.
+    """
+    bundle = bundle if isinstance(bundle, Bundle) else read_bundle(Path(bundle))
+    manifest = bundle.manifest
+    if manifest.variant != "hybrid":
+        raise BundleError(f"{bundle.folder}: is a {manifest.variant} bundle; a hybrid one is needed")
+    given = manifest.simulator.get("parameters", {})
+    return FittedModel(
+        site=site,
+        posterior=_posterior(bundle, site),
+        calibrated_on=manifest.calibrated_on,
+        alignment=manifest.alignment,
+        discrepancy=manifest.discrepancy,
+        effects=tuple(effect for effect in manifest.effects if effect.kind != "remainder"),
+        actuation={name: float(given.get(f"actuation:{name}", rule.value)) for name, rule in actuation.RULES.items()},
+        holding={name: float(given.get(f"holding:{name}", one.value)) for name, one in holding.PARAMETERS.items()},
+        crop=_crop_of(bundle),
+        training_span=manifest.training_span,
+        training_range=manifest.training_range,
+        errors=manifest.errors,
+    )
+
+
+def _posterior(bundle: Bundle, site: Site) -> Gaussian:
+    """Return what a bundle knows of the parameters, and of those that it lacks what the site's description says."""
+    manifest, prior = bundle.manifest, site_prior(site)
+    known = [name for name in prior.names if name in manifest.parameters]
+    if not known:
+        raise BundleError(f"{bundle.folder}: manifest.json: parameters: none of the simulator's stands there")
+    means = {name: manifest.parameters[name].mean for name in known}
+    values = prior.values | (as_described(means, site) if manifest.site == BUILT_IN else means)
+    covariance = prior.covariance.copy()
+    rows = [prior.names.index(name) for name in known]
+    order = [list(manifest.parameters).index(name) for name in known]
+    covariance[np.ix_(rows, rows)] = (
+        np.diag([manifest.parameters[name].standard_deviation ** 2 for name in known])
+        if manifest.covariance is None
+        else np.array(manifest.covariance)[np.ix_(order, order)]
+    )
+    return Gaussian(prior.names, np.array([values[name] for name in prior.names]), covariance)
+
+
+def _crop_of(bundle: Bundle) -> CropStages:
+    """Return the growth and yield stages that a bundle carries."""
+    path = bundle.folder / CROP_FILE
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise BundleError(f"{path}: not readable: {error.strerror}") from None
+    stages, _ = stages_from_bytes(content, where=str(path))
+    settings = bundle.manifest.simulator
+    growth = float(settings.get("conversion", 0.0)), float(settings.get("maintenance", 0.0))
+    covariance = settings.get("growth_covariance")
+    known = None if covariance is None else np.array(covariance, dtype=np.float64)
+    return CropStages(stages["growth"], stages["harvest"], *growth, known)
+
+
+def _parameter_values(model: FittedModel, reference: datetime) -> dict[str, float]:
+    """Return the value of each row of the graphs' input `parameters`."""
+    lamps = model.site.greenhouse.lamps
+    values = {
+        "mean_height": model.site.greenhouse.mean_height,
+        "lamp_efficacy": lamps.efficacy if lamps else 0.0,
+    }
+    values |= {f"parameter:{name}": value for name, value in model.posterior.values.items()}
+    values |= {f"actuation:{name}": float(value) for name, value in model.actuation.items()}
+    values |= {f"holding:{name}": float(value) for name, value in model.holding.items()}
+    for effect in model.effects:
+        for parameter in EFFECTS[effect.name].parameters:
+            estimate = effect.parameters.get(parameter.name)
+            value = estimate.value if estimate else parameter.typical
+            values[effect_parameter(effect.name, parameter.name)] = value
+        began = effect.onset.time if effect.onset else reference
+        values[effect_parameter(effect.name, "onset")] = (began - reference).total_seconds() / 86_400.0
+    return values

@@ -1,0 +1,92 @@
+"""What the PLC does with setpoints in one step, as blocks: equipment by the fitted rules, heat and CO2 that hold."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from igrow.core import air
+from igrow.core.quantities import SETPOINTS
+from igrow.core.simulator import actuation, holding
+from igrow.core.simulator.hybrid import climate
+from igrow.core.simulator.hybrid.measurement import PREDICTED
+from igrow.core.simulator.hybrid.parameters import PARAMETERS
+from igrow.core.simulator.plan import STEPS_PER_HOUR
+from igrow.trainer.exporting.blocks import Block, grouped, tags, trace
+from igrow.trainer.exporting.climate import ClimateBlocks
+
+CARRIED = ("vent_lee", "vent_wind", "energy_screen", "blackout_screen")
+"""Positions of the equipment that an hour hands to the next."""
+SECONDS = 3600.0 / STEPS_PER_HOUR
+"""Length of a step."""
+SETTINGS = (*tags("actuation", actuation.RULES), *tags("holding", holding.PARAMETERS))
+"""Parameters of the fitted rules."""
+
+
+def equipment_block(weather: Sequence[str]) -> Block:
+    """Trace `_equipment`; `weather` names what is known of it."""
+    return trace(
+        "equipment",
+        _equipment,
+        [
+            *tags("setpoint", SETPOINTS),
+            *tags("weather", weather),
+            *tags("climate", (*PREDICTED, "par")),
+            *tags("memory", CARRIED),
+            *SETTINGS,
+        ],
+    )
+
+
+def control_block(stage: ClimateBlocks) -> Block:
+    """Trace `_control` for a climate stage with its active effects."""
+    return trace(
+        "control",
+        _control,
+        [
+            *tags("state", climate.STATES),
+            *tags("driver", (*stage.inputs, *stage.derive.outputs, "mean_height")),
+            *stage.channels,
+            *tags("parameter", PARAMETERS),
+            *tags("setpoint", SETPOINTS),
+            *SETTINGS,
+            "shown_temperature",
+            "shown_co2",
+        ],
+    )
+
+
+def _equipment(xp: Any, arrays: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Lamps, screens, vents and irrigation by the fitted rules; the vents no faster than a step can bear."""
+    named = grouped(arrays)
+    slow = named["actuation"] | {"vent_lag": xp.maximum(named["actuation"]["vent_lag"], SECONDS / 60.0)}
+    climate_now = named["climate"]
+    pipes = dict.fromkeys(("rail_pipe_temperature", "grow_pipe_temperature"), 0.0 * climate_now["air_temperature"])
+    memory = named["memory"] | pipes
+    result = actuation.act(xp, named["setpoint"], named["weather"], climate_now, memory, slow, seconds=SECONDS)
+    return {name: result[name] for name in (*CARRIED, "lamp_power", "irrigation")}
+
+
+def _control(xp: Any, arrays: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Heat and CO2 that hold the setpoints, and the state at the end of the step."""
+    named = grouped(arrays)
+    state, drivers, settings = named["state"], named["driver"], named["holding"]
+    parameters, setpoints = named["parameter"], named["setpoint"]
+    temperature = state["air_temperature"]
+    zero = 0.0 * temperature
+    idle = drivers | {"rail_pipe_excess": zero, "grow_pipe_excess": zero, "co2_dosing": zero}
+    parts = climate.balances(xp, state, idle, parameters, named.get("added", {}))
+    heat = holding.heat_to_hold(
+        xp, setpoints["heating_setpoint"], arrays["shown_temperature"], parts["air_temperature"], settings, SECONDS
+    )
+    wanted = setpoints["co2_setpoint"] + settings["co2_offset"]
+    missing = air.co2_concentration(temperature, wanted) - air.co2_concentration(temperature, arrays["shown_co2"])
+    vents = 0.005 * (drivers["vent_lee"] + drivers["vent_wind"])
+    dose = holding.co2_to_hold(xp, missing, parts["co2_concentration"], vents, settings, SECONDS)
+    given = {"air_temperature": heat, "co2_concentration": parameters["dosing_share"] * dose / 3600.0}
+    following = {}
+    for name, (flux, conductance, capacity) in parts.items():
+        decay = xp.exp(-SECONDS * conductance / capacity)
+        following[name] = state[name] + (flux + given.get(name, 0.0)) / conductance * (1.0 - decay)
+    pipes = parameters["rail_pipe_heat_transfer"] + settings["grow_share"] * parameters["grow_pipe_heat_transfer"]
+    return following | {"heat": heat, "co2": dose, "rail_pipe_excess": heat / pipes}

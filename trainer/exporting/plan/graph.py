@@ -1,0 +1,71 @@
+"""The planning graph as a whole: its inputs and outputs, the start of a run, and the scans over hours and days."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from onnx import ModelProto
+
+from igrow.core.quantities import GROWTH, SETPOINTS, YIELD
+from igrow.core.simulator.hybrid.measurement import PREDICTED
+from igrow.core.simulator.plan import CLIMATE_OUT, CLOCK, EQUIPMENT, RESOURCES
+from igrow.trainer.exporting.blocks import Shape
+from igrow.trainer.exporting.climate_wiring import ClimateWiring
+from igrow.trainer.exporting.plan.blocks import PlanBlocks
+from igrow.trainer.exporting.plan.days import wire_days
+from igrow.trainer.exporting.plan.hour import carried_names, climate_inputs, hour_graph
+from igrow.trainer.exporting.wiring import Wiring, finished_model
+
+OUTPUTS: Mapping[str, Shape] = {
+    "climate_out": ("hours", len(CLIMATE_OUT), "batch"),
+    "resources": ("hours", len(RESOURCES), "batch"),
+    "growth_out": ("hours", len(GROWTH), "batch"),
+    "harvest_out": ("days", len(YIELD), "batch"),
+    "outside": ("hours", "batch"),
+}
+
+
+def input_shapes(blocks: PlanBlocks) -> dict[str, Shape]:
+    """Return the shapes of the graph's inputs; `w` and `members` are 1 or batch."""
+    return {
+        "climate": (len(PREDICTED), "batch"),
+        "growth": (len(GROWTH), "batch"),
+        "harvest": (len(YIELD), "batch"),
+        "equipment": (len(EQUIPMENT), "batch"),
+        "weather": ("hours", len(blocks.weather), "w"),
+        "clock": ("hours", len(CLOCK), 1),
+        "day": ("hours", 1),
+        "setpoints": ("hours", len(SETPOINTS), "batch"),
+        "parameters": (len(blocks.parameters), "members"),
+    }
+
+
+def plan_model(blocks: PlanBlocks) -> ModelProto:
+    """Return the planning graph."""
+    outer = Wiring("plan")
+    parameters = outer.rows("parameters", blocks.parameters)
+    growth = outer.rows("growth", GROWTH)
+    equipment = outer.rows("equipment", EQUIPMENT)
+    weather = outer.rows(outer.first("weather"), blocks.weather)
+    clock = outer.rows(outer.first("clock"), CLOCK)
+    zero = outer.constant("zero", [0.0])
+    inputs = climate_inputs(blocks, weather, clock, growth["leaf_area_index"], zero) | equipment
+    measured = outer.rows("climate", PREDICTED)
+    state = ClimateWiring(outer, blocks.climate, parameters, outer.first("day")).rest(measured, inputs)
+    carried = state | growth | equipment
+    packed = outer.matrix([carried[name] for name in carried_names(blocks)], like=state["air_temperature"])
+    (_, hourly) = outer.add(
+        "Scan",
+        [packed, "weather", "clock", "day", "setpoints"],
+        2,
+        body=hour_graph(blocks, parameters),
+        num_scan_inputs=4,
+    )
+    widths = outer.constant("parts", [len(CLIMATE_OUT), len(RESOURCES), len(GROWTH), 1])
+    climate_out, resources, growth_out, outside = outer.add("Split", [hourly, widths], 4, axis=1)
+    outer.output("climate_out", climate_out)
+    outer.output("resources", resources)
+    outer.output("growth_out", growth_out)
+    outer.output("outside", outside, outer.constant("axis", [1]), operator="Squeeze")
+    outer.output("harvest_out", wire_days(outer, blocks.harvest, climate_out, growth_out))
+    return finished_model(outer.graph("simulator", input_shapes(blocks), OUTPUTS), blocks.blocks)

@@ -1,0 +1,131 @@
+"""The one calibration: from a log to the fitted model of its greenhouse.
+
+    log --> alignment --> record on the working grid --> parameters --> discrepancy
+                                                    \\-> rules of the PLC, and how it holds heat and CO2
+
+The parameters are fitted to all of the log; how well they predict is told by a second fit that leaves every fourth week
+out, on these weeks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from igrow.core.bundle import HeldOutError, Span
+from igrow.core.errors import IgrowError
+from igrow.core.local_time import utc_datetime
+from igrow.core.quantities import QUANTITIES
+from igrow.core.simulator.hybrid.record import Record
+from igrow.core.site import Site
+from igrow.trainer.data import Log
+from igrow.trainer.data.splits import alternate_weeks
+from igrow.trainer.fit.actuation import fit_actuation, setpoint_columns
+from igrow.trainer.fit.climate import fit_climate
+from igrow.trainer.fit.evaluation import evaluate
+from igrow.trainer.fit.gaussian import Gaussian
+from igrow.trainer.fit.holding import fit_holding
+from igrow.trainer.fit.model import FittedModel, training_envelope
+
+HORIZONS = ("1_h", "24_h")
+"""Of the errors that a model carries."""
+
+Report = Callable[[str], None]
+
+
+def calibrate(
+    log: Log, site: Site | None = None, *, prior_model: FittedModel | None = None, progress: Report | None = None
+) -> FittedModel:
+    """Return the simulator of a greenhouse fitted to its log.
+
+        model = calibrate(log)
+
+    Args:
+        log: four weeks or more; less than a week says too little.
+        site: the greenhouse; None: the log's own.
+        prior_model: what is known of it before; None: its description alone. Causes that were found before are not
+            carried over: they are looked for again.
+        progress: is told what is being done, in lines.
+
+    Raises:
+        IgrowError: the log cannot be fitted to, and why.
+    """
+    log = log if site is None else replace(log, site=site)
+    log.require("a calibration")
+    site, say = log.known_site, progress or (lambda _line: None)
+    before = prior_model or FittedModel.described(site)
+    alignment = log.best_shift(before.posterior.values)
+    record = log.record(alignment)
+    posterior = fit_climate([(record, None)], before.posterior, progress=progress)
+    setpoints, inferred = setpoint_columns(log.telemetry, record)
+    rules = fit_actuation([(record, setpoints, None)], posterior.values)
+    say("rules of the climate computer fitted")
+    model = replace(
+        before,
+        site=site,
+        posterior=posterior,
+        calibrated_on=site.name,
+        alignment=alignment,
+        effects=(),
+        discrepancy={},
+        actuation=rules,
+        holding=fit_holding(record, setpoints, posterior.values, before.holding),
+        training_span=Span(utc_datetime(record.time[0]), utc_datetime(record.time[-1])),
+        training_range=training_envelope({**record.measured, **record.inputs, **setpoints}),
+        errors=held_out_errors(record, before.posterior, say),
+        notes=tuple(_notes(record, inferred)),
+    )
+    return _with_discrepancy(model, log, say)
+
+
+def held_out_errors(record: Record, prior: Gaussian, say: Report) -> tuple[HeldOutError, ...]:
+    """Return the errors of the prior and of a fit that leaves every fourth week out, on these weeks.
+
+    Empty where the log has no fourth week, or nothing complete in it.
+    """
+    held_out = alternate_weeks(record.time).held_out
+    if not held_out.any():
+        say("the log is too short to hold a week back: no errors on unseen days; four weeks are needed")
+        return ()
+    try:
+        fitted = fit_climate([(record, ~held_out)], prior)
+    except IgrowError:
+        return ()
+    old, new = (evaluate(record, values.values, {}, HORIZONS, held_out) for values in (prior, fitted))
+    return tuple(
+        HeldOutError(
+            quantity,
+            horizon,
+            old[quantity][horizon].mae,
+            summary.mae,
+            QUANTITIES[quantity].unit,
+            summary.persistence if np.isfinite(summary.persistence) else None,
+        )
+        for quantity, by_horizon in new.items()
+        for horizon, summary in by_horizon.items()
+    )
+
+
+def _with_discrepancy(model: FittedModel, log: Log, say: Report) -> FittedModel:
+    """Return the model with what it misses on its own log, and without it where that cannot be told."""
+    from igrow.trainer.diagnosis import discrepancy_of  # noqa: PLC0415  (a diagnosis needs fits in turn)
+
+    say("learning what the model misses on its own log")
+    try:
+        return replace(model, discrepancy=discrepancy_of(log, model))
+    except (IgrowError, np.linalg.LinAlgError) as error:
+        note = (
+            f"what the model misses on its own log could not be learned, so a diagnosis sees large causes only: {error}"
+        )
+        return replace(model, notes=(*model.notes, note))
+
+
+def _notes(record: Record, inferred: tuple[str, ...]) -> list[str]:
+    notes = []
+    if record.unknown:
+        notes.append(f"the log lacks {', '.join(record.unknown)}: what hangs on them keeps its usual value")
+    if inferred:
+        notes.append(f"the log lacks {', '.join(inferred)}: inferred from what was held")
+    return notes

@@ -1,0 +1,184 @@
+"""The hybrid simulator of one greenhouse as the trainer holds it: fitted, corrected, ready for export."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from igrow.core.arrays import Floats
+from igrow.core.bundle import EffectRecord, HeldOutError, Span
+from igrow.core.quantities import QUANTITIES
+from igrow.core.simulator import actuation, holding
+from igrow.core.simulator.crop import CropStages
+from igrow.core.simulator.hybrid.parameters import PARAMETERS
+from igrow.core.site import Site
+from igrow.trainer.fit.climate import site_prior
+from igrow.trainer.fit.gaussian import Gaussian
+
+MARGIN = 0.1
+"""Share of its width by which a range reaches beyond the data: so far a physical model may be believed."""
+
+
+@dataclass(frozen=True, repr=False)
+class FittedModel:
+    """Everything that a bundle of the hybrid variant is made from.
+
+    `igrow.trainer.calibrate` makes one from a log, a diagnosis corrects it, `igrow.trainer.export` writes its bundle.
+    """
+
+    site: Site
+    posterior: Gaussian
+    """Of the physical parameters, with their correlations."""
+    calibrated_on: str
+    """Name of the site on whose log they were fitted; empty where it was none."""
+    alignment: float | None = None
+    """Rows of its log by which the actuators are read ahead; None: each log is asked."""
+    discrepancy: Mapping[str, float] = field(default_factory=dict)
+    """What the calibration could not explain on its own log, which is no finding later: amplitude by key."""
+    effects: tuple[EffectRecord, ...] = ()
+    actuation: Mapping[str, float] = field(default_factory=actuation.default_rules)
+    """Rules of the actuation stage by name."""
+    holding: Mapping[str, float] = field(
+        default_factory=lambda: {name: one.value for name, one in holding.PARAMETERS.items()}
+    )
+    """How the PLC holds heat and CO2, by name."""
+    crop: CropStages | None = None
+    """Growth and yield; None: those of the built-in bundle."""
+    training_span: Span | None = None
+    training_range: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    errors: tuple[HeldOutError, ...] = ()
+    """On days that no fit saw."""
+    notes: tuple[str, ...] = ()
+    """What could not be told from the log, in sentences."""
+
+    @classmethod
+    def described(cls, site: Site) -> FittedModel:
+        """Return what follows from a site's description alone, before any log."""
+        return cls(site, site_prior(site), "")
+
+    def __repr__(self) -> str:
+        known = f"calibrated on {self.calibrated_on}" if self.calibrated_on else "not calibrated"
+        effects = f", effects: {', '.join(effect.name for effect in self.effects)}" if self.effects else ""
+        return f"FittedModel({self.site.name}: {len(self.posterior.names)} parameters, {known}{effects})"
+
+    @property
+    def active_effects(self) -> dict[str, dict[str, float]]:
+        """Parameter values of the effects by name, as `igrow.core.simulator.hybrid` takes them."""
+        return {
+            effect.name: {name: estimate.value for name, estimate in effect.parameters.items()}
+            for effect in self.effects
+        }
+
+    def corrected(
+        self,
+        posterior: Gaussian,
+        effects: Sequence[EffectRecord],
+        *,
+        span: Span,
+        errors: Sequence[HeldOutError],
+        discrepancy: Mapping[str, float] | None = None,
+    ) -> FittedModel:
+        """Return the model with what a later log of its greenhouse taught.
+
+        Args:
+            posterior: of the parameters, their correlations with it.
+            effects: all that are active now.
+            span: of the log.
+            errors: of the corrected model, on days that no fit saw.
+            discrepancy: None where it stays as it is.
+        """
+        return replace(
+            self,
+            posterior=posterior,
+            calibrated_on=self.site.name,
+            effects=tuple(effects),
+            training_span=span,
+            errors=tuple(errors),
+            discrepancy=self.discrepancy if discrepancy is None else discrepancy,
+        )
+
+    def summary(self) -> str:
+        """Return the parameters with their 90 % intervals, the effects and the errors, as a table for people."""
+        lines = [repr(self)[len("FittedModel(") : -1]]
+        if self.training_span is not None:
+            lines.append(f"fitted on {self.training_span.start:%Y-%m-%d} to {self.training_span.end:%Y-%m-%d} (UTC)")
+        if self.alignment is not None:
+            lines.append(f"actuators read {self.alignment:g} rows ahead")
+        lines += ["", f"{'parameter':28}{'value':>12}{'90 % interval':>26}  unit"]
+        for name, value, deviation in zip(
+            self.posterior.names, self.posterior.mean, self.posterior.standard_deviation, strict=True
+        ):
+            low, high = value - 1.645 * deviation, value + 1.645 * deviation
+            lines.append(f"{name:28}{value:12.4g}{f'{low:.4g} to {high:.4g}':>26}  {PARAMETERS[name].unit}")
+        for effect in self.effects:
+            for name, one in effect.parameters.items():
+                interval = f"{one.low:.4g} to {one.high:.4g}"
+                lines.append(f"{effect.name + ' ' + name:28}{one.value:12.4g}{interval:>26}  {one.unit}")
+        if self.errors:
+            columns = ("horizon", "persistence", "before", "after")
+            lines += ["", f"{'mean absolute error, unseen':28}" + "".join(f"{name:>12}" for name in columns)]
+            for error in self.errors:
+                naive = "-" if error.persistence is None else f"{error.persistence:.3g}"
+                cells = (error.horizon, naive, f"{error.before:.3g}", f"{error.after:.3g}")
+                lines.append(f"{error.quantity:28}" + "".join(f"{cell:>12}" for cell in cells) + f"  {error.unit}")
+        return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what is known of the model as plain values that `json` writes."""
+        return {
+            "site": self.site.name,
+            "calibrated_on": self.calibrated_on,
+            "alignment": self.alignment,
+            "parameters": {
+                name: {
+                    "mean": mean,
+                    "standard_deviation": self.posterior.deviations[name],
+                    "unit": PARAMETERS[name].unit,
+                }
+                for name, mean in self.posterior.values.items()
+            },
+            "covariance": self.posterior.covariance.tolist(),
+            "discrepancy": dict(self.discrepancy),
+            "effects": {name: dict(values) for name, values in self.active_effects.items()},
+            "actuation": dict(self.actuation),
+            "holding": dict(self.holding),
+            "training_range": {name: list(ends) for name, ends in self.training_range.items()},
+            "errors": [asdict(one) for one in self.errors],
+            "notes": list(self.notes),
+        }
+
+    def plot_errors(self, path: Path | None = None) -> Any:
+        """Return a matplotlib figure of the errors before and after, a panel for each quantity; `path` saves it."""
+        from matplotlib.figure import Figure  # noqa: PLC0415  (matplotlib is slow to import)
+
+        quantities = list(dict.fromkeys(one.quantity for one in self.errors))
+        figure = Figure(figsize=(3.2 * max(1, len(quantities)), 2.8), layout="constrained")
+        for position, quantity in enumerate(quantities):
+            axes = figure.add_subplot(1, len(quantities), position + 1)
+            rows = [one for one in self.errors if one.quantity == quantity]
+            place = np.arange(len(rows))
+            axes.bar(place - 0.2, [one.before for one in rows], 0.4, label="before", color="0.7")
+            axes.bar(place + 0.2, [one.after for one in rows], 0.4, label="after", color="tab:green")
+            axes.set_xticks(place, [one.horizon.replace("_", " ") for one in rows])
+            axes.set_title(f"{quantity.replace('_', ' ')} ({QUANTITIES[quantity].unit})", fontsize=9)
+        if quantities:
+            figure.axes[0].set_ylabel("mean absolute error")
+            figure.axes[0].legend(fontsize=8)
+        if path is not None:
+            figure.savefig(path)
+        return figure
+
+
+def training_envelope(columns: Mapping[str, Floats]) -> dict[str, tuple[float, float]]:
+    """Return the smallest and the largest value of each column that has any, with a margin on either side."""
+    found = {}
+    for name, values in columns.items():
+        finite = values[np.isfinite(values)]
+        if len(finite):
+            low, high = float(finite.min()), float(finite.max())
+            found[name] = (low - MARGIN * (high - low), high + MARGIN * (high - low))
+    return found

@@ -1,0 +1,136 @@
+"""The errors of a bundle on a log, as it will be used: driven by what the actuators did, and by setpoints alone.
+
+Persistence is what any of them must beat: as at the start an hour ahead, as one run earlier over a day or a week.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from igrow.core.arrays import Floats, Integers
+from igrow.core.bundle import Bundle
+from igrow.core.effects import EFFECTS
+from igrow.core.errors import IgrowError
+from igrow.core.planner.objective import Outcome
+from igrow.core.quantities import SETPOINTS, WEATHER
+from igrow.core.simulator.hybrid.record import Record
+from igrow.core.simulator.plan import BundleSimulator
+from igrow.core.site import Site
+from igrow.trainer.data import Log
+from igrow.trainer.diagnosis.knowledge import activate, active_term
+from igrow.trainer.exporting import read_model
+from igrow.trainer.fit.actuation import setpoint_columns
+from igrow.trainer.fit.evaluation import EVERY, Errors, Evaluation, Predictor, errors_of, free_runs, summarise
+
+HORIZONS = ("1_h", "24_h", "7_d")
+ACTUATORS, BY_SETPOINTS = "by actuators", "by setpoints"
+"""How a simulator is driven."""
+Report = Callable[[str], None]
+_DAY = 24
+_WEEKS_EVERY = 3 * EVERY
+"""Seconds between the starts of runs of a week, which overlap for days as it is."""
+
+
+def score_bundle(
+    log: Log, bundle: Bundle, horizons: Sequence[str] = HORIZONS, progress: Report | None = None
+) -> dict[str, Evaluation]:
+    """Return the errors by the way of driving: `ACTUATORS` (hybrid bundles only) and `BY_SETPOINTS`.
+
+    Days that the bundle was calibrated on, where it was on this very greenhouse, are left out.
+
+    Args:
+        log: of the greenhouse.
+        bundle: of either variant.
+        horizons: of `igrow.trainer.fit.evaluation.HORIZONS`.
+        progress: is told what is being done, in lines.
+
+    Raises:
+        IgrowError: the log cannot be used, or has no unseen days.
+    """
+    say = progress or (lambda _line: None)
+    given, log = log, unseen(log, bundle)
+    for note in log.notes[len(given.notes) :]:
+        say(f"note: {note}")
+    log.require("an evaluation", days=2.0)
+    site = log.known_site
+    if bundle.manifest.variant == "network":
+        from igrow.trainer.research.network.log_runs import climate_runs  # noqa: PLC0415  (torch is slow to import)
+
+        record = log.record()
+        by_setpoints = climate_runs(bundle.folder, record, setpoint_columns(log.telemetry, record)[0])
+        return {BY_SETPOINTS: _scores(record, by_setpoints, horizons, BY_SETPOINTS, say)}
+    model = read_model(bundle, site)
+    alignment = log.best_shift(model.posterior.values) if model.alignment is None else model.alignment
+    record = log.record(alignment)
+    terms = [active_term(effect) for effect in model.effects if effect.name in EFFECTS]
+    by_actuators = free_runs(record, model.posterior.values, activate(record, terms))
+    found = {ACTUATORS: _scores(record, by_actuators, horizons, ACTUATORS, say)}
+    setpoints, _ = setpoint_columns(log.telemetry, record)
+    planned = planned_runs(bundle, site, record, setpoints)
+    return found | {BY_SETPOINTS: _scores(record, planned, horizons, BY_SETPOINTS, say)}
+
+
+def _scores(record: Record, predict: Predictor, horizons: Sequence[str], how: str, say: Report) -> Evaluation:
+    found: dict[tuple[str, str], Errors] = {}
+    for horizon in horizons:
+        say(f"running {horizon.replace('_', ' ')} ahead {how}")
+        found |= errors_of(record, predict, (horizon,), every=_WEEKS_EVERY if horizon == "7_d" else EVERY)
+    return summarise([found])
+
+
+def unseen(log: Log, bundle: Bundle) -> Log:
+    """Return the part of a log that a bundle was not calibrated on.
+
+    Raises:
+        IgrowError: there is none.
+    """
+    span = bundle.manifest.training_span
+    time = log.telemetry.time
+    if span is None or bundle.manifest.calibrated_on != log.known_site.name or len(time) == 0:
+        return log
+    start, end = (np.datetime64(one.replace(tzinfo=None), "s") for one in (span.start, span.end))
+    if time[-1] <= start or time[0] > end:
+        return log
+    if time[-1] <= end:
+        raise IgrowError(
+            f"{log.name}: the bundle was calibrated on {span.start:%Y-%m-%d} to {span.end:%Y-%m-%d}, all days of this "
+            "log are among them: give a later one"
+        )
+    rest = log.select(end + np.timedelta64(1, "s"), None)
+    return replace(rest, notes=(*log.notes, f"days up to {span.end:%Y-%m-%d %H:%M} UTC were fitted on: left out"))
+
+
+def planned_runs(bundle: Bundle, site: Site, record: Record, setpoints: Mapping[str, Floats]) -> Predictor:
+    """Return runs of a bundle's planning graph, from the measured state by weather and setpoints, hour by hour.
+
+    Within an hour nothing is predicted: NaN.
+    """
+    simulator = BundleSimulator(bundle, site.greenhouse, members=1)
+    hour = max(1, round(3600.0 / record.step))
+    weather = np.stack([record.inputs[name] for name in WEATHER if name in record.inputs], axis=1)
+    asked = np.stack([setpoints[name] for name in SETPOINTS], axis=1)
+    last = len(record) - 1
+    known: dict[tuple[int, int], Outcome] = {}
+
+    def hourly(table: Floats, start: int, hours: int) -> Floats:
+        rows = np.minimum(start + np.arange(hours * hour), last)
+        means: Floats = table[rows].reshape(hours, hour, -1).mean(axis=1)
+        return means
+
+    def predict(starts: Integers, steps: int) -> Mapping[str, Floats]:
+        whole = -(-steps // (hour * _DAY)) * _DAY
+        ends = hour * np.arange(1, steps // hour + 1) - 1
+        shown = {name: np.full((steps, len(starts)), np.nan) for name in record.measured}
+        for column, start in enumerate(starts.tolist()):
+            if (start, whole) not in known:
+                state = {name: float(values[start]) for name, values in {**record.inputs, **record.measured}.items()}
+                ahead = hourly(weather, start, whole), hourly(asked, start, whole)[None]
+                known[start, whole] = simulator.simulate(state, *ahead, record.time[start])
+            for name, values in shown.items():
+                values[ends, column] = getattr(known[start, whole], name)[0, 0, : len(ends)]
+        return shown
+
+    return predict

@@ -1,0 +1,212 @@
+"""Every nonlinear fit of the trainer: weighted, robust least squares under a normal prior, within bounds.
+
+    minimise  1/2 sum_i w_i rho(r_i(x)) + 1/2 (x - m)^T S^-1 (x - m),   low <= x <= high
+
+by `scipy.optimize.least_squares`, the prior as p further rows. `rho` is Huber's loss, or the square. What a fit gives
+is a normal distribution about the minimum (Laplace's approximation), with the curvature of iteratively reweighted
+least squares: an error in the linear part of the loss tells less, but not nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import OptimizeResult, least_squares
+
+from igrow.core.arrays import Floats
+from igrow.core.errors import IgrowError
+from igrow.trainer.fit.gaussian import Gaussian
+
+Residuals = Callable[[Floats], Floats]
+"""Point (p,) -> errors in units of their scale, (n,)."""
+Jacobian = Callable[[Floats], Floats]
+"""Point (p,) -> d(errors)/d(point), (n, p)."""
+Batch = Callable[[Floats], Floats]
+"""Points (m, p) -> errors in units of their scale, (m, n)."""
+Progress = Callable[[int, Floats], None]
+"""Is told the number of each step, and the errors there, (n,)."""
+
+DIFFERENCE = 0.05
+"""Finite difference of a parameter, in standard deviations of its prior."""
+_COST_TOLERANCE = 1e-5
+"""Relative fall of the cost at which a search ends."""
+_STEP_TOLERANCE = 1e-3
+"""Length of a step, relative to the way from the start in the prior's standard deviations, at which it ends."""
+_AT_BOUND = 1e-3
+"""Distance from a bound, in standard deviations of the prior, within which a solution lies on it."""
+_INSIDE = 0.1
+"""Distance from a bound, in standard deviations of the prior, at which a search begins that may not begin on it."""
+_ARRIVED = 1e-3
+"""Relative fall of the cost that a full step without bounds promises at most where a search has arrived."""
+
+
+class DivergenceError(IgrowError):
+    """The model runs out of all bounds."""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """The minimum of a fit, and what is known about it."""
+
+    posterior: Gaussian
+    """The fitted parameters, and their covariance by the weights of the fit."""
+    residuals: Floats
+    """At the minimum, (n,)."""
+    jacobian: Floats
+    """At the minimum, (n, p)."""
+    cost: float
+    """What was minimised, at the minimum."""
+    evaluations: int
+    """Points that were tried."""
+
+
+def solve(
+    residuals: Residuals,
+    jacobian: Jacobian,
+    prior: Gaussian,
+    low: Floats,
+    high: Floats,
+    *,
+    weights: Floats | float = 1.0,
+    robust: float = np.inf,
+    start: Floats | None = None,
+    evaluations: int = 60,
+    progress: Progress | None = None,
+) -> Solution:
+    """Return the minimum.
+
+    Args:
+        residuals: of the model; may raise DivergenceError, and the search then takes a shorter step.
+        jacobian: of the model.
+        prior: of the parameters.
+        low: least value of each parameter, (p,).
+        high: largest value, (p,).
+        weights: independent errors that each one counts for, (n,); 0 leaves it out, and it may then be NaN.
+        robust: size of an error from which on it counts linearly.
+        start: where the search begins, (p,); None: at the prior's mean.
+        evaluations: points to try, at most.
+        progress: is told of each step.
+
+    Raises:
+        DivergenceError: the model has no finite error where the search begins.
+    """
+    begin = np.clip(prior.mean if start is None else start, low, high)
+    scale = prior.standard_deviation
+    whitening = prior.whitening
+    count = len(residuals(begin))
+    weight = np.broadcast_to(np.asarray(weights, dtype=np.float64), count)
+    limit = np.append(robust * np.sqrt(np.maximum(weight, 1e-300)), np.full(len(begin), np.inf))
+    latest: tuple[Floats, Floats, Floats] = (begin, np.zeros(0), np.zeros(0))
+    steps = 0
+
+    def rows(moved: Floats) -> Floats:
+        point = begin + scale * moved
+        try:
+            return np.append(_counted(residuals(point), weight), whitening @ (point - prior.mean))
+        except DivergenceError:
+            return np.full(len(limit), np.inf)
+
+    def slopes(moved: Floats) -> Floats:
+        nonlocal latest, steps
+        point = begin + scale * moved
+        latest = point, residuals(point), jacobian(point)
+        if progress is not None:
+            progress(steps, latest[1])
+        steps += 1
+        return np.concatenate([_counted(latest[2].T, weight).T, whitening]) * scale
+
+    if not np.isfinite(rows(np.zeros(len(begin)))).all():
+        raise DivergenceError("the model runs out of all bounds where the fit begins")
+    place, tried = np.zeros(len(begin)), 0
+    edges = (low - begin) / scale, (high - begin) / scale
+    # "dogbox" is quick, exact, and lies on bounds, but it can stop on its way where several parameters lie near theirs;
+    # "trf" goes on from there, if it does not begin on a bound.
+    for method in ("dogbox", "trf"):
+        found = least_squares(
+            rows,
+            place,
+            jac=slopes,
+            bounds=edges,
+            method=method,
+            loss=lambda squares: _huber(squares, limit),
+            ftol=_COST_TOLERANCE,
+            xtol=_STEP_TOLERANCE,
+            max_nfev=evaluations,
+        )
+        tried += int(found.nfev)
+        if _has_arrived(found):
+            break
+        inside = np.minimum(_INSIDE, 0.5 * (edges[1] - edges[0]))
+        place = np.clip(found.x, edges[0] + inside, edges[1] - inside)
+    point, errors, slope = latest
+    near = _AT_BOUND * scale
+    point = np.where(point < low + near, low, np.where(point > high - near, high, point))
+    posterior = Gaussian(prior.names, point, covariance(errors, slope, prior, weights=weight, robust=robust))
+    return Solution(posterior, errors, slope, float(found.cost), tried)
+
+
+def covariance(
+    residuals: Floats, jacobian: Floats, prior: Gaussian, *, weights: Floats | float = 1.0, robust: float = np.inf
+) -> Floats:
+    """Return the covariance of the posterior about a point, (p, p); arguments as `solve`'s, at that point."""
+    count = len(residuals)
+    weight = np.broadcast_to(np.asarray(weights, dtype=np.float64), count)
+    size = np.abs(_counted(residuals, (weight > 0.0).astype(np.float64)))
+    kept = weight * np.where(size > robust, robust / np.maximum(size, 1e-12), 1.0)
+    scale = prior.standard_deviation
+    slope = _counted(jacobian.T, kept).T * scale
+    white = prior.whitening * scale
+    inverse: Floats = np.linalg.inv(slope.T @ slope + white.T @ white) * np.outer(scale, scale)
+    return 0.5 * (inverse + inverse.T)
+
+
+def by_differences(batch: Batch, prior: Gaussian, high: Floats) -> tuple[Residuals, Jacobian]:
+    """Return residuals and Jacobian of a model that runs many points in one batch.
+
+    Args:
+        batch: the model.
+        prior: of the parameters; a difference is `DIFFERENCE` of its standard deviation.
+        high: largest value of each parameter, (p,); a difference that would pass it goes the other way.
+    """
+    known: dict[bytes, Floats] = {}
+
+    def residuals(point: Floats) -> Floats:
+        key = point.tobytes()
+        if key not in known:
+            errors = batch(point[None])[0]
+            known.clear()
+            known[key] = errors
+        return known[key]
+
+    def jacobian(point: Floats) -> Floats:
+        step = DIFFERENCE * prior.standard_deviation
+        step = np.where(point + step > high, -step, step)
+        slope: Floats = (batch(point + np.diag(step)) - residuals(point)).T / step
+        return slope
+
+    return residuals, jacobian
+
+
+def _has_arrived(found: OptimizeResult) -> bool:
+    """Tell whether a full Gauss-Newton step of the parameters that lie on no bound promises next to nothing."""
+    free = found.active_mask == 0
+    slope, gradient = found.jac[:, free], found.grad[free]
+    fall = 0.5 * float(gradient @ np.linalg.lstsq(slope.T @ slope, gradient, rcond=None)[0])
+    return fall <= _ARRIVED * float(found.cost)
+
+
+def _counted(values: Floats, weight: Floats) -> Floats:
+    """Return values (..., n) times the roots of their weights, 0 where they do not count."""
+    counted: Floats = np.where(weight > 0.0, values, 0.0) * np.sqrt(weight)
+    return counted
+
+
+def _huber(squares: Floats, limit: Floats) -> Floats:
+    """Return Huber's loss of squared errors, its slope, and 0 for the curvature of its weights, (3, n)."""
+    size = np.maximum(np.sqrt(squares), 1e-300)
+    far = size > limit
+    edge = np.where(far, limit, 0.0)
+    loss = np.where(far, edge * (2.0 * size - edge), squares)
+    return np.stack([loss, np.where(far, edge / size, 1.0), np.zeros_like(size)])

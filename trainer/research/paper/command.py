@@ -1,0 +1,32 @@
+"""`igrow-trainer reproduce`: one subcommand for each published table or figure."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+
+from igrow.trainer.research.paper import figure3, harvests, incremental, seasons, table1
+
+EXAMPLE = "igrow-trainer reproduce table1 --data data/wur2020 --out reproduced"
+
+PARTS = {
+    "table1": (table1, "R2 of whole virtual seasons run freely, beside the published table 1"),
+    "incremental": (incremental, "table 1 before and after real data join the virtual ones"),
+    "seasons": (seasons, "R2 of a trained network bundle on seasons that it has not seen"),
+    "figure3": (figure3, "net profit of the 2020 champion, predicted against measured"),
+    "harvests": (harvests, "harvests of the challenges' compartments, each predicted from the others"),
+}
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Add a subparser for each table or figure."""
+    parts = parser.add_subparsers(dest="part", metavar="PART", required=True)
+    for name, (module, summary) in PARTS.items():
+        part = parts.add_parser(name, help=summary, description=summary)
+        module.add_arguments(part)
+        part.set_defaults(part_run=module.run_command)
+
+
+def run(arguments: Namespace) -> int:
+    """Run one part."""
+    arguments.part_run(arguments)
+    return 0

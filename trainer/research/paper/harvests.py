@@ -1,0 +1,222 @@
+"""Measured harvests of ten compartments against four predictors, each fitted without the compartment it predicts.
+
+The data are few: six tomato crops of one season side by side, four cucumber crops of another. So the first predictor
+is the one that any model has to beat: the mean harvest of the other compartments, which knows nothing of the crop.
+"""
+
+from __future__ import annotations
+
+import json
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from igrow.core.arrays import Floats
+from igrow.core.greenhouse.canopy import photosynthesis
+from igrow.core.greenhouse.parameters import GreenhouseParameters
+from igrow.core.greenhouse.tomato import (
+    CARBOHYDRATE_PER_MOL,
+    assimilation_share,
+    deleaf,
+    grow,
+    leaf_area_index,
+    rates,
+    young_crop,
+)
+from igrow.trainer.research.network.simulator import layout
+from igrow.trainer.research.paper.compartments import Compartment, read_2018, read_2019
+from igrow.trainer.training.stage import StageData, TrainingPlan, run_stage, train_stage, untrained
+
+Predictor = Callable[[Sequence[Compartment], Compartment], Floats]
+
+DELAYS = range(0, 36, 5)
+"""Days from light to harvest that are tried."""
+WAITS = range(300, 1501, 50)
+"""Thermal times to the first harvest that are tried, degC d."""
+ASSUMED_CO2 = 700.0
+"""ppm in the mechanistic crop: no compartment of 2019 but one has published its CO2."""
+CANOPY_LIGHT = 0.75
+"""Share of the light above a grown canopy that it absorbs, per 1 - exp(-0.7 LAI)."""
+
+
+def mean_of_others(others: Sequence[Compartment], crop: Compartment) -> Floats:
+    """Return the mean cumulative harvest of the other compartments, (days,)."""
+    days = crop.day.size
+    rows = np.arange(days)
+    return np.asarray(np.mean([np.interp(rows, np.arange(o.day.size), o.cumulative()) for o in others], axis=0))
+
+
+def _light_since(crop: Compartment, wait: float, delay: int) -> Floats:
+    """Return the light since `wait` degC d after planting, as it was `delay` days ago, mol m-2, (days,)."""
+    light = np.cumsum(crop.drivers["light_sum"])
+    start = light[min(int(np.searchsorted(np.cumsum(crop.drivers["temperature"]), wait)), light.size - 1)]
+    lagged = np.concatenate([np.zeros(delay), light[: light.size - delay]])
+    return np.asarray(np.maximum(lagged - start, 0.0))
+
+
+def light_use(others: Sequence[Compartment], crop: Compartment) -> Floats:
+    """Return a harvest proportional to light: a constant kg per mol of the light that came after the first fruits set.
+
+    Three numbers are fitted on the others by least squares: the efficiency, the thermal time to the first harvest and
+    the delay from light to harvest.
+    """
+    best: tuple[float, float, float, int] | None = None
+    for wait in WAITS:
+        for delay in DELAYS:
+            light = np.concatenate([_light_since(other, wait, delay)[other.harvest_day] for other in others])
+            harvested = np.concatenate([other.harvested for other in others])
+            if not light.any():
+                continue
+            efficiency = float(light @ harvested / (light @ light))
+            error = float(((efficiency * light - harvested) ** 2).sum())
+            if best is None or error < best[0]:
+                best = (error, efficiency, wait, delay)
+    assert best is not None
+    return best[1] * _light_since(crop, best[2], best[3])
+
+
+DRIVERS = ("light_sum", "temperature", "crop_age")
+"""Not the stem density: with five crops to learn from, the sixth's lies outside what was seen."""
+
+
+def _stage_drivers(crop: Compartment) -> Floats:
+    age = np.arange(crop.day.size, dtype=np.float64)
+    columns = {**crop.drivers, "crop_age": age}
+    return np.stack([columns[name] for name in DRIVERS], axis=-1)
+
+
+def learned(others: Sequence[Compartment], crop: Compartment) -> Floats:
+    """Return the free run of a small daily harvest network (8 units) trained on the other compartments."""
+    days = min(other.day.size for other in (*others, crop))
+    drivers = np.stack([_stage_drivers(other)[:days] for other in others])
+    states = np.stack([other.cumulative()[:days, None] for other in others])
+    data = StageData(drivers, states, np.zeros(days), np.ones(states.shape[:2], dtype=bool))
+    shape = layout("harvest", ("fruit_fresh_weight",), DRIVERS, (10.0, 40.0), (8,), step=24.0)
+    plan = TrainingPlan(updates=((10, 300), (40, 300)), batch=64, learning_rate=1e-2, decay=0.1, start_share=0.2)
+    stage = train_stage(untrained(shape, data, 0), data, plan)
+    run = run_stage(stage, _stage_drivers(crop)[None], np.zeros(crop.day.size), np.zeros((1, 1)))
+    return np.asarray(run[0, :, 0])
+
+
+@lru_cache(maxsize=64)
+def _crop_run(light_sum: tuple[float, ...], temperature: tuple[float, ...]) -> tuple[float, ...]:
+    parameters = GreenhouseParameters()
+    shape = np.clip(np.sin((np.arange(24) - 4.0) / 16.0 * np.pi), 0.0, None)
+    shape = shape / shape.sum() * 1e6 / 3600.0
+    state = young_crop(parameters, 0.0)
+    harvested = []
+    for light_of_day, degrees in zip(light_sum, temperature, strict=True):
+        for hour in range(24):
+            area = leaf_area_index(parameters, state)
+            light = CANOPY_LIGHT * (1.0 - np.exp(-0.7 * area)) * light_of_day * shape[hour]
+            fixed = photosynthesis(np, parameters, light, ASSUMED_CO2, degrees, area)
+            fixed = fixed * assimilation_share(np, state) * 3600.0 * CARBOHYDRATE_PER_MOL
+            state = grow(np, parameters, state, rates(np, parameters, state, degrees), fixed, degrees, 3600.0)
+        state = deleaf(np, parameters, state)
+        harvested.append(float(state.harvested))
+    return tuple(harvested)
+
+
+def crop_run(crop: Compartment) -> Floats:
+    """Return carbohydrate harvested by the mechanistic crop, cumulative kg m-2, (days,).
+
+    The day's light comes as a half sine over 16 h, the temperature is the day's mean, leaves are picked daily.
+    """
+    return np.array(_crop_run(tuple(crop.drivers["light_sum"]), tuple(crop.drivers["temperature"])))
+
+
+def mechanistic(others: Sequence[Compartment], crop: Compartment) -> Floats:
+    """Return the mechanistic crop's harvest times one factor (fresh weight per carbohydrate) fitted on the others."""
+    modelled = np.concatenate([crop_run(other)[other.harvest_day] for other in others])
+    harvested = np.concatenate([other.harvested for other in others])
+    factor = float(modelled @ harvested / max(modelled @ modelled, 1e-12))
+    return factor * crop_run(crop)
+
+
+PREDICTORS: dict[str, Predictor] = {
+    "mean of the others": mean_of_others,
+    "light use": light_use,
+    "learned stage": learned,
+    "mechanistic crop": mechanistic,
+}
+
+
+@dataclass(frozen=True)
+class HarvestError:
+    """Errors of one predictor on one compartment that it had not seen, kg m-2."""
+
+    compartment: str
+    predictor: str
+    mean_absolute: float
+    """Of the cumulative harvest over the harvest days."""
+    season: float
+    """Predicted less measured at the last harvest."""
+    measured: float
+    """Measured total."""
+
+
+def leave_one_out(compartments: Sequence[Compartment]) -> list[HarvestError]:
+    """Return the errors of all predictors on each compartment, fitted on the others."""
+    errors = []
+    for crop in compartments:
+        others = [other for other in compartments if other is not crop]
+        for name, predictor in PREDICTORS.items():
+            miss = predictor(others, crop)[crop.harvest_day] - crop.harvested
+            errors.append(
+                HarvestError(crop.name, name, float(np.abs(miss).mean()), float(miss[-1]), float(crop.harvested[-1]))
+            )
+    return errors
+
+
+def as_text(title: str, errors: Sequence[HarvestError]) -> str:
+    """Return a table: compartments down, predictors across; mean absolute error and season's error in kg m-2."""
+    names = list(PREDICTORS)
+    rows = [
+        f"{title}: mean absolute error of the cumulative harvest (error of the season's total), kg m-2",
+        "| compartment | measured | " + " | ".join(names) + " |",
+        "|---" * (len(names) + 2) + "|",
+    ]
+    for crop in dict.fromkeys(error.compartment for error in errors):
+        mine = {error.predictor: error for error in errors if error.compartment == crop}
+        cells = [f"{mine[name].mean_absolute:.2f} ({mine[name].season:+.2f})" for name in names]
+        rows.append(f"| {crop} | {mine[names[0]].measured:.2f} | " + " | ".join(cells) + " |")
+    cells = []
+    for name in names:
+        mine_all = [error for error in errors if error.predictor == name]
+        absolute = np.mean([error.mean_absolute for error in mine_all])
+        cells.append(f"{absolute:.2f} ({np.mean([abs(error.season) for error in mine_all]):.2f} absolute)")
+    rows.append("| mean | | " + " | ".join(cells) + " |")
+    return "\n".join(rows)
+
+
+def run(
+    folder_2019: Path | None, folder_2018: Path | None, out: Path, report: Callable[[str], None] = print
+) -> dict[str, list[HarvestError]]:
+    """Print both tables and write harvests.json to `out`."""
+    results: dict[str, list[HarvestError]] = {}
+    if folder_2019 is not None:
+        results["agc2019, cherry tomato"] = leave_one_out(read_2019(folder_2019))
+    if folder_2018 is not None:
+        results["agc2018, cucumber"] = leave_one_out(read_2018(folder_2018))
+    for title, errors in results.items():
+        report(as_text(title, errors))
+    out.mkdir(parents=True, exist_ok=True)
+    content = {title: [asdict(error) for error in errors] for title, errors in results.items()}
+    (out / "harvests.json").write_text(json.dumps(content, indent=1))
+    return results
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Add the arguments of `reproduce harvests`."""
+    parser.add_argument("--agc2019", type=Path, help="folder of the second challenge")
+    parser.add_argument("--agc2018", type=Path, help="folder of the first challenge")
+    parser.add_argument("--out", type=Path, required=True, help="folder for harvests.json")
+
+
+def run_command(arguments: Namespace) -> None:
+    """Run `reproduce harvests`."""
+    run(arguments.agc2019, arguments.agc2018, arguments.out)
