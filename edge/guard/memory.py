@@ -55,6 +55,7 @@ def _note_point(memory: PointMemory, state: PointState) -> Entry:
         "held_until": None if memory.hand is None else memory.held_until,
         "ceiling": memory.ceiling,
         "floor": memory.floor,
+        "limited_until": memory.limited_until,
         "written": state.written,
         "written_at": state.written_at,
         "taken": state.taken,
@@ -72,6 +73,7 @@ def _recall_point(memory: PointMemory, entry: Entry, later: float, *, agree: boo
     if not agree:
         return
     memory.stands, memory.answers = _number(entry, "stands"), _number(entry, "answers")
+    memory.limited_until = _number(entry, "limited_until", math.inf) + later
     sent = entry.get("sent")
     for row in sent if isinstance(sent, list) else ():
         if isinstance(row, list) and len(row) == 4:

@@ -13,7 +13,7 @@ from igrow.edge.image import Quality, Value
 
 MOST_SENT = 4
 """Writes that are remembered until a reading shows them."""
-LATE = 900.0
+LATE = 120.0
 """Seconds for which a write that never showed may still be applied by a slow PLC."""
 
 

@@ -158,6 +158,8 @@ async def test_a_limit_of_the_plc_that_was_learned_is_known_after_a_restart():
     bench.restart()
     await bench.run(60)
     assert bench.plc.written("co2_setpoint") == [700.0]
+    await bench.run(720)
+    assert bench.plc.written("co2_setpoint") == [700.0, 700.0], "tried again as soon as a hand would no longer count"
     assert not bench.events("changed_by_hand")
 
 

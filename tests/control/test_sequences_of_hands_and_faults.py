@@ -44,7 +44,7 @@ class Hand:
     """The daemon has had a chance to see it."""
 
 
-@dataclass
+@dataclass(repr=False)
 class World:
     """A bench with what is really so."""
 
@@ -241,7 +241,7 @@ class World:
         await self.run(self.random.choice([1, 1, 2, 8]))
 
     async def all_is_well_in_the_end(self) -> None:
-        await self.run(round(RESPECT / 10.0) + 60)
+        await self.run(round(RESPECT / 10.0) + 40)
         for name, wish in self.wishes.items():
             expected = self.plc.makes.get(name, lambda same: same)(wish)
             assert abs(self.plc.values[name] - expected) <= self.rules[name].dead_band + 1e-9, (
@@ -286,7 +286,7 @@ def world_of(seed: int) -> World:
     return World(generator, bench, wishes, rules)
 
 
-async def play(seed: int, happenings: int = 12) -> World:
+async def play(seed: int, happenings: int = 8) -> World:
     """Play one sequence; AssertionError for a violation."""
     world = world_of(seed)
     await world.run(3)
@@ -304,9 +304,9 @@ def play_all(seeds: range) -> None:
             worlds.append(asyncio.run(play(seed)))
         except AssertionError as error:
             raise AssertionError(f"seed {seed}: {error}") from error
-    assert sum(world.written for world in worlds) > 10 * len(seeds)
-    assert sum(sum(map(len, world.made.values())) for world in worlds) > len(seeds)
-    assert sum(world.restored for world in worlds) > len(seeds) / 20
+    assert sum(world.written for world in worlds) > 8 * len(seeds)
+    assert sum(sum(map(len, world.made.values())) for world in worlds) > len(seeds) / 2
+    assert sum(world.restored for world in worlds) > len(seeds) / 40
 
 
 @pytest.fixture
