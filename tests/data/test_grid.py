@@ -106,6 +106,16 @@ def test_times_without_a_pace_are_read_on_a_grid_that_most_rows_reach(fine: Tele
     assert np.isfinite(log.telemetry["air_temperature"]).mean() > 0.7
 
 
+def test_rows_of_a_clock_that_was_not_set_are_set_aside_and_said(fine: Telemetry) -> None:
+    exact = every(fine, 5)
+    stray = np.datetime64("1970-01-01T00:00:00") + np.arange(3) * 5 * MINUTE
+    time = np.concatenate([stray, exact.time])
+    columns = {name: np.concatenate([values[:3], values]) for name, values in exact.columns.items()}
+    log = prepare_log(Telemetry(time, columns), SITE)
+    np.testing.assert_array_equal(log.telemetry.time, exact.time)
+    assert any("3 rows stand months away from all others (1970-01-01)" in note for note in log.notes)
+
+
 def test_an_interval_counts_from_half_of_its_rows() -> None:
     values = np.array([1.0, 3.0, 9.0, 9.0, 5.0, 0.0, 0.0, 0.0])
     counted = np.array([True, True, False, False, True, False, False, False])

@@ -94,3 +94,21 @@ def test_columns_of_one_name_are_told_apart(tmp_path: Path) -> None:
     mapping = 'time: {column: t}\ncolumns: {air_temperature: {column: T}, outdoor_temperature: {column: "T (2)"}}\n'
     telemetry = export(tmp_path, "t,T,T\n2020-01-01T00:00Z,20,5\n", mapping)
     assert (telemetry["air_temperature"][0], telemetry["outdoor_temperature"][0]) == (20.0, 5.0)
+
+
+@pytest.mark.parametrize("order", ["forwards", "backwards", "one reading a row"])
+def test_the_hour_that_happens_twice_is_told_by_the_order_of_rows(tmp_path: Path, order: str) -> None:
+    hours = np.datetime64("2020-10-25T00:00:00") + np.arange(8) * np.timedelta64(30, "m")
+    wall = ["02:00", "02:30", "02:00", "02:30", "03:00", "03:30", "04:00", "04:30"]
+    rows = [f"2020-10-25 {hour},{value}" for value, hour in enumerate(wall)]
+    columns = "columns: {air_temperature: {column: T}}\n"
+    header = "t,T"
+    if order == "backwards":
+        rows = rows[::-1]
+    if order == "one reading a row":
+        header, columns = "t,T,tag", "long: {name: tag, value: T}\ncolumns: {air_temperature: {column: a}}\n"
+        rows = [f"{row},{tag}" for row in rows for tag in ("a", "b")]
+    text = "\n".join([header, *rows]) + "\n"
+    telemetry = export(tmp_path, text, "time: {column: t, time_zone: Europe/Amsterdam}\n" + columns)
+    np.testing.assert_array_equal(telemetry.time, hours)
+    assert telemetry["air_temperature"].tolist() == list(range(8))

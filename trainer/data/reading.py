@@ -14,6 +14,7 @@ from igrow.trainer.data.grid import HOUR, on_grid, own_step
 from igrow.trainer.data.log import Log
 from igrow.trainer.data.open_source import open_source
 from igrow.trainer.data.plausibility import find_faults
+from igrow.trainer.data.rows import without_strays
 from igrow.trainer.data.screening import screen
 from igrow.trainer.data.source import Source
 
@@ -53,9 +54,9 @@ def prepare_log(telemetry: Telemetry, site: Site | None = None, *, name: str = "
 
 
 def _prepared(source: Source, site: Site | None, place: str, accept: Collection[str] = ()) -> Log:
-    telemetry = source.telemetry
-    if len(telemetry) == 0:
+    if len(source.telemetry) == 0:
         raise IgrowError(f"{source.name}: the log has no rows")
+    telemetry, strays = without_strays(source.telemetry)
     found = (*source.faults, *find_faults(telemetry, site))
     accepted = tuple(f"accepted although {fault.sentence}" for fault in found if fault.kind in accept)
     faults = [fault for fault in found if fault.kind not in accept]
@@ -66,7 +67,14 @@ def _prepared(source: Source, site: Site | None, place: str, accept: Collection[
     # What a wrong unit pushes out of range is no sensor's fault.
     wrong = {name for fault in faults for name in fault.quantity.split(", ")}
     faults += [fault for fault in screened.faults if fault.quantity not in wrong]
-    notes = [*source.notes, *accepted, *screened.notes, *_grid_notes(telemetry, table), *_unjudged(table, site)]
+    notes = [
+        *source.notes,
+        *strays,
+        *accepted,
+        *screened.notes,
+        *_grid_notes(telemetry, table),
+        *_unjudged(table, site),
+    ]
     return Log(
         source.name,
         table,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,8 @@ from igrow.trainer.data.fault import DataFault
 COMPARED = ("air_temperature", "outdoor_temperature", "air_humidity", "air_co2", "global_radiation")
 LARGEST_RATIO = 3.0
 """How much further than the next row a repeated row may lie, in medians of each, before it contradicts the first."""
+FAR_DAYS, FEW = 60, 0.01
+"""Rows so many days away from all others, and fewer than such a share of them, are a clock's mistake."""
 LEAST_REPEATED = 12
 """Rows that stand twice from which on a contradiction is judged."""
 
@@ -60,6 +63,27 @@ def merge(time: Times, columns: Mapping[str, Values]) -> Merged:
             seen = f"{repeated} rows have the time of another row, and {sentence}"
             faults.append(DataFault("repeated_times", "", seen, mend))
     return Merged(table, tuple(notes), tuple(faults))
+
+
+def without_strays(telemetry: Telemetry) -> tuple[Telemetry, tuple[str, ...]]:
+    """Return a log without the few rows that stand months away from all others, and a note on them.
+
+    A clock that was not set yet, or a misprint of the year, writes such rows.
+    """
+    if len(telemetry) < 3:
+        return telemetry, ()
+    far = np.flatnonzero(np.diff(telemetry.time).astype("timedelta64[D]").astype(np.int64) > FAR_DAYS)
+    edges = [0, *(int(row) + 1 for row in far), len(telemetry)]
+    parts = [(first, last) for first, last in pairwise(edges) if last - first > FEW * len(telemetry)]
+    kept = np.zeros(len(telemetry), dtype=bool)
+    for first, last in parts:
+        kept[first:last] = True
+    if kept.all():
+        return telemetry, ()
+    lost = telemetry.time[~kept]
+    when = ", ".join(dict.fromkeys(str(time.astype("datetime64[D]")) for time in lost[:5]))
+    table = Telemetry(telemetry.time[kept], {name: values[kept] for name, values in telemetry.columns.items()})
+    return table, (f"{len(lost)} rows stand months away from all others ({when}): set aside",)
 
 
 def _contradiction(time: Times, columns: Mapping[str, Values], table: Telemetry) -> str | None:

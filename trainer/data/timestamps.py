@@ -58,7 +58,21 @@ def to_utc(texts: Sequence[str], form: str, time_zone: str) -> tuple[Times, int 
             shifts[position] = np.timedelta64(int(offset.total_seconds()), "s")
             moment = moment.replace(tzinfo=None)
         local[position] = np.datetime64(moment, "s")
-    return (local - shifts if aware else from_local(local, time_zone)), None
+    return (local - shifts if aware else _of_wall(local, time_zone)), None
+
+
+def _of_wall(local: Times, time_zone: str) -> Times:
+    """Return UTC times of wall times in the order of a file: forwards or backwards, each time on one row or several.
+
+    In the hour that happens twice the order alone tells which is which.
+    """
+    if len(local) > 1 and (np.diff(local.astype(np.int64)) < 0).mean() > 0.5:
+        backwards: Times = _of_wall(local[::-1], time_zone)[::-1]
+        return backwards
+    new = np.ones(len(local), dtype=bool)
+    new[1:] = local[1:] != local[:-1]
+    times: Times = from_local(local[new], time_zone)[np.cumsum(new) - 1]
+    return times
 
 
 def _iso(text: str) -> datetime.datetime:
