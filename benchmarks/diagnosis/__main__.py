@@ -3,9 +3,11 @@
 `scoring` (the default) draws 208 cases, simulates their logs and those that the models are calibrated on, diagnoses
 each, and prints the table beside its bounds. `others` does the same with greenhouses that nothing was learned from,
 each with a model calibrated on its own first weeks; `transferred` diagnoses the same logs with the built-in bundle.
-`matched` does the like with greenhouses of the simulator's own structure; `real` diagnoses the public logs.
-`nuisance` learns anew what greenhouses show though nothing is missing, and `rules` fits the bounds that are fitted,
-both from seeds that no case has; `thresholds` prints all rules. Everything is made afresh: an hour or so on two cores.
+`matched` does the like with greenhouses of the simulator's own structure; `same` with greenhouses that have drifted a
+little since their calibration, and asks what has changed in them; `real` diagnoses the public logs. `nuisance` learns
+anew what greenhouses show though nothing is missing, and `rules` fits the bounds that are fitted, both from seeds that
+no case has; `thresholds` prints all rules. Everything is made afresh: an hour or so on two cores, most of it for
+simulated weeks.
 """
 
 from __future__ import annotations
@@ -17,14 +19,14 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from benchmarks.diagnosis import matched, nuisance, real, rules
+from benchmarks.diagnosis import matched, nuisance, real, rules, same
 from benchmarks.diagnosis.cases import SEASONS, Case, draw
 from benchmarks.diagnosis.greenhouses import of_seasons, others
 from benchmarks.diagnosis.logs import Reference, built_in, reference, simulate_cases
 from benchmarks.diagnosis.scoring import Outcome, judge, show, table
 from igrow.core.telemetry import Telemetry
 
-WHAT = ("scoring", "tuning", "others", "transferred", "matched", "nuisance", "rules", "thresholds", "real")
+WHAT = ("scoring", "tuning", "others", "transferred", "matched", "nuisance", "rules", "thresholds", "same", "real")
 OTHER_GREENHOUSES = 8
 SEASONS_USED = ("winter", "spring")
 
@@ -37,7 +39,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.diagnosis", description=__doc__)
     parser.add_argument("what", nargs="?", default="scoring", choices=WHAT)
     parser.add_argument("data", nargs="?", type=Path, help="folder of the public data sets, for `real`")
-    parser.add_argument("--cases", type=int, default=208)
+    parser.add_argument("--cases", type=int, help="default: 208; of `same` 60")
+    parser.add_argument("--greenhouses", type=int, default=11, help="of `same`: the usual one by season, then others")
+    parser.add_argument("--tuning", action="store_true", help="of `same`: greenhouses and seeds that rules are set on")
     parser.add_argument("--days", type=int, default=28)
     parser.add_argument("--season", action="append", choices=tuple(SEASONS), help="default: winter and spring")
     parser.add_argument("--seed", type=int, help="of the first case; earlier tables had others")
@@ -54,6 +58,9 @@ def main() -> int:
         return rules.main(options.processes)
     if options.what == "thresholds":
         return rules.show()
+    if options.what == "same":
+        return same.main(options)
+    count = options.cases or 208
     away = options.what in {"others", "transferred"}
     if away and options.season:
         parser.error("other greenhouses have seasons of their own: leave --season out")
@@ -69,7 +76,7 @@ def main() -> int:
             references[name] = one
             print(f"{len(references)} of {len(greenhouses)}: {name}", file=sys.stderr)
         units = {name: one.unit for name, one in references.items()}
-        cases = draw("scoring" if away else options.what, options.cases, units, options.seed)
+        cases = draw("scoring" if away else options.what, count, units, options.seed)
         own = {name: [case for case in cases if case.greenhouse == name] for name in greenhouses}
         print(f"simulating {len(cases)} logs", file=sys.stderr)
         simulated = pool.map(

@@ -83,12 +83,12 @@ def draw(kind: str, count: int, units: Mapping[str, Mapping[str, float]], seed: 
     process = [name for name, effect in EFFECTS.items() if effect.kind == "process"]
     sensor = [name for name, effect in EFFECTS.items() if effect.kind == "sensor"]
     turns = {
-        "single": _shuffled(rng, process),
-        "sensor": _shuffled(rng, sensor),
-        "withheld": _shuffled(rng, process),
-        "outside": _shuffled(rng, list(UNCATALOGUED)),
-        "pair": _shuffled(rng, process),
-        "onset": _shuffled(rng, [*process, *sensor]),
+        "single": Turn(rng, process),
+        "sensor": Turn(rng, sensor),
+        "withheld": Turn(rng, process),
+        "outside": Turn(rng, list(UNCATALOGUED)),
+        "pair": Turn(rng, process),
+        "onset": Turn(rng, [*process, *sensor]),
     }
     greenhouses = list(units)
     cases: list[Case] = []
@@ -97,9 +97,9 @@ def draw(kind: str, count: int, units: Mapping[str, Mapping[str, float]], seed: 
             greenhouse = greenhouses[index % len(greenhouses)]
             causes: tuple[str, ...] = ()
             if group != "nothing":
-                causes = (_next(turns[group], units[greenhouse], ()),)
+                causes = (turns[group].next(units[greenhouse], ()),)
             if group == "pair":
-                causes = (*causes, _next(turns["single" if index % 2 else "sensor"], units[greenhouse], causes))
+                causes = (*causes, turns["single" if index % 2 else "sensor"].next(units[greenhouse], causes))
             cases.append(
                 Case(
                     name=f"{kind}-{group}-{index:03d}",
@@ -153,17 +153,18 @@ def hidden(case: Case, unit: dict[str, float], start: np.datetime64) -> list[Hid
     return effects
 
 
-def _shuffled(rng: np.random.Generator, names: list[str]) -> list[str]:
-    order = list(names)
-    rng.shuffle(order)
-    return order
+class Turn:
+    """Causes in a random order, each as often as the others, as far as they can be seen."""
 
+    def __init__(self, rng: np.random.Generator, names: list[str]) -> None:
+        self._order = list(names)
+        rng.shuffle(self._order)
 
-def _next(turn: list[str], unit: Mapping[str, float], but: tuple[str, ...]) -> str:
-    """Take the next cause that can be seen in the greenhouse, and put it at the end of the line."""
-    for position, name in enumerate(turn):
-        definition = EFFECTS.get(name) or UNCATALOGUED[name]
-        if name not in but and REACHABLE * unit[name] <= abs(definition.amplitude.high):
-            turn.append(turn.pop(position))
-            return name
-    raise AssertionError("a greenhouse in which no cause can be seen")
+    def next(self, unit: Mapping[str, float], but: tuple[str, ...]) -> str:
+        """Take the next cause that can be seen in the greenhouse, and put it at the end of the line."""
+        for position, name in enumerate(self._order):
+            definition = EFFECTS.get(name) or UNCATALOGUED[name]
+            if name not in but and REACHABLE * unit[name] <= abs(definition.amplitude.high):
+                self._order.append(self._order.pop(position))
+                return name
+        raise AssertionError("a greenhouse in which no cause can be seen")

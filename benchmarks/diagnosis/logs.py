@@ -13,13 +13,14 @@ from igrow.core import sun
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.effects import EFFECTS
 from igrow.core.greenhouse import Disturbances, recipe, simulate_many
+from igrow.core.greenhouse.tomato import Crop
 from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
 from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import prepare_log
 from igrow.trainer.data.splits import split_days
-from igrow.trainer.diagnosis import freerun, sensitivity
+from igrow.trainer.diagnosis import freerun, history_of, sensitivity
 from igrow.trainer.exporting import read_model
 from igrow.trainer.fit import FittedModel, calibrate
 
@@ -35,6 +36,8 @@ class Reference:
     greenhouse: VirtualGreenhouse
     model: FittedModel
     unit: dict[str, float]
+    crop: Crop
+    """At the end of the log that it was calibrated on."""
 
 
 def reference(greenhouse: VirtualGreenhouse) -> Reference:
@@ -44,7 +47,9 @@ def reference(greenhouse: VirtualGreenhouse) -> Reference:
     (log,) = simulate_many(greenhouse.plant, weather, recipe, start, greenhouse.start, count=1, seed=greenhouse.seed)
     seen = prepare_log(log.measured, greenhouse.site)
     model = calibrate(seen)
-    return Reference(greenhouse, model, enr_units(seen.record(model.alignment or 0.0), model))
+    # Learned here whether or not it is asked by default.
+    model = replace(model, history=history_of(seen, model))
+    return Reference(greenhouse, model, enr_units(seen.record(model.alignment or 0.0), model), log.crop)
 
 
 def built_in(site: Site) -> FittedModel:
@@ -90,12 +95,13 @@ def simulate_cases(known: Reference, cases: Sequence[Case], days: int) -> list[T
         count=len(cases),
         seed=cases[0].seed,
         effects=[hidden(case, known.unit, start) for case in cases],
-        disturbances=[_disturbances(case) for case in cases],
+        disturbances=[disturbances(case) for case in cases],
     )
     return [one.measured for one in seasons]
 
 
-def _disturbances(case: Case) -> Disturbances:
+def disturbances(case: Case) -> Disturbances:
+    """Return what disturbs the greenhouse of a case."""
     usual = Disturbances(degrees_of_freedom=4.0 if case.heavy_tails else None)
     if not case.wrong_noise:
         return usual

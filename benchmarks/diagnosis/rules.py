@@ -32,8 +32,9 @@ from benchmarks.diagnosis.nuisance import (
 from benchmarks.provenance import provenance
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.diagnosis import DEFAULT, compare, linear, nuisance, rules, search
-from igrow.trainer.diagnosis.design import Design, disagreement
+from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.nuisance import Direction, LogLikelihood
+from igrow.trainer.diagnosis.structure import disagreement
 
 COMMAND = "python -m benchmarks.diagnosis rules"
 QUANTILES = {

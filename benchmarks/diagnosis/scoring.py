@@ -19,7 +19,7 @@ from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import prepare_log
-from igrow.trainer.diagnosis import DEFAULT, compare, diagnose, linear, sensitivity
+from igrow.trainer.diagnosis import DEFAULT, DecisionRules, compare, diagnose, linear, sensitivity
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.evidence import Evidence, errors_with
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
@@ -59,12 +59,12 @@ class Outcome:
     seconds: float
 
 
-def judge(case: Case, telemetry: Telemetry, reference: Reference) -> Outcome:
+def judge(case: Case, telemetry: Telemetry, reference: Reference, rules: DecisionRules = DEFAULT) -> Outcome:
     """Diagnose one case and compare with the truth."""
     begun = time.perf_counter()
     site = reference.greenhouse.site
     log = prepare_log(telemetry, site)
-    diagnosis = diagnose(log, reference.model, without=case.without)
+    diagnosis = diagnose(log, reference.model, without=case.without, rules=rules)
     evidence = diagnosis.evidence
     seconds = time.perf_counter() - begun
     causes = [one for one in diagnosis.findings if one.kind != "discrepancy"]

@@ -42,6 +42,8 @@ class Season:
     true: Telemetry
     resources: Mapping[str, NDArray[np.float64]] = field(repr=False)
     """Cumulative at each row: heat MJ m-2, electricity kWh m-2, co2 kg m-2, irrigation and drain L m-2."""
+    crop: Crop = field(repr=False)
+    """At the last row: where a later season of the same greenhouse begins; in a batch each value is an array (1,)."""
 
     def total(self, name: str) -> float:
         """Return the season's use of one resource."""
@@ -190,9 +192,16 @@ def _run(plant: Plant, schedule: Schedule, end: np.datetime64, step: int) -> lis
             measured=_table(times, logs["measured"], column),
             true=_table(times, logs["true"], column),
             resources={name: values[:, column].copy() for name, values in logs["resources"].items()},
+            crop=_one_crop(plant, column),
         )
         for column in range(count)
     ]
+
+
+def _one_crop(plant: Plant, column: int) -> Crop:
+    if plant.count is None:
+        return plant.state.crop
+    return Crop(*(np.asarray(part)[..., column : column + 1].copy() for part in plant.state.crop))
 
 
 def _table(times: NDArray[Any], log: Mapping[str, NDArray[np.float64]], column: int) -> Telemetry:

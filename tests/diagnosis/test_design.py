@@ -11,9 +11,10 @@ from igrow.trainer.data import Log
 from igrow.trainer.data.splits import split_days
 from igrow.trainer.diagnosis import recalibration
 from igrow.trainer.diagnosis.candidates import Candidate
-from igrow.trainer.diagnosis.design import Design, disagreement, prepare
+from igrow.trainer.diagnosis.design import Design, prepare
 from igrow.trainer.diagnosis.knowledge import knowledge_of
 from igrow.trainer.diagnosis.rules import DEFAULT, HOUR
+from igrow.trainer.diagnosis.structure import disagreement
 from tests.diagnosis.conftest import model_in_force
 from tests.diagnosis.synthetic_design import make_design
 from tests.virtual_log import SITE

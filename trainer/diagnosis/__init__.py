@@ -10,7 +10,7 @@ blocks), `search` (a scan of all candidates), `compare` (the best of them beside
 every threshold, `nuisance` what greenhouses show though nothing is missing. docs/method.md tells why.
 """
 
-from igrow.trainer.diagnosis.diagnose import diagnose, discrepancy_of
+from igrow.trainer.diagnosis.diagnose import diagnose, discrepancy_of, history_of
 from igrow.trainer.diagnosis.nuisance import NuisanceSubspace, read_nuisance
 from igrow.trainer.diagnosis.result import EXIT_CODES, Diagnosis, Finding
 from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules, read_rules
@@ -24,6 +24,7 @@ __all__ = [
     "NuisanceSubspace",
     "diagnose",
     "discrepancy_of",
+    "history_of",
     "read_nuisance",
     "read_rules",
 ]

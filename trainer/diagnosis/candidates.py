@@ -55,7 +55,7 @@ UNIT_FLUX: Mapping[str, float] = {
     "light_loss": 0.1,
 }
 """Size of one unit of a pattern in each channel: W m-2, kg m-2 s-1, kg m-2 s-1, m s-1, 1."""
-_WEEKDAYS = ("Monday", "Tuesday", "Wednesday", "Thursday", "Friday", "Saturday", "Sunday")
+WEEKDAYS = ("Monday", "Tuesday", "Wednesday", "Thursday", "Friday", "Saturday", "Sunday")
 _VISIBLE = 1e-9
 """Sensitivity below which a log shows nothing of a candidate."""
 _PATTERN_DIFFERENCE = 0.1
@@ -164,7 +164,7 @@ def patterns(record: Record, longitude: float) -> list[tuple[str, tuple[str, ...
         if (first, last) in {(5, 9), (7, 16), (11, 14)}:
             table.append((f"{text} on working days", ("hour", "weekday"), window(first, last) * working))
     table.append(("working days", ("weekday",), working))
-    for index, name in enumerate(_WEEKDAYS):
+    for index, name in enumerate(WEEKDAYS):
         for first, last in ((0, 6), (6, 10), (10, 14), (14, 19), (19, 24)):
             course: Floats = window(first, last) * (weekday == index).astype(np.float64)
             table.append((f"{first:02d} to {last:02d} h on {name}s", ("hour", "weekday"), course))

@@ -103,7 +103,7 @@ def profile(design: Design, model: LinearModel, start: Whitening | None = None) 
     """
     day, days = design.line.runs.day, design.split.days
     stack = np.concatenate(
-        [design.values[[RESIDUAL, *model.base]], *(_column(design, one)[None] for one in model.terms)]
+        [design.values[[RESIDUAL, *model.base]], *(search.column_of(design, one)[None] for one in model.terms)]
     )
     size = len(model.base)
     terms = tuple(Term(size + 1 + index) for index in range(len(model.terms)))
@@ -114,7 +114,7 @@ def profile(design: Design, model: LinearModel, start: Whitening | None = None) 
         fitted = linear.fit(DailyGrams(products, design.split.fit), own)
         coefficients = fitted.solution.coefficients
         errors = np.tensordot(np.concatenate([[1.0], coefficients]), stack, axes=1)
-        whitening = noise.fit_noise(errors, design.observed, design.fitted, whitening)
+        whitening = design.fit_noise(errors, whitening)
     likelihood = np.where(design.observed, noise.log_likelihood(whitening, errors), 0.0).sum(axis=1)
     by_day = np.zeros(days)
     np.add.at(by_day, day, likelihood)
@@ -229,14 +229,3 @@ def _patterns(design: Design, first: Contender, growth: float, rng: np.random.Ge
         current = linear.fit(design.grams, current.model.with_term(passed[0].term))
     amplitudes = current.amplitudes[before:]
     return tuple(replace(one, amplitude=float(amplitude)) for one, amplitude in zip(found, amplitudes, strict=True))
-
-
-def _column(design: Design, term: Term) -> Floats:
-    """Return the column of a term from its beginning on, (b, r, intervals)."""
-    column: Floats = design.values[term.column]
-    if term.onset is None:
-        return column
-    if term.ageing is not None:
-        column = column - term.onset * design.values[term.ageing]
-    begun: Floats = np.where((design.line.runs.day >= term.onset)[None, :, None], column, 0.0)
-    return begun

@@ -108,7 +108,8 @@ def correct(
             continue
         judged = _judged(log, one, current, trial)
         estimates.append(judged)
-        if stands(judged, kept, rules):
+        proven = is_proven_change if knowledge.history else stands
+        if proven(judged, kept, rules):
             kept.append(judged)
             current = trial
     if patterns:
@@ -133,6 +134,19 @@ def stands(one: Estimated, kept: Sequence[Estimated], rules: DecisionRules) -> b
         and one.bootstrap_p <= rules.further_bootstrap_p
         and one.gain >= rules.further_gain_share * sum(other.gain for other in kept)
     )
+
+
+def is_proven_change(one: Estimated, kept: Sequence[Estimated], rules: DecisionRules) -> bool:
+    """Tell whether a change stands, if only by making unseen days likelier; one beside others must do more.
+
+    Skill alone is too much to ask: over a day parameters within their drift can stand in for a change that single
+    steps show.
+    """
+    if stands(one, kept, rules):
+        return True
+    large = one.effect_to_noise >= rules.least_effect_to_noise and same_in_all_regimes(one.regimes, rules)
+    likelier = one.bootstrap_p <= rules.further_bootstrap_p
+    return large and likelier and one.gain >= rules.further_gain_share * sum(other.gain for other in kept)
 
 
 def same_in_all_regimes(regimes: Mapping[str, Interval], rules: DecisionRules) -> bool:

@@ -24,18 +24,38 @@ from igrow.core.arrays import Floats, Integers, Mask
 from igrow.core.simulator.hybrid.climate import ActiveEffects
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.data.splits import DaySplit
-from igrow.trainer.diagnosis import candidates, linear, sensitivity
+from igrow.trainer.diagnosis import candidates, linear, noise, sensitivity
 from igrow.trainer.diagnosis.candidates import Candidate, Pattern
 from igrow.trainer.diagnosis.knowledge import drift
 from igrow.trainer.diagnosis.linear import DailyGrams, LinearModel
-from igrow.trainer.diagnosis.noise import Whitening
+from igrow.trainer.diagnosis.noise import NoiseFilter, Whitening
 from igrow.trainer.diagnosis.recalibration import averaging, recalibrate
 from igrow.trainer.diagnosis.rules import HOUR, DecisionRules
 from igrow.trainer.diagnosis.sensitivity import Linearisation
 from igrow.trainer.fit.gaussian import Gaussian
 
+Part = tuple[str, Sequence[str], Floats, Floats, Floats | None]
+"""Name, labels, columns, and mean and precision of a block."""
 NULL = ("parameter", "discrepancy", "nuisance", "drift")
 """Blocks of the model under which nothing is missing."""
+JOINT = ("parameter", "effect", "pattern")
+"""The same where the greenhouse's history is known: whatever may be missing was there to some extent before."""
+
+
+@dataclass(frozen=True)
+class History:
+    """What is known of a greenhouse from its calibration, as a log shows it."""
+
+    amplitudes: Gaussian
+    """Of parameters, effects and patterns, in this order, beyond what is expected of them."""
+    misfit: Floats
+    """What the model is expected to miss: added to the errors, (b, r, intervals)."""
+    filters: tuple[NoiseFilter, ...]
+    """The colour of the noise, by balance at hand; empty where it is to be learned."""
+    own_gains: Mapping[str, float]
+    """Of effects and patterns in windows of the calibration log."""
+    without: frozenset[str] = frozenset()
+    """Effects that are no candidates, though they may have been there before."""
 
 
 @dataclass(frozen=True)
@@ -82,6 +102,8 @@ class Design:
     untestable: tuple[str, ...]
     usual_size: Mapping[str, float]
     """Amplitude, by effect, that a log with nothing missing usually shows."""
+    history: History | None = None
+    """What is known of this very greenhouse from its calibration; None: greenhouses in general stand in."""
 
     def block(self, name: str) -> Block:
         """Return a block by name.
@@ -103,6 +125,10 @@ class Design:
 
     def null_model(self) -> LinearModel:
         """Return the model under which nothing is missing."""
+        if self.history is not None:
+            joint = self.history.amplitudes
+            columns = tuple(column for name in JOINT for column in self.blocks[name].columns)
+            return LinearModel(columns, joint.precision, joint.mean)
         blocks = [self.blocks[name] for name in NULL]
         size = sum(len(block) for block in blocks)
         precision, first = np.zeros((size, size)), 0
@@ -122,13 +148,29 @@ class Design:
     @property
     def transferred(self) -> bool:
         """What the model misses of this greenhouse when all is well is not known."""
-        return len(self.blocks["discrepancy"]) == 0
+        return self.history is None and len(self.blocks["discrepancy"]) == 0
+
+    @property
+    def onset_price(self) -> float:
+        """Gain that a beginning within the log must add."""
+        return self.rules.onset_price if self.history is None else self.rules.change_onset_price
 
     @property
     def fitted(self) -> Mask:
         """Runs on days for fitting, (r, 1)."""
         runs: Mask = self.split.fit[self.line.runs.day][:, None]
         return runs
+
+    def fit_noise(self, errors: Floats, start: Whitening | None = None) -> Whitening:
+        """Fit the noise that a model leaves on the fit days: its scale alone where its colour is known.
+
+        Args:
+            errors: (b, r, intervals).
+            start: where to begin with the colour.
+        """
+        if self.history is not None and self.history.filters:
+            return noise.rescaled(self.history.filters, errors, self.observed, self.fitted)
+        return noise.fit_noise(errors, self.observed, self.fitted, start)
 
     def whitened(self, whitening: Whitening) -> Design:
         """Return the design as another noise shows it."""
@@ -179,7 +221,7 @@ def prepare(
     stand = np.array([line.parameters[name] for name in prior.names])
     none, effect_keys = np.zeros(0), tuple(one.key for one in found.candidates)
     spread = rules.discrepancy_spread
-    parts: list[tuple[str, Sequence[str], Floats, Floats, Floats | None]] = [
+    parts: list[Part] = [
         ("residual", ("residual",), line.errors[None], none, None),
         ("parameter", prior.names, slopes, prior.mean - stand, prior.precision),
         ("effect", effect_keys, found.columns, none, None),
@@ -190,11 +232,6 @@ def prepare(
         ("nuisance", list(map(str, range(len(nuisance)))), nuisance, np.zeros(len(nuisance)), np.eye(len(nuisance))),
         ("drift", prior.names[: len(drifting)], drifting, np.zeros(len(drifting)), np.eye(len(drifting))),
     ]
-    blocks: dict[str, Block] = {}
-    place = 0
-    for name, labels, columns, mean, precision in parts:
-        blocks[name] = Block(tuple(labels), range(place, place + len(columns)), mean, precision)
-        place += len(columns)
     values = np.concatenate([average(columns) for _, _, columns, _, _ in parts])
     products = linear.daily_products(whitening(values), runs.day, split.days)
     return Design(
@@ -203,7 +240,7 @@ def prepare(
         prior=prior,
         rules=rules,
         interval=interval,
-        blocks=blocks,
+        blocks=blocks_of(parts),
         values=values,
         observed=average.observed,
         whitening=whitening,
@@ -213,6 +250,16 @@ def prepare(
         untestable=found.untestable,
         usual_size=usual_size or {},
     )
+
+
+def blocks_of(parts: Sequence[Part]) -> dict[str, Block]:
+    """Return the blocks of columns that stand one after the other."""
+    blocks: dict[str, Block] = {}
+    place = 0
+    for name, labels, columns, mean, precision in parts:
+        blocks[name] = Block(tuple(labels), range(place, place + len(columns)), mean, precision)
+        place += len(columns)
+    return blocks
 
 
 def _combined(line: Linearisation, longitude: float, lists: Sequence[Mapping[str, float]]) -> Floats:
@@ -241,34 +288,3 @@ def _drifting(slopes: Floats, prior: Gaussian, day: Integers, rules: DecisionRul
     size = drift(prior.values, rules.parameter_drift, rules)
     drifting: Floats = slopes * size[:, None, None, None] * course[:, None]
     return drifting
-
-
-def disagreement(hours: Design, steps: Design) -> float:
-    """Return how far parameters fitted to hours and to time steps lie apart, over what chance makes.
-
-    Where the model's structure is the greenhouse's, both agree within their doubt; where masses are missing that answer
-    within the hour, the fast errors pull the parameters elsewhere. The specification test of Hausman (1978,
-    Econometrica 46, 1251-1271): the difference of both estimates against the difference of their covariances; mean
-    squared over the directions in which the time steps tell more, infinite where nothing tells.
-
-    Args:
-        hours: the log with errors averaged to hours.
-        steps: the same log with errors time step by time step.
-    """
-    slow, slow_covariance = _parameters(hours)
-    fast, fast_covariance = _parameters(steps)
-    gained, directions = np.linalg.eigh(slow_covariance - fast_covariance)
-    told = gained > hours.rules.least_gained_variance
-    if not told.any():
-        return float("inf")
-    apart = directions.T @ (slow - fast)
-    return float(np.mean(apart[told] ** 2 / gained[told]))
-
-
-def _parameters(design: Design) -> tuple[Floats, Floats]:
-    """Return the fitted parameters and their covariance, in prior standard deviations, (p,) and (p, p)."""
-    fitted = linear.fit(design.grams, design.null_model()).solution
-    count, spread = len(design.block("parameter")), design.prior.standard_deviation
-    stand = np.array([design.line.parameters[name] for name in design.prior.names])
-    covariance = fitted.inverse[:count, :count] / np.outer(spread, spread)
-    return (stand + fitted.coefficients[:count]) / spread, covariance

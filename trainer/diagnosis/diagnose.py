@@ -12,15 +12,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from igrow.core.arrays import Floats
 from igrow.core.effects import EFFECTS
 from igrow.core.errors import IgrowError
 from igrow.core.site import Site
 from igrow.trainer.data.log import Log
 from igrow.trainer.data.splits import split_days
-from igrow.trainer.diagnosis import freerun, sensitivity, wording
+from igrow.trainer.diagnosis import freerun, history, sensitivity, wording
+from igrow.trainer.diagnosis.change import changed
 from igrow.trainer.diagnosis.compare import Round, compare
 from igrow.trainer.diagnosis.correction import Corrected, LogDays, correct, corrected_model
-from igrow.trainer.diagnosis.design import Design, disagreement, prepare
+from igrow.trainer.diagnosis.design import Design, prepare
 from igrow.trainer.diagnosis.estimate import Estimated, estimate, with_refitted, within_bounds
 from igrow.trainer.diagnosis.evidence import Evidence
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, activate, knowledge_of
@@ -28,6 +30,10 @@ from igrow.trainer.diagnosis.nuisance import NuisanceSubspace, learn_discrepancy
 from igrow.trainer.diagnosis.refit import are_identifiable, refit
 from igrow.trainer.diagnosis.result import Diagnosis, Finding, Verdict
 from igrow.trainer.diagnosis.rules import DEFAULT, HOUR, DecisionRules
+from igrow.trainer.diagnosis.structure import disagreement
+from igrow.trainer.fit.climate import site_prior
+from igrow.trainer.fit.discrepancy import Discrepancy
+from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.model import FittedModel
 from igrow.trainer.fit.solver import DivergenceError
 
@@ -68,7 +74,7 @@ def diagnose(
     log.require("a diagnosis", rules.least_days)
     knowledge = knowledge_of(model, site, rules)
     days = log_days(log, model)
-    search = _Search(days, site, knowledge, frozenset(without), rules, nuisance or read_nuisance())
+    search = _search(days, site, model, knowledge, frozenset(without), rules, nuisance)
     first, last, found = search.run(np.random.default_rng(seed))
     result = correct(days, knowledge, found, last.patterns, site.longitude, rules)
     verdict, findings = _verdict(result.kept, last, rules)
@@ -106,6 +112,12 @@ def discrepancy_of(log: Log, model: FittedModel, rules: DecisionRules = DEFAULT)
     return learn_discrepancy(design)
 
 
+def history_of(log: Log, model: FittedModel, rules: DecisionRules = DEFAULT) -> Discrepancy:
+    """Return the same with its doubt and the colour of its noise, for `FittedModel.history`; raises as above does."""
+    record = log_days(log, model).record
+    return history.learn(record, log.known_site, model.posterior, rules)
+
+
 def log_days(log: Log, model: FittedModel) -> LogDays:
     """Return the record of a log as a model reads it, split into days, with its runs."""
     shift = log.best_shift(model.posterior.values) if model.alignment is None else model.alignment
@@ -136,7 +148,7 @@ class _Search:
         found: list[Estimated] = []
         while True:
             explained = sum(one.gain for one in found)
-            judged = compare(design, explained, rng, causes=len(found) < self.rules.most_causes)
+            judged = self.judge(design, explained, rng, causes=len(found) < self.rules.most_causes)
             first = first or judged
             new = estimate(judged, rng)
             terms = [] if new is None else self.refitted(judged, [*found, new])
@@ -148,6 +160,10 @@ class _Search:
                 # No cause: the log itself stayed within all bounds.
                 return first, judged, found
             found = terms
+
+    def judge(self, design: Design, explained: float, rng: np.random.Generator, *, causes: bool) -> Round:
+        """Return what one round finds."""
+        return compare(design, explained, rng, causes=causes)
 
     def design(self, terms: Sequence[ActiveTerm], interval: float) -> Design:
         """Return the design of a model with terms; what usually differs stands in where its structure does not."""
@@ -185,6 +201,60 @@ class _Search:
         better = [with_refitted(one, two, self.rules) for one, two in zip(causes, found, strict=True)]
         stands = all(one.term.amplitude != 0.0 for one in better) and all(map(_is_inside, better[1:]))
         return better if stands and (len(found) == 1 or are_identifiable(found)) else []
+
+
+@dataclass(frozen=True)
+class _Change(_Search):
+    """The same in a greenhouse whose history is known: what has changed in it since."""
+
+    history: Discrepancy
+    plain: Design
+    """The log without any cause, before any noise."""
+    misfit: Floats
+    """What the model is expected to miss in this log."""
+
+    def judge(self, design: Design, explained: float, rng: np.random.Generator, *, causes: bool) -> Round:
+        """Return what one round finds."""
+        return changed(design, explained, rng, causes=causes)
+
+    def design(self, terms: Sequence[ActiveTerm], interval: float) -> Design:
+        """Return the design of a model with terms, about the calibrated parameters."""
+        plain = _laid_out(self.days, self.site, self.history, terms, self.rules) if terms else self.plain
+        return history.expected(self.history, plain, self.misfit, self.without)
+
+    def resolved(self) -> Design:
+        """Return the first design: by the steps that the history was learned from."""
+        return self.design(self.knowledge.terms, self.days.record.step)
+
+
+def _search(
+    days: LogDays,
+    site: Site,
+    model: FittedModel,
+    knowledge: Knowledge,
+    without: frozenset[str],
+    rules: DecisionRules,
+    nuisance: NuisanceSubspace | None,
+) -> _Search:
+    """Return the search that fits what is known: of changes where the greenhouse's history applies to the log."""
+    common = (days, site, knowledge, without, rules, nuisance or read_nuisance())
+    known = model.history
+    if not rules.history or known is None or model.calibrated_on != site.name:
+        return _Search(*common)
+    plain = _laid_out(days, site, known, (), rules)
+    if not history.applies(known, plain):
+        return _Search(*common)
+    return _Change(*common, known, plain, history.expected_misfit(known, plain))
+
+
+def _laid_out(
+    days: LogDays, site: Site, known: Discrepancy, terms: Sequence[ActiveTerm], rules: DecisionRules
+) -> Design:
+    """Return the design of a log about the parameters of the calibration, before any noise."""
+    names = tuple(known.parameters)
+    spread = site_prior(site).marginal(names).covariance
+    about = Gaussian(names, np.array(list(known.parameters.values())), spread)
+    return history.lay_out(days.record, days.split, about, activate(days.record, terms), site.longitude, rules)
 
 
 def _is_inside(one: Estimated) -> bool:

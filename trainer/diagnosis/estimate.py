@@ -122,7 +122,8 @@ def _rivals(
     margin = max(design.rules.rival_gain, design.rules.rival_share * gain)
     onsets = search.onset_days(design) if hypothesis.term.onset is not None else [None]
     scored = search.score_candidates(design, null, onsets, rng)
-    as_good = [one.effect for one in scored if one.gain >= gain - margin]
+    hidden = frozenset[str]() if design.history is None else design.history.without
+    as_good = [one.effect for one in scored if one.gain >= gain - margin and one.effect not in hidden]
     return (hypothesis.effect, *(name for name in as_good if name != hypothesis.effect))
 
 

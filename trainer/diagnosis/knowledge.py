@@ -26,6 +26,12 @@ from igrow.trainer.fit.model import FittedModel
 PARAMETER_PREFIX = "parameter:"
 """Key of a parameter's shift in a discrepancy: what short errors of the calibration log say beside the long ones."""
 
+CROP = frozenset({
+    "transpiration_radiation", "transpiration_deficit", "transpiration_night_share", "crop_long_wave_loss",
+    "assimilation_maximum", "assimilation_light", "assimilation_co2", "respiration",
+})  # fmt: skip
+"""Parameters that change as the crop does."""
+
 
 @dataclass(frozen=True)
 class ActiveTerm:
@@ -54,6 +60,8 @@ class Knowledge:
     """Empty for a transferred model."""
     transferred: bool
     """What the model misses of this greenhouse when all is well is not known."""
+    history: bool = False
+    """It is known with its doubt: causes are changes since the calibration."""
 
 
 def knowledge_of(model: FittedModel, site: Site, rules: DecisionRules) -> Knowledge:
@@ -63,12 +71,14 @@ def knowledge_of(model: FittedModel, site: Site, rules: DecisionRules) -> Knowle
     discrepancy = model.discrepancy if at_home else {}
     if not at_home:
         posterior = posterior.widened(drift(posterior.values, rules.transferred_drift, rules))
-    prior = posterior.widened(drift(posterior.values, rules.parameter_drift, rules))
+    known = at_home and rules.history and model.history is not None
+    change = home_drift if known else general_drift
+    prior = posterior.widened(change(posterior.values, rules))
     low, high = bounds(prior.names)
     shift = np.array([discrepancy.get(PARAMETER_PREFIX + name, 0.0) for name in prior.names])
     centred = prior.moved(np.clip(prior.mean + shift, low, high))
     terms = tuple(active_term(one) for one in model.effects if one.name in EFFECTS)
-    return Knowledge(model.posterior, prior, centred, terms, discrepancy, not discrepancy)
+    return Knowledge(model.posterior, prior, centred, terms, discrepancy, not discrepancy, known)
 
 
 def active_term(record: EffectRecord) -> ActiveTerm:
@@ -85,6 +95,18 @@ def drift(mean: Mapping[str, float], share: float, rules: DecisionRules) -> Floa
     return np.array(
         [share * max(abs(value), rules.least_drift_share * abs(PARAMETERS[name].value)) for name, value in mean.items()]
     )
+
+
+def general_drift(mean: Mapping[str, float], rules: DecisionRules) -> Floats:
+    """Return the change to expect of every parameter where little is known of the greenhouse, (p,)."""
+    return drift(mean, rules.parameter_drift, rules)
+
+
+def home_drift(mean: Mapping[str, float], rules: DecisionRules) -> Floats:
+    """Return the change to expect of every parameter of a greenhouse since its calibration, (p,): the crop grows."""
+    share = np.array([rules.crop_drift if name in CROP else rules.wall_drift for name in mean])
+    changes: Floats = share * drift(mean, 1.0, rules)
+    return changes
 
 
 def clipped(names: Sequence[str], values: Floats) -> dict[str, float]:

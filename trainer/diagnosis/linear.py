@@ -64,19 +64,21 @@ class DailyGrams:
     def of(self, base: Sequence[int], terms: Sequence[Term]) -> Floats:
         """Return the products of [residual, base columns, terms], (days, p, p)."""
         plain = [RESIDUAL, *base]
-        if all(term.onset is None for term in terms):
-            chosen = np.array(plain + [term.column for term in terms])
-            picked: Floats = self.products[:, chosen[:, None], chosen[None, :]]
-            return picked
+        # An ageing column is carried along, taken off its term, and dropped.
+        carried = [term.ageing for term in terms if term.ageing is not None]
+        chosen = np.array([*plain, *(term.column for term in terms), *carried])
+        picked: Floats = self.products[:, chosen[:, None], chosen[None, :]]
         size = len(plain) + len(terms)
-        transform = np.zeros((self.days, self.products.shape[1], size))
-        transform[:, plain, np.arange(len(plain))] = 1.0
+        shift = size
         for position, term in enumerate(terms, start=len(plain)):
             first = term.onset or 0
-            transform[first:, term.column, position] = 1.0
             if term.ageing is not None:
-                transform[first:, term.ageing, position] = -float(first)
-        joined: Floats = np.matmul(transform.transpose(0, 2, 1), np.matmul(self.products, transform))
+                picked[:, position] -= first * picked[:, shift]
+                picked[:, :, position] -= first * picked[:, :, shift]
+                shift += 1
+            picked[:first, position] = 0.0
+            picked[:first, :, position] = 0.0
+        joined: Floats = picked[:, :size, :size]
         return joined
 
 

@@ -130,6 +130,18 @@ def fit_noise(errors: Floats, observed: Mask, fitted: Mask, start: Whitening | N
     return extend(whitening, errors, observed)
 
 
+def rescaled(filters: tuple[NoiseFilter, ...], errors: Floats, observed: Mask, fitted: Mask) -> Whitening:
+    """Return the whitening of known colour: covariance and weights alone are fitted; arguments as in `fit_noise`."""
+    errors = errors * observed
+    return extend(fit_whitening(errors, observed & fitted, filters), errors, observed)
+
+
+def filter_of(raw: tuple[float, ...]) -> NoiseFilter:
+    """Return the filter of raw coefficients."""
+    numerator, denominator, poles = _coefficients(np.asarray(raw), len(raw) // 2)
+    return NoiseFilter(numerator, denominator, poles, raw)
+
+
 def log_likelihood(whitening: Whitening, errors: Floats) -> Floats:
     """Return the log-likelihood of every sample under Student's t but for a constant, (r, steps).
 

@@ -16,7 +16,7 @@ from scipy.linalg import block_diag
 
 from igrow.core.arrays import Floats, Mask
 from igrow.core.effects import EFFECTS
-from igrow.trainer.diagnosis import noise, sensitivity
+from igrow.trainer.diagnosis import sensitivity
 from igrow.trainer.diagnosis.design import NULL, Design
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, activate, clipped
 from igrow.trainer.diagnosis.linear import Fit
@@ -140,6 +140,8 @@ def refit(design: Design, named: Fit, terms: Sequence[ActiveTerm], before: Seque
     average = averaging(design.line, design.interval, rules)
     background = np.concatenate([design.values[design.block(name).columns] for name in NULL[1:]])
     size, other = len(prior.names), len(background)
+    # What is known of the greenhouse is held at its mean: left free it would take its share of the terms.
+    misfit = np.zeros_like(design.values[0]) if design.history is None else design.history.misfit
     # Where the search left off.
     point = unknowns.prior.mean.copy()
     point[: size + other] = named.solution.coefficients[: size + other]
@@ -149,13 +151,13 @@ def refit(design: Design, named: Fit, terms: Sequence[ActiveTerm], before: Seque
     for _ in range(rules.refit_rounds):
         # The noise is fitted about the model as it now stands.
         errors = average(unknowns.line(point).errors[None])[0]
-        errors = errors + np.tensordot(point[size : size + other], background, axes=1)
-        whitening = noise.fit_noise(errors, average.observed, design.fitted, whitening)
+        errors = errors + misfit + np.tensordot(point[size : size + other], background, axes=1)
+        whitening = design.fit_noise(errors, whitening)
         view = _View(whitening, average, design.fitted)
 
         def residuals(point: Floats, view: _View = view) -> Floats:
             plain = average(unknowns.line(point).errors[None])
-            return view.flat(plain + np.tensordot(point[size : size + other], background, axes=1))[:, 0]
+            return view.flat(plain + np.tensordot(point[size : size + other], background, axes=1) + misfit)[:, 0]
 
         def jacobian(point: Floats, view: _View = view) -> Floats:
             slopes = average(unknowns.slopes(point))

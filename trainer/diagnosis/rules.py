@@ -1,4 +1,4 @@
-"""Every threshold of a diagnosis: what it means, and whether it was chosen or fitted, and by which command.
+"""Every threshold of a diagnosis: what it means, and whether it was chosen, set on tuning logs, or fitted by a command.
 
 Choices stand here. Bounds that were fitted to tuning logs have no value here: they come from `learned/rules.json`,
 which the command that fits them writes together with where they come from.
@@ -23,6 +23,10 @@ def _chosen(value: float, meaning: str) -> Any:
     return field(default=value, metadata={"meaning": meaning, "set": "chosen"})
 
 
+def _tuned(value: float, meaning: str) -> Any:
+    return field(default=value, metadata={"meaning": meaning, "set": "set on tuning greenhouses"})
+
+
 def _fitted(meaning: str) -> Any:
     return field(metadata={"meaning": meaning, "set": "fitted"})
 
@@ -44,6 +48,24 @@ class DecisionRules:
     discrepancy_spread: float = _chosen(0.3, "relative change of the model discrepancy from the calibration to a log")
     discrepancy_effect_ridge: float = _chosen(0.7, "prior deviation of an effect in it, in typical amplitudes")
     discrepancy_pattern_ridge: float = _chosen(0.15, "prior deviation of a pattern in it, in its units")
+
+    # What has changed since the calibration, where what the model misses of this greenhouse was learned then.
+    # Off: in a season that it was not set on, three of twelve logs with nothing missing got a name, all three for the
+    # CO2 of a growing crop.
+    history: bool = _chosen(False, "ask what has changed since, and not what greenhouses with nothing missing show")
+    omission_effect: float = _tuned(0.3, "prior deviation of an effect in the discrepancy, in typical amplitudes")
+    omission_pattern: float = _tuned(0.05, "the same of a pattern, in its units")
+    wall_drift: float = _tuned(0.015, "relative change of a parameter between the calibration and a log")
+    crop_drift: float = _tuned(0.05, "the same of a parameter of the crop")
+    effect_drift: float = _tuned(0.02, "change of an effect in the discrepancy, in typical amplitudes")
+    pattern_drift: float = _tuned(0.005, "the same of a pattern, in its units")
+    change_onset_price: float = _tuned(12.0, "gain that a beginning of a change must add")
+    change_last_days: int = _tuned(5, "days at the end of a log in which no beginning of a change is looked for")
+    least_change_gain: float = _tuned(12.0, "gain of a change over what it gained in windows of the calibration log")
+    least_pattern_change: float = _tuned(60.0, "the same of a pattern: greenhouses drift with the weather")
+    least_proven_pattern: float = _tuned(20.0, "of it, what the scatter of day scores must bear out")
+    pattern_over_change: float = _tuned(1.5, "times a change's gain at which a pattern replaces it")
+    least_left_by_hour: float = _tuned(25.0, "gain of a pattern by the hour beside a change that unmakes its name")
 
     # Time steps or hours.
     largest_disagreement: float = _fitted(

@@ -157,6 +157,11 @@ class Hypothesis:
     p_value: float
 
     @property
+    def key(self) -> str:
+        """The effect at any shape, or the pattern: as own gains are kept."""
+        return self.cause.effect if isinstance(self.cause, Candidate) else self.cause.key
+
+    @property
     def effect(self) -> str:
         """Name of the effect; a pattern has none."""
         return self.cause.effect if isinstance(self.cause, Candidate) else ""
@@ -164,8 +169,10 @@ class Hypothesis:
 
 def onset_days(design: Design) -> list[int | None]:
     """Return the days of beginning worth trying; None is always."""
-    first, last = design.rules.first_onset_days, design.split.days - design.rules.first_onset_days
-    step = max(1, -(-(last - first) // design.rules.most_onsets))
+    rules = design.rules
+    first = rules.first_onset_days
+    last = design.split.days - (first if design.history is None else rules.change_last_days)
+    step = max(1, -(-(last - first) // rules.most_onsets))
     return [None, *range(first, last + 1, step)]
 
 
@@ -180,7 +187,7 @@ def score_candidates(
     bounds = np.array([(one.definition.amplitude.low, one.definition.amplitude.high) for one in design.candidates])
     columns, rules = design.block("effect").columns, design.rules
     scanned = scan(design.grams, current, columns, ageing, onsets, bounds, rng, rules.flips)
-    return _best(scanned, design.candidates, ageing, [one.effect for one in design.candidates], rules.onset_price)
+    return _best(scanned, design.candidates, ageing, [one.effect for one in design.candidates], design.onset_price)
 
 
 def middle_of_best(gains: Floats) -> int:
@@ -200,7 +207,7 @@ def score_patterns(
     bounds = np.tile([-_UNBOUNDED, _UNBOUNDED], (count, 1))
     none: list[int | None] = [None] * count
     scanned = scan(design.grams, current, design.block("pattern").columns, none, onsets, bounds, rng, rules.flips)
-    return _best(scanned, design.patterns, none, list(range(count)), rules.onset_price)
+    return _best(scanned, design.patterns, none, list(range(count)), design.onset_price)
 
 
 def _best(
@@ -229,3 +236,14 @@ def _best(
             float(scanned.p_value[place, column]),
         )
     return list(found.values())
+
+
+def column_of(design: Design, term: Term) -> Floats:
+    """Return the column of a term from its beginning on, (b, r, intervals)."""
+    column: Floats = design.values[term.column]
+    if term.onset is None:
+        return column
+    if term.ageing is not None:
+        column = column - term.onset * design.values[term.ageing]
+    begun: Floats = np.where((design.line.runs.day >= term.onset)[None, :, None], column, 0.0)
+    return begun

@@ -35,11 +35,13 @@ from igrow.trainer.exporting.optimizer import export_optimizer, optimizer_signat
 from igrow.trainer.exporting.plan import plan_blocks, plan_model
 from igrow.trainer.exporting.signatures import signatures
 from igrow.trainer.fit.climate import bounds, site_prior
+from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.model import FittedModel
 from igrow.trainer.training.stage_file import stages_from_bytes, stages_to_bytes
 
 CROP_FILE = "crop.npz"
+DISCREPANCY_FILE = "discrepancy.npz"
 MEMBERS = 3
 """Draws from the posterior that a bundle carries beside the mean, for cautious plans."""
 
@@ -116,6 +118,8 @@ def export(model: FittedModel, folder: Path | str, *, created: datetime | None =
     )
     files = {f"{name}.onnx": graph.SerializeToString() for name, graph in graphs.items()}
     files[CROP_FILE] = stages_to_bytes({"growth": crop.growth, "harvest": crop.harvest})
+    if model.history is not None:
+        files[DISCREPANCY_FILE] = model.history.to_bytes()
     return write_bundle(Path(folder), manifest, files, golden)
 
 
@@ -136,6 +140,7 @@ def read_model(bundle: Bundle | Path | str, site: Site) -> FittedModel:
         calibrated_on=manifest.calibrated_on,
         alignment=manifest.alignment,
         discrepancy=manifest.discrepancy,
+        history=_history_of(bundle),
         effects=tuple(effect for effect in manifest.effects if effect.kind != "remainder"),
         actuation={name: float(given.get(f"actuation:{name}", rule.value)) for name, rule in actuation.RULES.items()},
         holding={name: float(given.get(f"holding:{name}", one.value)) for name, one in holding.PARAMETERS.items()},
@@ -163,6 +168,17 @@ def _posterior(bundle: Bundle, site: Site) -> Gaussian:
         else np.array(manifest.covariance)[np.ix_(order, order)]
     )
     return Gaussian(prior.names, np.array([values[name] for name in prior.names]), covariance)
+
+
+def _history_of(bundle: Bundle) -> Discrepancy | None:
+    """Return what a bundle knows of its greenhouse's discrepancy; None where it knows nothing."""
+    if DISCREPANCY_FILE not in bundle.manifest.files:
+        return None
+    path = bundle.folder / DISCREPANCY_FILE
+    try:
+        return Discrepancy.from_bytes(path.read_bytes(), where=str(path))
+    except OSError as error:
+        raise BundleError(f"{path}: not readable: {error.strerror}") from None
 
 
 def _crop_of(bundle: Bundle) -> CropStages:

@@ -70,6 +70,7 @@ def calibrate(
         alignment=alignment,
         effects=(),
         discrepancy={},
+        history=None,
         actuation=rules,
         holding=fit_holding(record, setpoints, posterior.values, before.holding),
         training_span=Span(utc_datetime(record.time[0]), utc_datetime(record.time[-1])),
@@ -110,11 +111,12 @@ def held_out_errors(record: Record, prior: Gaussian, say: Report) -> tuple[HeldO
 
 def _with_discrepancy(model: FittedModel, log: Log, say: Report) -> FittedModel:
     """Return the model with what it misses on its own log, and without it where that cannot be told."""
-    from igrow.trainer.diagnosis import discrepancy_of  # noqa: PLC0415  (a diagnosis needs fits in turn)
+    from igrow.trainer.diagnosis import DEFAULT, discrepancy_of, history_of  # noqa: PLC0415  (a diagnosis needs fits in turn)
 
     say("learning what the model misses on its own log")
     try:
-        return replace(model, discrepancy=discrepancy_of(log, model))
+        known = history_of(log, model) if DEFAULT.history else None
+        return replace(model, discrepancy=discrepancy_of(log, model), history=known)
     except (IgrowError, np.linalg.LinAlgError) as error:
         note = (
             f"what the model misses on its own log could not be learned, so a diagnosis sees large causes only: {error}"

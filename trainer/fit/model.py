@@ -17,6 +17,7 @@ from igrow.core.simulator.crop import CropStages
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.core.site import Site
 from igrow.trainer.fit.climate import site_prior
+from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
 
 MARGIN = 0.1
@@ -39,6 +40,8 @@ class FittedModel:
     """Rows of its log by which the actuators are read ahead; None: each log is asked."""
     discrepancy: Mapping[str, float] = field(default_factory=dict)
     """What the calibration could not explain on its own log, which is no finding later: amplitude by key."""
+    history: Discrepancy | None = None
+    """The same with its doubt and the colour of its noise, at the log's own step; None where it was not learned."""
     effects: tuple[EffectRecord, ...] = ()
     actuation: Mapping[str, float] = field(default_factory=actuation.default_rules)
     """Rules of the actuation stage by name."""
@@ -99,6 +102,8 @@ class FittedModel:
             training_span=span,
             errors=tuple(errors),
             discrepancy=self.discrepancy if discrepancy is None else discrepancy,
+            # The history of another greenhouse is none of this one's.
+            history=self.history if self.calibrated_on == self.site.name else None,
         )
 
     def summary(self) -> str:

@@ -1,0 +1,127 @@
+"""The history of a greenhouse on designs of known truth: what is learned, what drifts, what its own windows gain."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from igrow.core.effects import EFFECTS
+from igrow.trainer.diagnosis import history, linear, search
+from igrow.trainer.diagnosis.change import changed, net_gain, proven_gain
+from igrow.trainer.diagnosis.design import Design, History
+from igrow.trainer.diagnosis.rules import DEFAULT
+from igrow.trainer.fit.discrepancy import Discrepancy
+from igrow.trainer.fit.gaussian import Gaussian
+from tests.diagnosis.synthetic_design import BALANCES, PLAIN, Truth, make_design
+
+RNG_SEED = 3
+PATTERN = "heat:cold weather"
+
+
+def with_history(design: Design, deviation: float = 0.3, **own: float) -> Design:
+    """The design with a history that expects nothing, give or take a deviation of every amplitude."""
+    names = history.keys(design)
+    prior = Gaussian(names, np.zeros(len(names)), deviation**2 * np.eye(len(names)))
+    known = History(prior, np.zeros_like(design.values[0]), (PLAIN,) * BALANCES, own)
+    _, solved = history.solve_jointly(replace(design, history=known))
+    return solved
+
+
+def in_real_parameters(design: Design) -> Design:
+    """The design with parameters of the simulator: two of the walls about one of the crop."""
+    names = ("leakage_wind", "respiration", "vent_wind")
+    block = replace(design.block("parameter"), labels=names)
+    prior = Gaussian(names, np.full(3, 2.0), np.eye(3))
+    return replace(design, prior=prior, blocks={**design.blocks, "parameter": block})
+
+
+def test_everything_is_learned_together_by_penalised_least_squares() -> None:
+    truth = Truth({"lamp_heat": 0.4}, {PATTERN: -0.2}, (0.3, 0.0, -0.1))
+    design = with_history(make_design(truth, sigma=0.5, seed=1))
+    found, design = history.solve_jointly(design)
+    columns = [*design.columns("parameter"), *design.columns("effect"), *design.columns("pattern")]
+    white = (design.whitening(design.values) * design.fitted).reshape(len(design.values), -1)
+    left, right = white[columns], white[0]
+    matrix = left @ left.T + np.eye(len(columns)) / 0.09
+    np.testing.assert_allclose(found.mean, np.linalg.solve(matrix, -left @ right), rtol=1e-6)
+    np.testing.assert_allclose(found.covariance, np.linalg.inv(matrix), rtol=1e-6, atol=1e-12)
+    expected = np.array([0.3, 0.0, -0.1, 0.4, 0.0, -0.2])
+    assert np.all(np.abs(found.mean - expected) < 4.0 * found.standard_deviation)
+
+
+def test_what_drifts_is_added_to_what_is_not_known() -> None:
+    design = in_real_parameters(make_design(seed=2))
+    names = history.keys(design)[:-1]
+    rng = np.random.default_rng(0)
+    root = rng.normal(size=(len(names),) * 2)
+    known = Discrepancy(
+        dict.fromkeys(design.prior.names, 1.0), Gaussian(names, np.zeros(len(names)), root @ root.T), {}, 3600.0, {}
+    )
+    now = history.drifted(known, design).covariance
+    drift = history.drift_of(design)
+    np.testing.assert_allclose(now[:-1, :-1], root @ root.T + np.diag(drift[:-1] ** 2))
+    # The pattern is new in this log: it is as doubtful as before any log.
+    assert np.isclose(now[-1, -1], DEFAULT.omission_pattern**2 + DEFAULT.pattern_drift**2)
+    walls, crop = 2.0 * DEFAULT.wall_drift, 2.0 * DEFAULT.crop_drift
+    typical = EFFECTS["lamp_heat"].amplitude.typical
+    np.testing.assert_allclose(drift[:4], [walls, crop, walls, DEFAULT.effect_drift * typical])
+
+
+def test_own_gains_tell_what_comes_and_goes_in_a_log_without_a_change() -> None:
+    hidden = {"lamp_heat": 0.4}
+    steady = with_history(in_real_parameters(make_design(Truth(hidden, {}), days=56, seed=4)))
+    comes = with_history(in_real_parameters(make_design(Truth(hidden, {}, onset=28), days=56, seed=4)))
+    assert history.own_gains(steady).get("lamp_heat", 0.0) < 6.0
+    assert history.own_gains(comes)["lamp_heat"] > 30.0
+    assert history.own_gains(comes).get("rain_cooling", 0.0) < 6.0
+
+
+def test_a_change_beyond_the_history_is_named_and_its_own_gain_is_taken_off() -> None:
+    # Far beyond what the history leaves open.
+    truth = Truth({"lamp_heat": 0.5}, {})
+    judged = changed(with_history(make_design(truth, seed=5), 0.01), 0.0, np.random.default_rng(RNG_SEED))
+    assert judged.cause is not None and judged.cause.hypothesis.effect == "lamp_heat"
+    assert not judged.patterns
+    assert abs(judged.cause.profile.amplitudes[0] - 0.5) < 4.0 * judged.cause.profile.deviations[0]
+    found = judged.cause.hypothesis
+    own = with_history(make_design(truth, seed=5), 0.01, lamp_heat=found.gain - 5.0)
+    assert np.isclose(net_gain(own, found), 5.0)
+    assert changed(own, 0.0, np.random.default_rng(RNG_SEED)).cause is None
+
+
+def test_nothing_is_named_where_nothing_has_changed() -> None:
+    for seed in range(5):
+        design = with_history(make_design(seed=10 + seed), 0.05)
+        judged = changed(design, 0.0, np.random.default_rng(RNG_SEED))
+        assert judged.cause is None and not judged.patterns
+
+
+def test_a_pattern_that_fits_better_than_every_name_is_not_named() -> None:
+    design = with_history(make_design(Truth({}, {PATTERN: 0.6}), seed=6), 0.01)
+    judged = changed(design, 0.0, np.random.default_rng(RNG_SEED))
+    assert judged.cause is None
+    assert [one.key for one in judged.patterns] == [PATTERN]
+
+
+def test_effects_that_are_not_to_be_considered_are_no_candidates() -> None:
+    design = with_history(make_design(Truth({"lamp_heat": 0.5}, {}), seed=5), 0.01)
+    assert design.history is not None
+    hidden = replace(design, history=replace(design.history, without=frozenset({"lamp_heat"})))
+    judged = changed(hidden, 0.0, np.random.default_rng(RNG_SEED))
+    assert judged.cause is None
+
+
+def test_a_change_that_comes_and_goes_from_day_to_day_is_not_proven() -> None:
+    """It gains much by the noise, and little by the scatter of days."""
+    design = make_design(seed=7)
+    values = design.values.copy()
+    (column,) = design.columns("effect:lamp_heat")
+    of_day = np.random.default_rng(8).normal(0.5, 0.8, size=design.split.days)
+    values[0] -= of_day[:, None] * values[column]
+    fickle = with_history(replace(design, values=values).whitened(design.whitening), 0.01)
+    null = linear.fit(fickle.grams, fickle.null_model())
+    scored = search.score_candidates(fickle, null, [None], np.random.default_rng(0))
+    (found,) = [one for one in scored if one.effect == "lamp_heat"]
+    assert net_gain(fickle, found) > DEFAULT.least_change_gain > proven_gain(fickle, found)
+    assert changed(fickle, 0.0, np.random.default_rng(RNG_SEED)).cause is None

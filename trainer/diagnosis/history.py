@@ -1,0 +1,236 @@
+"""The history of a greenhouse: learned from the log of its calibration, carried on to each later log.
+
+Two questions are told apart. What the model lacks is asked of the calibration log, under physical priors: every
+parameter, every effect and every pattern together, linear about the calibrated parameters (`learn`). What has changed
+since is asked of a later log: a greenhouse drifts, its crop faster than its walls, and that drift alone stands between
+what was learned and what may be expected now (`expected`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+
+import numpy as np
+
+from igrow.core.arrays import Floats
+from igrow.core.effects import EFFECTS
+from igrow.core.simulator.hybrid.climate import ActiveEffects
+from igrow.core.simulator.hybrid.record import Record
+from igrow.core.site import Site
+from igrow.trainer.data.splits import DaySplit, split_days
+from igrow.trainer.diagnosis import candidates, linear, noise, search, sensitivity
+from igrow.trainer.diagnosis.candidates import WEEKDAYS
+from igrow.trainer.diagnosis.design import JOINT, Design, History, blocks_of
+from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, home_drift
+from igrow.trainer.diagnosis.linear import DailyGrams, LinearModel
+from igrow.trainer.diagnosis.noise import Whitening
+from igrow.trainer.diagnosis.recalibration import averaging
+from igrow.trainer.diagnosis.rules import DecisionRules
+from igrow.trainer.fit.climate import site_prior
+from igrow.trainer.fit.discrepancy import Discrepancy
+from igrow.trainer.fit.gaussian import Gaussian
+
+PARTS = (2, 4)
+"""Into so many windows a calibration log is cut, to see what gains in each though nothing has changed."""
+
+
+def learn(record: Record, site: Site, posterior: Gaussian, rules: DecisionRules) -> Discrepancy:
+    """Return what a calibrated model misses of its greenhouse, learned from all days of the calibration log.
+
+    Args:
+        record: of that log, on its working grid.
+        site: the greenhouse.
+        posterior: of the parameters; a change of them is held to the site's description, not to their calibration,
+            which has used this log already.
+        rules: how much of everything may be missing.
+
+    Raises:
+        DivergenceError: the model runs out of all bounds on the log.
+    """
+    days = split_days(record, site.longitude)
+    whole = DaySplit(days.day, np.ones(days.days, dtype=bool))
+    plain = lay_out(record, whole, posterior, {}, site.longitude, rules)
+    described = site_prior(site).marginal(posterior.names)
+    deviation = np.concatenate([described.standard_deviation, _omission(plain)])
+    mean = np.zeros(len(deviation))
+    mean[: len(described.mean)] = described.mean - posterior.mean
+    prior = Gaussian(keys(plain), mean, np.diag(deviation**2))
+    design = replace(plain, history=History(prior, np.zeros_like(plain.values[0]), (), {}))
+    found, design = solve_jointly(design)
+    balances = averaging(design.line, design.interval, rules).balances
+    return Discrepancy(
+        parameters=posterior.values,
+        amplitudes=found,
+        filters={balance: one.raw for balance, one in zip(balances, design.whitening.filters, strict=True)},
+        step=record.step,
+        own_gains=own_gains(design),
+    )
+
+
+def lay_out(
+    record: Record, split: DaySplit, prior: Gaussian, effects: ActiveEffects, longitude: float, rules: DecisionRules
+) -> Design:
+    """Return the design of a log about the prior's mean, at its own step, before any noise.
+
+    Patterns of single weekdays are left out: eight weeks know too little of them.
+    """
+    runs = sensitivity.day_runs(record, split.day)
+    line = sensitivity.linearise(record, runs, prior.values, effects)
+    average = averaging(line, record.step, rules)
+    found = candidates.effect_columns(line)
+    every, courses = candidates.pattern_columns(line, longitude)
+    lasting = [place for place, one in enumerate(every) if not any(day in one.when for day in WEEKDAYS)]
+    patterns = tuple(every[place] for place in lasting)
+    labels = tuple(one.key for one in found.candidates)
+    slopes = sensitivity.parameter_sensitivities(line, prior.names, prior.standard_deviation)
+    none, nothing = np.zeros(0), np.zeros((0, *line.shown.shape))
+    parts = [
+        ("residual", ("residual",), line.errors[None], none, None),
+        ("parameter", prior.names, slopes, none, None),
+        ("effect", labels, found.columns, none, None),
+        ("ageing", labels, found.ageing, none, None),
+        ("pattern", tuple(one.key for one in patterns), courses[lasting], none, None),
+        *((name, (), nothing, none, np.zeros((0, 0))) for name in ("discrepancy", "nuisance", "drift")),
+    ]
+    values = np.concatenate([average(columns) for _, _, columns, _, _ in parts])
+    return Design(
+        line=line,
+        split=split,
+        prior=prior,
+        rules=rules,
+        interval=record.step,
+        blocks=blocks_of(parts),
+        values=values,
+        observed=average.observed,
+        whitening=Whitening((), np.eye(len(average.balances)), average.observed.astype(np.float64)),
+        grams=DailyGrams(np.zeros((split.days, 0, 0)), split.fit),
+        candidates=found.candidates,
+        patterns=patterns,
+        untestable=found.untestable,
+        usual_size={},
+    )
+
+
+def keys(design: Design) -> tuple[str, ...]:
+    """Return the keys of everything that may be missing, as a discrepancy has them."""
+    parameters = (PARAMETER_PREFIX + name for name in design.block("parameter").labels)
+    return (*parameters, *design.block("effect").labels, *design.block("pattern").labels)
+
+
+def expected_misfit(known: Discrepancy, plain: Design) -> Floats:
+    """Return what the model is expected to miss along a log, (b, r, intervals); what is new in the log is 0."""
+    amplitudes = known.amplitudes.values
+    mean = np.array([amplitudes.get(key, 0.0) for key in keys(plain)])
+    misfit: Floats = np.tensordot(mean, plain.values[_columns(plain)], axes=1)
+    return misfit
+
+
+def applies(known: Discrepancy, plain: Design) -> bool:
+    """Tell whether a log has the step and the balances that the history was learned from."""
+    balances = averaging(plain.line, plain.interval, plain.rules).balances
+    return plain.interval == known.step and set(balances) <= set(known.filters)
+
+
+def expected(known: Discrepancy, plain: Design, misfit: Floats, without: Collection[str] = ()) -> Design:
+    """Return the design of a later log: what is expected of it taken off, under the history's colour.
+
+    Args:
+        known: of the greenhouse.
+        plain: the log, laid out about the calibrated parameters.
+        misfit: from `expected_misfit`, of the log without the causes that have been found in it.
+        without: effects that are no candidates.
+    """
+    balances = averaging(plain.line, plain.interval, plain.rules).balances
+    filters = tuple(noise.filter_of(known.filters[balance]) for balance in balances)
+    now = drifted(known, plain)
+    values = plain.values.copy()
+    values[0] += misfit
+    design = replace(plain, values=values, history=History(now, misfit, filters, known.own_gains, frozenset(without)))
+    _, design = solve_jointly(design)
+    # Parameters as the rest of the history leaves them, for fits that hold it.
+    count = len(plain.prior.names)
+    covariance: Floats = np.linalg.inv(now.precision[:count, :count]).astype(np.float64)
+    held = Gaussian(plain.prior.names, plain.prior.mean, covariance)
+    return replace(design, prior=held)
+
+
+def drifted(known: Discrepancy, plain: Design) -> Gaussian:
+    """Return how far everything may now lie from what is expected: the doubt of the history, and a drift.
+
+    What is new in this log has the doubt that it had before any log.
+    """
+    wanted = keys(plain)
+    place = {key: row for row, key in enumerate(known.amplitudes.names)}
+    seen = [row for row, key in enumerate(wanted) if key in place]
+    rows = [place[wanted[row]] for row in seen]
+    count = len(plain.prior.names)
+    prior = np.concatenate([plain.prior.standard_deviation, _omission(plain)])
+    assert all(row in seen for row in range(count))
+    covariance = np.diag(prior**2)
+    covariance[np.ix_(seen, seen)] = known.amplitudes.covariance[np.ix_(rows, rows)]
+    return Gaussian(wanted, np.zeros(len(wanted)), covariance).widened(drift_of(plain))
+
+
+def drift_of(design: Design) -> Floats:
+    """Return the standard deviation of the change of everything between two logs, (k,)."""
+    rules = design.rules
+    return np.concatenate([
+        home_drift(design.prior.values, rules),
+        rules.effect_drift * _typical(design),
+        np.full(len(design.patterns), rules.pattern_drift),
+    ])  # fmt: skip
+
+
+def own_gains(design: Design) -> dict[str, float]:
+    """Return the largest gain of every effect and pattern in a window of a log, when all is learned on the rest.
+
+    Args:
+        design: of the calibration log, under its noise.
+    """
+    null, days = design.null_model(), design.split.days
+    assert design.history is not None
+    change, largest = drift_of(design), dict[str, float]()
+    for parts in PARTS:
+        part = np.arange(days) * parts // days
+        for number in range(parts):
+            inside = part == number
+            rest = linear.fit(DailyGrams(design.grams.products, ~inside), null).solution
+            after = Gaussian(design.history.amplitudes.names, rest.coefficients, rest.inverse).widened(change)
+            window = replace(design, grams=DailyGrams(design.grams.products, inside))
+            current = linear.fit(window.grams, LinearModel(null.base, after.precision, after.mean))
+            rng = np.random.default_rng(0)
+            for score in (search.score_candidates, search.score_patterns):
+                for one in score(window, current, [None], rng):
+                    largest[one.key] = max(largest.get(one.key, 0.0), one.gain)
+    return {key: float(f"{gain:.4g}") for key, gain in largest.items()}
+
+
+def solve_jointly(design: Design) -> tuple[Gaussian, Design]:
+    """Return all amplitudes under their prior, and the design under the noise beside them, fitted by turns."""
+    null = design.null_model()
+    columns = list(null.base)
+    found = Gaussian(keys(design), np.zeros(len(columns)), np.zeros((len(columns),) * 2))
+    whitening: Whitening | None = None
+    for _ in range(design.rules.noise_rounds):
+        errors = design.values[0] + np.tensordot(found.mean, design.values[columns], axes=1)
+        whitening = design.fit_noise(errors, whitening)
+        design = design.whitened(whitening)
+        solution = linear.fit(design.grams, null).solution
+        found = Gaussian(found.names, solution.coefficients, solution.inverse)
+    return found, design
+
+
+def _columns(design: Design) -> list[int]:
+    return [column for name in JOINT for column in design.block(name).columns]
+
+
+def _typical(design: Design) -> Floats:
+    return np.array([abs(EFFECTS[one.effect].amplitude.typical) for one in design.candidates])
+
+
+def _omission(design: Design) -> Floats:
+    """Return the prior deviation of effects and patterns before any log, (k,)."""
+    rules = design.rules
+    patterns = np.full(len(design.patterns), rules.omission_pattern)
+    return np.concatenate([rules.omission_effect * _typical(design), patterns])
