@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint format soak bench bench-diagnosis results bundle api clean
+.PHONY: help demo test notebooks lint format soak bench bench-diagnosis results bundle wheel api clean
 
 help: ## List the targets.
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-16s %s\n", $$1, $$2}'
@@ -21,7 +21,7 @@ demo: $(STAMP) ## Run the whole loop on a virtual greenhouse with an undeclared 
 	$(BIN)/python config/demo/run.py --out out/demo
 
 test: $(STAMP) ## Run the tests (at most 10 minutes).
-	$(BIN)/pytest -n 2 --dist worksteal -m 'not soak' tests
+	$(BIN)/pytest -n 2 --dist worksteal -m 'not soak and not notebooks' tests
 
 lint: $(STAMP) ## Run ruff and strict mypy.
 	$(BIN)/ruff check .
@@ -32,6 +32,9 @@ lint: $(STAMP) ## Run ruff and strict mypy.
 format: $(STAMP) ## Format the code.
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
+
+notebooks: $(STAMP) ## Run the documentation's notebooks from end to end.
+	$(BIN)/pytest -m notebooks tests/notebooks
 
 soak: $(STAMP) ## Run the long tests: fault sequences, kill -9, thirty days of plant time.
 	$(BIN)/pytest -n 2 --dist worksteal -m soak tests
@@ -47,6 +50,14 @@ results: $(STAMP) ## Write the tables of docs/results that are quick to make (th
 
 bundle: $(STAMP) ## Rebuild the default bundle in igrow_core/default_bundle.
 	$(BIN)/igrow-trainer bundle --out igrow_core/default_bundle
+
+wheel: $(STAMP) ## Build the wheel into dist, and try the gateway's commands from it in an empty environment.
+	rm -rf dist build
+	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist .
+	$(PYTHON) -m venv --clear dist/venv
+	dist/venv/bin/pip install --quiet --disable-pip-version-check "$$(ls dist/*.whl)[edge]"
+	dist/venv/bin/igrow-edge --version
+	dist/venv/bin/igrow-edge check-config config/daemon.yaml
 
 api: $(STAMP) ## Write the pages of the Python interface to out/api.
 	$(BIN)/pdoc --docformat google --output-directory out/api igrow
