@@ -167,7 +167,7 @@ class Readback:
         if newest is not None and stays and matches(rule, shown, newest.value):
             return [self._confirmed(name, shown)]
         if stays:
-            return self._overdue(name, now)
+            return self._overdue(name, shown, now)
         # A PLC takes writes in turn, so of equal ones it is the first.
         ours = next((sent for sent in (*memory.late, *memory.sent) if matches(rule, shown, sent.value)), None)
         if ours is not None and ours is newest:
@@ -192,7 +192,7 @@ class Readback:
         on_its_way = any(on_the_way(rule, memory.stands, sent.value, shown) for sent in memory.sent)
         if on_its_way or memory.is_known_limit(rule, newest.value, shown):
             memory.move_to(shown, now)
-            return self._overdue(name, now)
+            return self._overdue(name, shown, now)
         return [self._confirmed(name, shown)] if rounds(rule, newest.value, shown) else None
 
     def _confirmed(self, name: str, shown: float) -> Finding:
@@ -201,27 +201,26 @@ class Readback:
         memory.settled(self._rules[name], shown, newest.value)
         return Finding(name, Outcome.CONFIRMED, newest.value, shown, newest.source)
 
-    def _overdue(self, name: str, now: float) -> list[Finding]:
-        """Judge a write that no reading shows yet."""
+    def _overdue(self, name: str, shown: float, now: float) -> list[Finding]:
+        """Judge a write that no reading shows yet; this one is near enough to what stood there."""
         rule, memory = self._rules[name], self.points[name]
         if not memory.sent or memory.overdue or now - memory.waits_since <= self._confirm_within:
             return []
-        newest, stands = memory.sent[-1], memory.stands
-        assert stands is not None
-        if rounds(rule, newest.value, stands):
-            return [self._confirmed(name, stands)]
+        newest = memory.sent[-1]
+        if rounds(rule, newest.value, shown):
+            return [self._confirmed(name, shown)]
         there = {other: memory.stands for other, memory in self.points.items()}
-        text = self._crossed(name, there) or f"{newest.value:g} was written to {name}, but the PLC shows {stands:g}"
+        text = self._crossed(name, there) or f"{newest.value:g} was written to {name}, but the PLC shows {shown:g}"
         limited = not newest.urgent and memory.is_limited(rule, newest.value)
         if limited:
             memory.learn_limit(newest.value)
             text += ": it seems to have a limit of its own there"
-            memory.settled(rule, stands, newest.value)
+            memory.settled(rule, shown, newest.value)
             memory.limited_until = now + self._respect_hand
         else:
             memory.overdue, memory.answers = True, None
         memory.problem = Problem(text, minor=limited)
-        return [Finding(name, Outcome.UNCONFIRMED, newest.value, stands, newest.source, text)]
+        return [Finding(name, Outcome.UNCONFIRMED, newest.value, shown, newest.source, text)]
 
     def _unread(self, name: str, value: Value, image: Image) -> list[Finding]:
         """Judge a write to a point that cannot be read, although its unit answers; no reading will ever confirm it."""
