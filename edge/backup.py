@@ -20,8 +20,8 @@ from igrow.edge.configuration import Configuration, load_configuration
 from igrow.edge.state_lock import LOCK_FILE, daemon_stopped
 
 STORE, CONFIGURATION, STATE, DAEMON_FILE = "store.tar.gz", "configuration", "state", "daemon.yaml"
-_PASSING = (".part", ".new")
-"""Ends of names of files that are just being written."""
+_PASSING = (".part", ".new", "status.json")
+"""Ends of names of files that are just being written, or made anew all the time."""
 
 
 class BackupError(IgrowError):

@@ -28,9 +28,8 @@ def test_a_second_daemon_and_a_restore_are_refused_until_the_first_is_gone(tmp_p
             assert "a daemon is running on it" in said
             assert said.count("\n") == 1
         plant.kill()
-        (plant.state / "store").rename(plant.state / "old")
-        assert command(plant, "restore", archive)[0] == 0
-        (plant.state / "status.json").unlink()
+        plant.state.rename(plant.state.with_name("old"))
+        assert command(plant, "restore", archive) == (0, "")
         plant.start()
         plant.wait_for((plant.state / "status.json").exists)
         assert plant.stop() == 0
