@@ -23,7 +23,8 @@ from igrow.edge.ports import SetpointStatus
 from igrow.edge.sensors import ImageBuilder, RawReading
 from igrow.edge.sources import Choice, Decision, Source, decide
 
-ASKED_AT_STOP = ("plc_manual", "plc_fallback", HEARTBEAT)
+MANUAL = "plc_manual"
+ASKED_AT_STOP = (MANUAL, "plc_fallback", HEARTBEAT)
 """What has to be known beside the setpoints themselves before a stop moves them."""
 
 
@@ -108,6 +109,7 @@ class ControlCycle:
     def recall(self, content: Mapping[str, object], later: float, *, same: Collection[str], agree: bool) -> None:
         """Go on where the process before this one stood; see `igrow.edge.guard.memory`."""
         self.state = recall(content, self.readback, later, same=same, agree=agree)
+        self._manual = content.get("manual") is True
 
     async def run(self, names: Collection[str] | None = None) -> CycleResult:
         """Run one cycle. `names` None reads what is due."""
@@ -133,7 +135,8 @@ class ControlCycle:
 
     async def _read(self, names: Collection[str] | None) -> Image:
         readings = await self._plc.read(names)
-        if names is None and (more := self._look_at - readings.keys()):
+        # Whoever operates the PLC by hand is not to be surprised, however seldom the switch is read otherwise.
+        if names is None and (more := {*self._look_at, *self._builder.names((MANUAL,))} - readings.keys()):
             readings = {**readings, **await self._plc.read(sorted(more))}
         image = self._image(readings)
         if names is None and (unseen := set(self.readback.unseen(image)) - readings.keys()):
@@ -166,12 +169,12 @@ class ControlCycle:
 
     def _look_whether_by_hand(self, image: Image) -> None:
         """Keep what `plc_manual` last said, as long as nothing says otherwise."""
-        flag = image.value_of("plc_manual")
+        flag = image.value_of(MANUAL)
         if flag.value is None or flag.quality not in (Quality.GOOD, Quality.STALE):
             return
         manual = flag.value >= 0.5
         if manual != self._manual:
-            self._journal.event("plc_by_hand" if manual else "plc_by_hand_ended", point="plc_manual")
+            self._journal.event("plc_by_hand" if manual else "plc_by_hand_ended", point=MANUAL)
         self._manual = manual
 
     async def _guard_and_write(
@@ -190,7 +193,7 @@ class ControlCycle:
         for write in writes:
             self.readback.wrote(write, now)
         if self._keep is not None:
-            self._keep(image, note(self.state, self.readback))
+            self._keep(image, {**note(self.state, self.readback), "manual": self._manual})
         outcomes = await self._writer.carry_out(writes)
         for outcome in outcomes:
             if not outcome.may_have_arrived:

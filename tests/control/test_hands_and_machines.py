@@ -397,6 +397,25 @@ async def test_a_plc_whose_manual_switch_cannot_be_read_stays_as_it_last_said():
     assert {name for _, name, _ in bench.plc.writes} == {"heartbeat"}
 
 
+async def test_the_manual_switch_is_read_in_every_cycle_however_seldom_its_map_says():
+    bench = bench_of(values={"plc_manual": 0.0})
+    bench.plc.polls = {"plc_manual": 300.0}
+    await bench.run(3)
+    bench.plc.values["plc_manual"] = 1.0
+    bench.cycle.sources[0].setpoints["heating_setpoint"] = 24.0
+    await bench.run(3)
+    assert bench.plc.values["heating_setpoint"] == 21.0
+
+
+async def test_a_start_while_the_manual_switch_cannot_be_read_takes_it_as_it_last_stood():
+    bench = bench_of(values={"plc_manual": 1.0}, units={"plc_manual": "panel"})
+    await bench.run(3)
+    bench.plc.down = {"panel"}
+    bench.restart()
+    await bench.run(30)
+    assert {name for _, name, _ in bench.plc.writes} == {"heartbeat"}
+
+
 async def test_what_was_set_while_the_plc_was_operated_by_hand_is_respected_afterwards():
     bench = bench_of(values={"plc_manual": 0.0})
     await bench.run(3)
