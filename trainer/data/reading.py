@@ -55,7 +55,7 @@ def prepare_log(telemetry: Telemetry, site: Site | None = None, *, name: str = "
 
 def _prepared(source: Source, site: Site | None, place: str, accept: Collection[str] = ()) -> Log:
     if len(source.telemetry) == 0:
-        raise IgrowError(f"{source.name}: the log has no rows")
+        raise IgrowError(f"{source.name}: the log has no rows (`igrow-trainer import` shows what is read of an export)")
     telemetry, strays = without_strays(source.telemetry)
     found = (*source.faults, *find_faults(telemetry, site))
     accepted = tuple(f"accepted although {fault.sentence}" for fault in found if fault.kind in accept)
