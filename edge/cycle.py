@@ -6,22 +6,36 @@ last: it tells the PLC that a whole cycle was completed, and a lock-step plant t
 
 from __future__ import annotations
 
+import asyncio
+import math
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol
 
 from igrow.edge.clock import Clock
-from igrow.edge.guard import GuardedWriter, GuardRules, GuardState, Readback, Request, Verdict, Write, guard
+from igrow.edge.guard import (
+    GuardedWriter,
+    GuardRules,
+    GuardState,
+    Readback,
+    Request,
+    Verdict,
+    Write,
+    WriteOutcome,
+    guard,
+)
 from igrow.edge.guard.core import LONGEST_RAMP, begin_again, go_on, never_sent, postponed
-from igrow.edge.guard.findings import Finding, Outcome
+from igrow.edge.guard.findings import moved_and_stood
 from igrow.edge.guard.memory import note, recall
 from igrow.edge.guard.writer import HEARTBEAT
 from igrow.edge.image import Image, Quality
 from igrow.edge.journal import Journal
 from igrow.edge.ports import SetpointStatus
 from igrow.edge.sensors import ImageBuilder, RawReading
-from igrow.edge.sources import Choice, Decision, Source, decide
+from igrow.edge.setpoint_statuses import setpoint_statuses
+from igrow.edge.sources import Decision, Source, decide
+from igrow.edge.stopping import LOOK_SECONDS, STOP_SECONDS, StopReport, furthest_first, write_at_once
 
 MANUAL = "plc_manual"
 ASKED_AT_STOP = (MANUAL, "plc_fallback", HEARTBEAT)
@@ -45,18 +59,6 @@ class CycleResult:
     setpoints: Mapping[str, SetpointStatus]
     seconds: float
     """Wall-clock length of the cycle."""
-
-
-@dataclass(frozen=True, slots=True)
-class StopReport:
-    """What a stop left behind."""
-
-    reached: bool
-    """The PLC answers."""
-    manual: bool
-    """Somebody operates it by hand, so nothing was written."""
-    by_hand: tuple[str, ...]
-    """The points that were left as a hand has set them."""
 
 
 class ControlCycle:
@@ -97,11 +99,25 @@ class ControlCycle:
         self._manual = False
         self._look_at: set[str] = set()
         """Points to be read in the next cycle although they are not due, since they wait to be written."""
+        self._reading: asyncio.Future[Mapping[str, RawReading]] | None = None
+        self._seen = self._giving_way = False
+        self.unknown_until = -math.inf
+        """Monotonic seconds until which it is not known what hands have set before a restart; all is left alone."""
+
+    def give_way(self) -> None:
+        """End the present cycle after the write that is under way, or now while it reads: the stop needs the line.
+
+        `run` then raises CancelledError, or returns what it has done until then.
+        """
+        self._giving_way = True
+        if self._reading is not None:
+            self._reading.cancel()
 
     def carry_over(self, before: ControlCycle, same: Collection[str]) -> None:
         """Go on where the cycle before a reload stood; `same` are the points that mean the same register as before."""
         self.state = before.state
         self._source, self._manual = before._source, before._manual
+        self._seen, self.unknown_until = before._seen, before.unknown_until
         self._builder.carry_over(before._builder, same)
         for name in self.readback.points.keys() & before.readback.points.keys() & set(same):
             self.readback.points[name] = before.readback.points[name]
@@ -120,21 +136,51 @@ class ControlCycle:
         verdict = await self._guard_and_write(requests, image)
         self._log(image, decision, verdict)
         await self._beat(image)
-        statuses = self._statuses(decision.choices, image, verdict)
+        held = self.readback.held(image.monotonic)
+        if self._manual:
+            held = dict.fromkeys(self._rules.points, self._respect_hand)
+        statuses = setpoint_statuses(self._rules.points, decision.choices, image, verdict, self.state, held)
         return CycleResult(image, decision, verdict, statuses, time.perf_counter() - began)
 
-    async def stop(self) -> StopReport:
-        """Write the safe setpoints, through the guard, where no hand rules.
+    async def stop(self, seconds: float = STOP_SECONDS) -> StopReport:
+        """Write the safe setpoints within so many seconds, through the guard, where no hand rules.
 
         The heartbeat then ends, and the PLC falls back by itself.
         """
-        image = await self._read(self._builder.names((*self._rules.points, *ASKED_AT_STOP)))
-        await self._guard_and_write({}, image, stopping=True)
+        until = asyncio.get_running_loop().time() + seconds
+        self._giving_way = False
+        try:
+            async with asyncio.timeout(min(LOOK_SECONDS, seconds)):
+                image = await self._read(self._builder.names((*self._rules.points, *ASKED_AT_STOP)))
+        except TimeoutError:
+            # A PLC that is slower still: what was known before has to do.
+            image = self._image({})
+        if not self._seen:
+            return StopReport(seen=False)
+        outcomes = await self._stop_by(image, until)
         held = () if self._manual else tuple(sorted(self.readback.held(image.monotonic)))
-        return StopReport(image.link_ok, self._manual, held)
+        return StopReport.after(outcomes, by_hand=held, manual=self._manual)
+
+    async def _stop_by(self, image: Image, until: float) -> list[WriteOutcome]:
+        """Write the guard's verdict on a stop, also to units that were silent lately."""
+        before, shown = self.state, self.readback.shown()
+        held = {**self._hands(image.monotonic)[0], **self.readback.held(image.monotonic)}
+        verdict = guard({}, shown, held, image, before, self._rules, stopping=True, manual=self._manual)
+        self.state = verdict.state
+        writes = furthest_first(verdict.writes, shown)
+        self._about_to_write(writes, image)
+        left = until - asyncio.get_running_loop().time()
+        outcomes = await write_at_once(self._writer, writes, left)
+        self._written(outcomes, before)
+        self._journal.ledger(verdict.clamps, outcomes, ())
+        return outcomes
 
     async def _read(self, names: Collection[str] | None) -> Image:
-        readings = await self._plc.read(names)
+        self._reading = asyncio.ensure_future(self._plc.read(names))
+        try:
+            readings = await self._reading
+        finally:
+            self._reading = None
         # Whoever operates the PLC by hand is not to be surprised, however seldom the switch is read otherwise.
         if names is None and (more := {*self._look_at, *self._builder.names((MANUAL,))} - readings.keys()):
             readings = {**readings, **await self._plc.read(sorted(more))}
@@ -147,25 +193,15 @@ class ControlCycle:
     def _image(self, readings: Mapping[str, RawReading]) -> Image:
         """Make the image of these readings, and look what it shows of our writes and of others' hands."""
         image = self._builder.build(readings, self._clock.monotonic(), self._clock.true_time())
+        self._seen |= image.link_ok and bool(readings)
         self._journal.begin(image)
         beat = image.value_of(HEARTBEAT)
         lost = self._writer.heartbeat_was_lost(beat.value if beat.age <= 0.0 else None)
         findings = self.readback.observe(image, restarted=lost)
         self._journal.findings(findings, self._respect_hand)
-        self._ramps_after(findings)
-        return image
-
-    def _ramps_after(self, findings: Sequence[Finding]) -> None:
-        """Let ramps begin where the PLC now stands, or go on where it was off for a moment only."""
-        moved: set[str] = set()
-        stood: dict[str, float] = {}
-        for found in findings:
-            briefly = found.outcome is Outcome.RESTARTED and found.unseen <= LONGEST_RAMP
-            if found.expected is not None and (found.outcome is Outcome.CROSSED or briefly):
-                stood[found.point] = found.expected
-            elif found.outcome not in (Outcome.CONFIRMED, Outcome.HAND_ENDED):
-                moved.add(found.point)
+        moved, stood = moved_and_stood(findings, briefly=LONGEST_RAMP)
         self.state = go_on(begin_again(self.state, moved), stood)
+        return image
 
     def _look_whether_by_hand(self, image: Image) -> None:
         """Keep what `plc_manual` last said, as long as nothing says otherwise."""
@@ -177,34 +213,46 @@ class ControlCycle:
             self._journal.event("plc_by_hand" if manual else "plc_by_hand_ended", point=MANUAL)
         self._manual = manual
 
-    async def _guard_and_write(
-        self, requests: Mapping[str, Request], image: Image, *, stopping: bool = False
-    ) -> Verdict:
+    async def _guard_and_write(self, requests: Mapping[str, Request], image: Image) -> Verdict:
         now, before = image.monotonic, self.state
         held, restored = self._hands(now)
-        if stopping:
-            held, restored = self.readback.held(now), {}
-        verdict = guard(
-            {**requests, **restored}, self.readback.shown(), held, image, before, self._rules,
-            stopping=stopping, manual=self._manual,
-        )  # fmt: skip
+        shown = self.readback.shown()
+        verdict = guard({**requests, **restored}, shown, held, image, before, self._rules, manual=self._manual)
         self.state = verdict.state
         writes = self._that_may_leave(verdict.writes, image, before)
-        for write in writes:
-            self.readback.wrote(write, now)
-        if self._keep is not None:
-            self._keep(image, {**note(self.state, self.readback), "manual": self._manual})
-        outcomes = await self._writer.carry_out(writes)
-        for outcome in outcomes:
-            if not outcome.may_have_arrived:
-                self.readback.not_sent(outcome.write)
-                self.state = never_sent(self.state, before, outcome.write.point)
+        self._about_to_write(writes, image)
+        outcomes: list[WriteOutcome] = []
+        for position, write in enumerate(writes):
+            if self._giving_way:
+                for unsent in writes[position:]:
+                    self._never_sent(unsent, before)
+                break
+            outcomes += await self._writer.carry_out([write])
+        self._written(outcomes, before)
         pending = [name for name in self._rules.points if self.readback.pending(name)]
         clamps = [clamp for clamp in verdict.clamps if image.reaches(clamp.point)]
         self._journal.ledger(clamps, outcomes, pending)
         targets = {name: memory.ramp for name, memory in verdict.state.points.items()}
         self._journal.problems(self.readback.settle(targets))
         return verdict
+
+    def _about_to_write(self, writes: Sequence[Write], image: Image) -> None:
+        """Note what is going to be written, so that neither a later look nor a restart takes it for somebody else's."""
+        for write in writes:
+            self.readback.wrote(write, image.monotonic)
+        # What is not known yet must not be replaced by what little is known until then.
+        if self._keep is not None and image.monotonic >= self.unknown_until:
+            self._keep(image, {**note(self.state, self.readback), "manual": self._manual})
+
+    def _written(self, outcomes: Sequence[WriteOutcome], before: GuardState) -> None:
+        """Forget what certainly never left."""
+        for outcome in outcomes:
+            if not outcome.may_have_arrived:
+                self._never_sent(outcome.write, before)
+
+    def _never_sent(self, write: Write, before: GuardState) -> None:
+        self.readback.not_sent(write)
+        self.state = never_sent(self.state, before, write.point)
 
     def _hands(self, now: float) -> tuple[dict[str, float], dict[str, Request]]:
         """Return the hands that stand, with the seconds that they are respected, and requests for those moved away."""
@@ -218,6 +266,8 @@ class ControlCycle:
                     f"back to {hand.value:g}, set by hand at the PLC and respected for {hand.seconds / 60:.0f} min more"
                 )
                 restored[name] = Request(hand.value, "hand", why, at_once=True)
+        if now < self.unknown_until:
+            held |= {name: self.unknown_until - now for name in self._rules.points if name not in held}
         return held, restored
 
     def _that_may_leave(self, writes: Sequence[Write], image: Image, before: GuardState) -> list[Write]:
@@ -242,7 +292,7 @@ class ControlCycle:
     async def _beat(self, image: Image) -> None:
         """Tell the PLC that a cycle was completed: the unit that hears it was part of the cycle."""
         error = None
-        if image.reaches(HEARTBEAT):
+        if image.reaches(HEARTBEAT) and not self._giving_way:
             error = await self._writer.heartbeat()
             if error is None:
                 self.readback.beat(image.monotonic)
@@ -255,26 +305,3 @@ class ControlCycle:
         self._journal.sensors(image)
         self._journal.interlocks(verdict.engaged, self._rules.points)
         self._journal.telemetry(image)
-
-    def _statuses(self, choices: Mapping[str, Choice], image: Image, verdict: Verdict) -> dict[str, SetpointStatus]:
-        forced = {clamp.point: clamp.reason for clamp in verdict.clamps if clamp.kind == "interlock"}
-        held = self.readback.held(image.monotonic)
-        if self._manual:
-            held = dict.fromkeys(self._rules.points, self._respect_hand)
-        statuses = {}
-        for name in self._rules.points:
-            choice, memory = choices.get(name), self.state.points.get(name)
-            status = SetpointStatus(
-                requested=choice.value if choice else None,
-                applied=memory.written if memory else None,
-                shown=image.value_of(name).value,
-                source=choice.source if choice else "",
-                why=choice.why if choice else "",
-                held_until=image.monotonic + held[name] if name in held else None,
-            )
-            if name in forced:
-                status = replace(status, source="interlock", why=forced[name])
-            elif memory is not None and memory.taken is not None:
-                status = replace(status, source="interlock", why=f"on its way back to {memory.taken:g}")
-            statuses[name] = status
-        return statuses

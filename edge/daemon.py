@@ -5,22 +5,38 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import math
 import signal
+import time
 from collections.abc import Coroutine, Iterator
+from concurrent.futures import Future
 from datetime import UTC, datetime
 from pathlib import Path
 
 from igrow.core.errors import IgrowError
+from igrow.edge.carrying_over import carry_over, log_to_remember, remember
 from igrow.edge.configuration import Configuration, load_configuration
-from igrow.edge.cycle import CycleResult, StopReport
+from igrow.edge.cycle import CycleResult
+from igrow.edge.earlier import Earlier
+from igrow.edge.hand_off import PATIENCE, HandOff, LateError, settled
+from igrow.edge.image import Quality
 from igrow.edge.journal import Journal
 from igrow.edge.notify import Notifier
-from igrow.edge.ports import Plan, Snapshot
+from igrow.edge.ports import Plan
+from igrow.edge.reloading import Reloading
+from igrow.edge.snapshot import snapshot_of
 from igrow.edge.state_lock import sole_use
-from igrow.edge.wiring import Control, Services, build_control, carry_over, open_services, remember
+from igrow.edge.stopping import STOP_SECONDS, StopReport
+from igrow.edge.wiring import SIMULATED_PATIENCE, Control, Services, build_control, open_services
 
-STOP_SECONDS = 5.0
-"""Longest time that the safe setpoints may take on the way out."""
+LOCK_SECONDS = 5.0
+"""Longest time for the disk to say whether another daemon has the state folder; then control comes first."""
+LEAST_STOP = 5.0
+"""Seconds that the safe setpoints get however long the cycle took to give way."""
+LINE_SECONDS = 2.0
+"""Longest time for a line, or the status page, to be closed."""
+CLOSE_SECONDS = 16.0
+"""Longest time for the services to be closed once the safe setpoints are written. What hangs is left behind."""
 LOCKSTEP_WAIT = 900.0
 """Longest time, by the wall clock, that a lock-step plant is kept waiting for a plan or an update."""
 
@@ -40,35 +56,37 @@ class Daemon:
         self._journal = Journal(self.services.store)
         self._control: Control | None = None
         self._stopping = asyncio.Event()
-        self._reload = False
+        self._stop_by = math.inf
+        self._reloading = Reloading(configuration.path)
         self._configuration_problem = ""
+        self._earlier: Future[Earlier] | None = None
         self._plan: Plan | None = None
         self.cycles = 0
         self.last: CycleResult | None = None
 
     def stop(self) -> None:
-        """End after the present cycle."""
-        self._stopping.set()
+        """End now: a cycle that is under way gives way to the safe setpoints."""
+        if not self._stopping.is_set():
+            self._stop_by = time.monotonic() + STOP_SECONDS
+            self._stopping.set()
 
     def reload(self) -> None:
-        """Read the configuration again before the next cycle."""
-        self._reload = True
+        """Read the configuration again; control goes on by the last good one until it is there."""
+        if self._reloading.start():
+            self._notifier.reloading()
 
     async def run(self) -> None:
         """Control until `stop`; then write the safe setpoints and close everything."""
         self._control = self._begin(None)
+        self._earlier = self.services.store.earlier(log_to_remember(self._control))
         await self.services.status.start()
         self._notifier.ready()
         self._journal.event("started", site=self.configuration.site.name)
         try:
-            remembered = False
             while await self._due():
-                if not remembered:
-                    remember(self._control, self.services.store)
-                    remembered = True
-                if self._reload:
-                    await self._reload_now()
-                await self._cycle()
+                await self._unless_stopped(self._remember())
+                await self._take_over_configuration()
+                await self._until_told_to_stop()
         finally:
             await self._end()
 
@@ -94,13 +112,49 @@ class Daemon:
         task.result()
         return True
 
-    async def _cycle(self) -> None:
-        control = self._control
-        assert control is not None
+    async def _until_told_to_stop(self) -> None:
+        """Run a cycle; one that is under way when the stop comes gives way to it."""
+        assert self._control is not None
+        if self._stopping.is_set():
+            return
+        cycle = asyncio.ensure_future(self._cycle(self._control))
+        stop = asyncio.ensure_future(self._stopping.wait())
+        await asyncio.wait((cycle, stop), return_when=asyncio.FIRST_COMPLETED)
+        stop.cancel()
+        if not cycle.done():
+            self._control.cycle.give_way()
+            await asyncio.wait((cycle,))
+        if not cycle.cancelled():
+            cycle.result()
+
+    async def _remember(self) -> None:
+        """Carry over what a restart must not forget; while its disk hangs, leave all setpoints as they stand."""
+        control, earlier = self._control, self._earlier
+        if earlier is None or control is None:
+            return
+        if self.cycles == 0:
+            patience = SIMULATED_PATIENCE if control.lockstep else PATIENCE
+            await settled(earlier, patience)
+        if earlier.done():
+            remember(control, earlier.result())
+            self._earlier = None
+            control.cycle.unknown_until = -math.inf
+            self._journal.alarm("memory", "")
+        elif control.cycle.unknown_until == -math.inf:
+            respected = control.configuration.file.cycle.respect_hand.total_seconds()
+            control.cycle.unknown_until = control.clock.monotonic() + respected
+            text = "what was set by hand before the start cannot be read yet, so all setpoints are left as they stand"
+            self._journal.alarm("memory", text)
+
+    async def _cycle(self, control: Control) -> None:
         result = await control.cycle.run()
         self.last = result
         self.cycles += 1
         image = result.image
+        other = image.value_of("plc_clock")
+        if other.quality is Quality.GOOD and other.value is not None:
+            control.clock.witness(other.value)
+        self._journal.alarm("clock", control.clock.doubt)
         with self._contained("climate alarms"):
             control.climate_alarms.tick(image, self._journal.alarm)
         with self._contained("updates"):
@@ -113,7 +167,9 @@ class Daemon:
         with self._contained("planning"):
             await self._plan_ahead(control, result)
         with self._contained("status"):
-            self.services.status.publish(self._snapshot(control, result))
+            problems = (self._configuration_problem,)
+            services, journal = self.services, self._journal
+            services.status.publish(snapshot_of(control, result, services, journal, self.cycles, problems))
         self._notifier.cycle_completed(f"{result.decision.source}: {result.decision.why}")
 
     @contextlib.contextmanager
@@ -133,7 +189,7 @@ class Daemon:
         planning, schedule = self.services.planning, control.schedule
         if planning is None or schedule is None:
             return
-        asked = await schedule.tick(result.image, self.services.updates.active())
+        asked = schedule.tick(result.image, self.services.updates.active())
         if asked and control.lockstep:
             await self._unless_stopped(planning.wait(LOCKSTEP_WAIT))
         if planning.health and not planning.busy:
@@ -165,13 +221,14 @@ class Daemon:
             control.plc.start()
         return control
 
-    async def _reload_now(self) -> None:
-        self._reload = False
+    async def _take_over_configuration(self) -> None:
+        """Go on by a configuration that was read since the last cycle, if there is one."""
         before = self._control
         assert before is not None
-        self._notifier.reloading()
         try:
-            configuration = load_configuration(self.configuration.path)
+            configuration = self._reloading.take()
+            if configuration is None:
+                return
             _refuse_what_needs_a_restart(self.configuration, configuration)
         except (IgrowError, OSError) as error:
             self._configuration_problem = f"the new configuration is not used: {error}"
@@ -186,66 +243,23 @@ class Daemon:
         self._notifier.ready()
 
     async def _end(self) -> None:
+        """Write the safe setpoints, whatever hangs; then let go of everything, each in its time."""
         self._notifier.stopping()
         control = self._control
         assert control is not None
+        report = StopReport(seen=False)
         try:
-            report = await asyncio.wait_for(control.cycle.stop(), STOP_SECONDS)
-        except TimeoutError:
-            report = None
-        try:
-            self._journal.event("stopped", setpoints=_left(report))
+            control.plc.last_orders()
+            report = await control.cycle.stop(min(max(LEAST_STOP, self._stop_by - time.monotonic()), STOP_SECONDS))
         finally:
-            await control.plc.close()
-            await self.services.status.close()
-            await asyncio.to_thread(self.services.close)
+            self._journal.event("stopped", setpoints=report.words())
+            self._reloading.close()
+            for closing in (control.plc.close(), self.services.status.close()):
+                with contextlib.suppress(TimeoutError):
+                    await asyncio.wait_for(closing, LINE_SECONDS)
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(HandOff("closing").run(self.services.close), CLOSE_SECONDS)
             self._notifier.close()
-
-    def _snapshot(self, control: Control, result: CycleResult) -> Snapshot:
-        image, services, schedule = result.image, self.services, control.schedule
-        problems = [
-            services.store.health,
-            services.planning.health if services.planning is not None else "",
-            schedule.problem if schedule is not None else "",
-            services.exchange.health if services.exchange is not None else "",
-            services.status.health,
-            self._configuration_problem,
-        ]
-        rules, points = control.configuration.guard_rules.points, control.cycle.state.points
-        return Snapshot(
-            site=control.configuration.site.name,
-            time=image.true_time,
-            monotonic=image.monotonic,
-            clock_ok=image.true_time is not None,
-            cycle=self.cycles,
-            cycle_seconds=result.seconds,
-            link_ok=image.link_ok,
-            source=result.decision.source,
-            why=result.decision.why,
-            values=image.values,
-            setpoints=result.setpoints,
-            clamps=tuple(self._journal.clamps),
-            alarms=self._journal.alarms.active,
-            plan=control.keeper.plan,
-            bundle=services.updates.describe(),
-            problems=tuple(filter(None, problems)),
-            writes_left={
-                name: rule.daily_budget - len(points[name].budget)
-                for name, rule in rules.items()
-                if rule.daily_budget is not None and name in points
-            },
-        )
-
-
-def _left(report: StopReport | None) -> str:
-    """Return in words how the setpoints were left."""
-    if report is None or not report.reached:
-        return "the PLC does not answer, so its own safe setpoints rule after its timeout"
-    if report.manual:
-        return "nothing was written, as somebody operates the PLC by hand"
-    if report.by_hand:
-        return f"the safe setpoints were written, but for {', '.join(report.by_hand)}, which a hand has set"
-    return "the safe setpoints were written"
 
 
 def _same_registers(old: Configuration, new: Configuration) -> bool:
@@ -272,7 +286,12 @@ async def run_daemon(path: Path) -> None:
     Raises IgrowError for a bad configuration, and where another daemon has the same state folder.
     """
     configuration = load_configuration(path)
-    with sole_use(configuration.state_folder):
+    with contextlib.ExitStack() as held:
+        try:
+            lock = HandOff("lock", patience=LOCK_SECONDS, share=1.0)
+            lock.do(lambda: held.enter_context(sole_use(configuration.state_folder)))
+        except LateError:
+            log.warning("%s does not answer, so nobody knows of another daemon there", configuration.state_folder)
         daemon = Daemon(configuration)
         loop = asyncio.get_running_loop()
         for number in (signal.SIGTERM, signal.SIGINT):

@@ -4,13 +4,15 @@ The cycle is written against this file alone (and `igrow.edge.bus.plc` for the P
 the bundle updates and the status page implement it; tests implement it with a few lines each.
 
 Times: `time` is seconds since 1970 UTC, or None while the clock cannot be trusted (`clock_ok` is false); a record
-without a time keeps its order. `monotonic` is seconds on the daemon's own clock. None of these calls may block
-the cycle for longer than a disk write.
+without a time keeps its order. `monotonic` is seconds on the daemon's own clock. None of these calls may hold the
+cycle, whatever disk, share, graph or network hangs behind it (`igrow.edge.hand_off`); LateError says that there is
+nothing yet.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
@@ -21,6 +23,7 @@ from igrow.edge.image import Value
 
 if TYPE_CHECKING:
     from igrow.core.planner.explain import Explanation
+    from igrow.edge.earlier import Earlier
 
 # --- records --------------------------------------------------------------------------------------------------
 
@@ -78,17 +81,17 @@ class Store(Protocol):
     def record_alarm(self, record: AlarmRecord) -> None:
         """Add one alarm row, durably, before returning."""
 
-    def writes_of_last_day(self) -> Sequence[WriteRecord]:
-        """Return the rows with outcome "written" of the 24 h before the newest such row, oldest first."""
+    def earlier(self, log_seconds: float) -> Future[Earlier]:
+        """Begin to read what an earlier run has left, with so much of its log. Never blocks."""
 
     def record_state(self, time: float | None, content: Mapping[str, object]) -> None:
         """Add what control must know again after a restart, durably, before returning; the newest counts."""
 
-    def newest_state(self) -> Mapping[str, object] | None:
-        """Return what was recorded last, or None."""
-
     def telemetry(self, start: float, end: float) -> Telemetry:
-        """Return the stored values with quality good in [start, end), seconds since 1970 UTC; others are NaN."""
+        """Return the stored values with quality good in [start, end), seconds since 1970 UTC; others are NaN.
+
+        Raises LateError and StoreError; it may take long, so this one is not for the control cycle.
+        """
 
     @property
     def health(self) -> str:
@@ -115,8 +118,8 @@ class PlanRequest:
     """What the grower's recipe would command over the horizon, by setpoint: (steps,)."""
     bundle: Path
     """Folder of the bundle in force."""
-    forecast: tuple[Telemetry, ...] = ()
-    """Weather over the horizon: the members of a forecast; none means persistence of the last days."""
+    forecast: Path | None = None
+    """File with the weather over the horizon; without one, or while it cannot be read, that of the last days."""
     seed: int = 0
 
 
@@ -143,6 +146,8 @@ class Plan:
     """The plan visits states or actions that the simulator was not trained on."""
     note: str = ""
     """For the grower: that it follows the recipe, which limits of the crop bind, what is not known of growth."""
+    problem: str = ""
+    """One line on what it had to be made without; empty when all was there."""
     predicted: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     """By quantity: the expected course at the end of each step, (steps,)."""
     binding: Mapping[str, tuple[tuple[str, ...], ...]] = field(default_factory=dict)
@@ -154,8 +159,11 @@ class Plan:
 class PlanningService(Protocol):
     """Planning in a process of its own: a plan that hangs, crashes or grows costs the cycle nothing."""
 
-    def request(self, request: PlanRequest) -> None:
-        """Start to make a plan; when one is being made already, do nothing. Never blocks."""
+    def request(self, prepare: Callable[[], PlanRequest | None]) -> None:
+        """Start to make a plan; when one is being made already, do nothing. Never blocks.
+
+        `prepare` is called aside and may read disks; with None from it there is no plan to be made.
+        """
 
     def latest(self) -> Plan | None:
         """Return the newest finished plan, or None."""
@@ -200,6 +208,10 @@ class UpdateService(Protocol):
 
         `time` None means that the clock cannot be trusted: nothing that expires may be accepted.
         """
+
+    @property
+    def health(self) -> str:
+        """Empty when all is well, else one line."""
 
     @property
     def busy(self) -> bool:

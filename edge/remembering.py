@@ -34,13 +34,14 @@ class StateNotes:
         entry = {**content, "registers": self._registers, "at": to_json(now)}
         self._store.record_state(image.true_time, entry)
 
-    def recall(self, cycle: ControlCycle, now: Moment, *, respect_hand: float) -> float | None:
-        """Give back to `cycle` what the process before this one noted.
+    def recall(
+        self, cycle: ControlCycle, content: Mapping[str, object] | None, now: Moment, *, respect_hand: float
+    ) -> float | None:
+        """Give back to `cycle` what the process before this one noted; None is nothing.
 
         Returns what time it is by the clock of the ledger, in seconds since 1970 UTC; None where that is not known.
         Where nobody knows how long it is ago, no interval counts as over and no hand as respected for long enough.
         """
-        content = self._store.newest_state()
         then = None if content is None else from_json(content.get("at"))
         if content is None or then is None:
             return now.time

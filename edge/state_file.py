@@ -1,12 +1,17 @@
-"""Small JSON files that survive a restart: written whole or not at all."""
+"""Small JSON files that survive a restart: written whole or not at all, and by the daemon aside."""
 
 from __future__ import annotations
 
+import contextlib
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import TypeVar
 
 from igrow.core.whole_files import write_whole
+from igrow.edge.hand_off import HandOff, LateError
+
+T = TypeVar("T")
 
 
 def read_state(path: Path) -> dict[str, object]:
@@ -29,3 +34,36 @@ def write_state(path: Path, content: Mapping[str, object]) -> str:
     except OSError as error:
         return f"{path}: {error.strerror or error}"
     return ""
+
+
+class StateFile:
+    """A state file as the control cycle has it: a disk that hangs can neither hold its reader nor its writer."""
+
+    def __init__(self, path: Path, aside: HandOff) -> None:
+        """Several files may share one `aside`."""
+        self.path = path
+        self._aside = aside
+        self._problem = ""
+
+    @property
+    def problem(self) -> str:
+        """Empty while it can be written, else one line."""
+        return self._aside.problem or self._problem
+
+    def read(self) -> dict[str, object]:
+        """Return what the file holds; raises LateError."""
+        return self._aside.ask(lambda: read_state(self.path))
+
+    def do(self, work: Callable[[], T]) -> T:
+        """Return what `work` with the file returns; raises LateError."""
+        return self._aside.ask(work)
+
+    def write(self, content: Mapping[str, object], unless: Callable[[], bool] = lambda: False) -> None:
+        """Replace the file, at once where the disk answers in time; not where `unless` then holds."""
+
+        def now() -> None:
+            if not unless():
+                self._problem = write_state(self.path, content)
+
+        with contextlib.suppress(LateError):
+            self._aside.do(now)

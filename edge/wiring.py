@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from igrow import __version__
-from igrow.core import agronomy
 from igrow.core.simulator.hindcast import HindcastPredictor
 from igrow.core.sun import position
 from igrow.edge.bus.plc import RegisterPlc
@@ -18,14 +18,13 @@ from igrow.edge.cycle import ControlCycle
 from igrow.edge.exchange import ExchangeService
 from igrow.edge.exchange.service import TransferRules
 from igrow.edge.guard import GuardedWriter, Readback
-from igrow.edge.guard.core import DAY, with_earlier_writes
-from igrow.edge.guard.crop import restored
 from igrow.edge.guard.writer import HEARTBEAT
+from igrow.edge.hand_off import PATIENCE, SHARE, HandOff
 from igrow.edge.journal import Journal
-from igrow.edge.moment import Moment, this_boot
+from igrow.edge.moment import this_boot
 from igrow.edge.overriding import override_file
 from igrow.edge.pace import FollowedPlant, Pace, TickPace
-from igrow.edge.planning import PlanningProcess, ProcessLimits
+from igrow.edge.planning import GraphProcess, PlanningProcess
 from igrow.edge.planning_schedule import PlanningRules, PlanningSchedule
 from igrow.edge.point_rules import highest_beat
 from igrow.edge.ports import Exchange, Plan, PlanningService, StatusService, Store, UpdateService
@@ -33,10 +32,15 @@ from igrow.edge.registers.model import TWIN_SUFFIX
 from igrow.edge.remembering import StateNotes, registers_of
 from igrow.edge.sensors import ImageBuilder, TwinSensors
 from igrow.edge.sources import FreshPlan, GrowerOverride, HandsOff, LastValidPlan, PlanKeeper, RecipeSource
+from igrow.edge.state_file import StateFile
 from igrow.edge.status import StatusServer
-from igrow.edge.store import SqliteStore, StoreLimits
+from igrow.edge.store import StoreAside, StoreError, StoreLimits
 from igrow.edge.updates import BundleUpdates, SignedSource, UpdateRules
 
+SIMULATED_PATIENCE = 60.0
+"""Seconds that a simulated plant waits for its disk, as it runs so fast that a share of its time would be none."""
+STATE_FILE_SECONDS = 1.0
+"""How long the stop waits for the small files of the state folder."""
 STATUS_FILE = "status.json"
 TWIN_TOLERANCE = {
     "air_temperature": 1.5,
@@ -51,24 +55,38 @@ FALLBACK_CYCLES = 3.0
 """A PLC's heartbeat timeout is longer than this many cycles (docs/commissioning.md)."""
 
 
+log = logging.getLogger("igrow.edge")
+
+
 @dataclass
 class Services:
     """What lives as long as the daemon."""
 
     store: Store
+    state_files: HandOff
+    """Reads and writes the small files of the state folder."""
+    graphs: GraphProcess
     planning: PlanningService | None
     updates: UpdateService
     exchange: Exchange | None
     status: StatusService
 
     def close(self) -> None:
-        """Stop all but the status page; the store last, since the others still write to it."""
+        """Stop all but the status page; the store last, since the others still write to it.
+
+        None of them waits for what hangs longer than its own few seconds.
+        """
+        self.graphs.close()
         if self.planning is not None:
             self.planning.close()
         self.updates.close()
         if self.exchange is not None:
             self.exchange.close()
-        self.store.close()
+        self.state_files.close(STATE_FILE_SECONDS)
+        try:
+            self.store.close()
+        except StoreError as error:
+            log.warning("%s", error)
 
 
 @dataclass
@@ -98,8 +116,10 @@ def open_services(configuration: Configuration) -> Services:
     state, file, site = configuration.state_folder, configuration.file, configuration.site
     simulated = file.cycle.clock is not ClockSource.SYSTEM
     limits = StoreLimits(survive_power_cut=not simulated, batch_seconds=3600.0 if simulated else 60.0)
-    store = SqliteStore(configuration.store_folder, limits)
+    patience, share = (SIMULATED_PATIENCE, 1.0) if simulated else (PATIENCE, SHARE)
+    store = StoreAside(configuration.store_folder, limits, patience=patience, share=share)
     exchange = _exchange(configuration, store)
+    graphs = GraphProcess()
     source = None
     if exchange is not None and file.updates.enabled and configuration.trusted_root is not None:
         source = SignedSource(exchange.bundles, state / "updates" / "trust", configuration.trusted_root)
@@ -108,6 +128,7 @@ def open_services(configuration: Configuration) -> Services:
         site=site.name,
         igrow_version=__version__,
         store=store,
+        graphs=graphs,
         predictor=HindcastPredictor(),
         source=source,
         reports=exchange,
@@ -119,13 +140,14 @@ def open_services(configuration: Configuration) -> Services:
     )
     planning = None
     if file.planning.enabled:
-        planning = PlanningProcess(site, ProcessLimits(timeout_seconds=file.planning.timeout.total_seconds()))
+        planning = PlanningProcess(site, graphs, seconds=file.planning.timeout.total_seconds())
     late_after = max(60.0, 3.0 * file.cycle.interval.total_seconds())
     status = StatusServer(file.status.port, state / STATUS_FILE, zone=configuration.zone, late_after=late_after)
-    return Services(store, planning, updates, exchange, status)
+    state_files = HandOff("state files", patience=patience, share=share)
+    return Services(store, state_files, graphs, planning, updates, exchange, status)
 
 
-def _exchange(configuration: Configuration, store: SqliteStore) -> ExchangeService | None:
+def _exchange(configuration: Configuration, store: StoreAside) -> ExchangeService | None:
     if configuration.exchange is None:
         return None
     settings, hosts, identity = configuration.file.transfer, configuration.known_hosts, configuration.identity
@@ -186,7 +208,7 @@ def build_control(
             configuration.sensor_rules, _twins(configuration), sun_elevation(site.latitude, site.longitude), units
         ),
         [
-            GrowerOverride(override_file(configuration.state_folder), boot),
+            GrowerOverride(StateFile(override_file(configuration.state_folder), services.state_files), boot),
             FreshPlan(keeper, fresh_for=1.5 * every),
             LastValidPlan(keeper),
             RecipeSource(file.recipe, configuration.zone),
@@ -212,41 +234,6 @@ def build_control(
         configuration, plc, clock, pace, cycle, keeper, _schedule(configuration, services), notes, boot,
         ClimateAlarms(usual_climate_alarms(site.crop) if file.climate_alarms is None else file.climate_alarms),
     )  # fmt: skip
-
-
-def remember(control: Control, store: Store) -> None:
-    """Carry over what a restart must not forget.
-
-    Hands that are respected, intervals, interlocks, what the crop has had, and writes of the last day.
-
-    To be called when the clock was first read. A write whose age cannot be known counts as just done.
-    """
-    now = Moment(control.boot, control.clock.monotonic(), control.clock.true_time())
-    respect_hand = control.configuration.file.cycle.respect_hand.total_seconds()
-    ledgers_time = control.notes.recall(control.cycle, now, respect_hand=respect_hand)
-    place, true_time = control.configuration.guard_rules.crop, now.time
-    if place is not None and true_time is not None:
-        log = store.telemetry(true_time - 2 * DAY, true_time)
-        had = restored(agronomy.remember(place, log, true_time))
-        control.cycle.state = replace(control.cycle.state, crop=had)
-    rules = control.configuration.guard_rules.points
-    if all(rule.daily_budget is None for rule in rules.values()):
-        return
-    times: dict[str, list[float]] = {}
-    for record in store.writes_of_last_day():
-        rule = rules.get(record.point)
-        if rule is not None and rule.daily_budget is not None:
-            age = 0.0 if ledgers_time is None or record.time is None else max(0.0, ledgers_time - record.time)
-            times.setdefault(record.point, []).append(now.monotonic - age)
-    control.cycle.state = with_earlier_writes(control.cycle.state, times)
-
-
-def carry_over(control: Control, before: Control) -> None:
-    """Let control go on where it stood before a reload, for all points that still mean the same register."""
-    old, new = before.configuration.register_map, control.configuration.register_map
-    was = registers_of(old, old.points)
-    same = [name for name, register in registers_of(new, new.points).items() if was.get(name) == register]
-    control.cycle.carry_over(before.cycle, same)
 
 
 def _schedule(configuration: Configuration, services: Services) -> PlanningSchedule | None:

@@ -7,11 +7,11 @@ Here an answer counts only if unit, function, length and echo are exactly those 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 READ_BITS = (1, 2)
 READ_REGISTERS = (3, 4)
-LOOPBACK = 8
+WRITE_ONE = (5, 6)
 WRITE_MANY = (15, 16)
 
 LONGEST_PDU = 253
@@ -88,11 +88,8 @@ def find_rtu_answer(request: bytes, line: bytes, crc: Callable[[bytes], bytes]) 
     answer to something else.
     """
     unit, function = request[0], request[1]
-    for start in range(len(line) - 4):
+    for start, end in sound_frames(line, crc):
         if line[start] != unit or line[start + 1] & 0x7F != function:
-            continue
-        end = _rtu_end(request, line, start)
-        if end > len(line) or crc(line[start : end - 2]) != line[end - 2 : end]:
             continue
         check_pdu(request[1:], line[start + 1 : end - 2])
         if end != len(line):
@@ -101,10 +98,23 @@ def find_rtu_answer(request: bytes, line: bytes, crc: Callable[[bytes], bytes]) 
     return None
 
 
-def _rtu_end(request: bytes, line: bytes, start: int) -> int:
-    """Return where the frame that begins at `start` ends, by its own function code and byte count."""
-    if line[start + 1] & 0x80:
+def sound_frames(line: bytes, crc: Callable[[bytes], bytes]) -> Iterator[tuple[int, int]]:
+    """Yield where each answer with a right check sum begins and ends, one after the other."""
+    start = 0
+    while start < len(line) - 4:
+        end = _rtu_end(line, start)
+        if end and end <= len(line) and crc(line[start : end - 2]) == line[end - 2 : end]:
+            yield start, end
+            start = end
+        else:
+            start += 1
+
+
+def _rtu_end(line: bytes, start: int) -> int:
+    """Return where an answer that begins at `start` ends, by its own function code and byte count; 0 for no answer."""
+    function = line[start + 1]
+    if function & 0x80:
         return start + 5
-    if request[1] in READ_BITS or request[1] in READ_REGISTERS:
+    if function in READ_BITS or function in READ_REGISTERS:
         return start + 5 + line[start + 2]
-    return start + 8
+    return start + 8 if function in (*WRITE_ONE, *WRITE_MANY) else 0

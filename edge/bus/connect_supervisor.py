@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from typing import Protocol
 
 from igrow.edge.bus.errors import NotConnectedError
@@ -43,7 +44,6 @@ class ConnectSupervisor:
         name: str,
         *,
         monotonic: Callable[[], float],
-        sleep: Callable[[float], Awaitable[None]] = asyncio.sleep,
         first_wait: float = 0.5,
         longest_wait: float = 10.0,
         settled: float = 1.0,
@@ -51,12 +51,12 @@ class ConnectSupervisor:
         self._line = line
         self._name = name
         self._monotonic = monotonic
-        self._sleep = sleep
         self._first_wait = first_wait
         self._longest_wait = longest_wait
         self._settled = settled
         self._lost = asyncio.Event()
         self._attempt_over = asyncio.Event()
+        self._hurried = asyncio.Event()
         self._task: asyncio.Task[None] | None = None
         self.connects = 0
         """How often the line came up."""
@@ -69,6 +69,12 @@ class ConnectSupervisor:
     def lost(self) -> None:
         """Hear from the line that it is gone."""
         self._lost.set()
+
+    def hurry(self) -> None:
+        """Do not wait for the next attempt to connect, this once."""
+        if self._task is not None and not self._line.connected:
+            self._attempt_over.clear()
+            self._hurried.set()
 
     async def attempt(self) -> None:
         """Wait for the end of the attempt to connect that is under way, if any."""
@@ -110,4 +116,6 @@ class ConnectSupervisor:
                 wait = 0.0 if held_long else min(max(2 * wait, self._first_wait), self._longest_wait)
             self._attempt_over.set()
             if wait > 0:
-                await self._sleep(wait)
+                with contextlib.suppress(TimeoutError):
+                    await asyncio.wait_for(self._hurried.wait(), wait)
+                self._hurried.clear()

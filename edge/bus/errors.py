@@ -41,6 +41,17 @@ class BadAnswerError(BusError):
     sent = True
 
 
+class OldAnswerError(BusError):
+    """What came may be the answer to an older request, and was thrown away. A write may have been done."""
+
+    sent = True
+
+    def __init__(self, message: str, code: int = 0) -> None:
+        super().__init__(message)
+        self.code = code
+        """Of the exception that came."""
+
+
 class RefusedError(BusError):
     """The unit answered with an exception: it understood, and did not do it."""
 

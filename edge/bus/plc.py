@@ -79,6 +79,11 @@ class RegisterPlc:
         for bus in self.buses.values():
             bus.start()
 
+    def last_orders(self) -> None:
+        """Let what is written from now on wait for no unit that rests, and for no line to be tried again."""
+        for bus in self.buses.values():
+            bus.last_orders()
+
     async def close(self) -> None:
         """Drop all lines."""
         await asyncio.gather(*(bus.close() for bus in self.buses.values()))

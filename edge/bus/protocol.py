@@ -64,6 +64,10 @@ class Bus(Protocol):
         """Return when the unit has confirmed the very values; never repeats by itself. Raises BusError."""
         ...
 
+    def last_orders(self) -> None:
+        """Let what is asked from now on wait for nothing: the daemon stops."""
+        ...
+
     async def close(self) -> None:
         """Drop the line; requests that wait fail with NotConnectedError."""
         ...

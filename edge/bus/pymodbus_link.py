@@ -9,23 +9,20 @@ after the fifth timeout of one. A link carries one exchange at a time; who sees 
 from __future__ import annotations
 
 import asyncio
-import errno
-import os
-import ssl
+import contextlib
 from collections.abc import Callable
 from typing import cast
 
 from pymodbus.framer import FramerRTU, FramerSocket
 from pymodbus.pdu import DecodePDU, ModbusPDU
 from pymodbus.pdu.bit_message import ReadCoilsRequest, ReadDiscreteInputsRequest, WriteSingleCoilRequest
-from pymodbus.pdu.diag_message import ReturnQueryDataRequest
 from pymodbus.pdu.register_message import (
     ReadHoldingRegistersRequest,
     ReadInputRegistersRequest,
     WriteMultipleRegistersRequest,
     WriteSingleRegisterRequest,
 )
-from pymodbus.transport.serialtransport import create_serial_connection
+from pymodbus.transport.serialtransport import SerialTransport
 
 from igrow.edge.bus.answer_check import (
     MisfitError,
@@ -41,9 +38,13 @@ from igrow.edge.bus.errors import (
     ConnectionLostError,
     NoAnswerError,
     NotConnectedError,
+    OldAnswerError,
     refusal,
 )
+from igrow.edge.bus.opening import open_socket, why_not_open, words
+from igrow.edge.bus.owed import OwedAnswers
 from igrow.edge.bus.protocol import ReadRequest, WriteRequest
+from igrow.edge.hand_off import HandOff, LateError
 from igrow.edge.registers.model import BusSettings, Function, Parity, Transport
 
 _READS: dict[Function, type[ModbusPDU]] = {
@@ -59,22 +60,33 @@ into pieces some 10 to 20 ms apart."""
 
 LONGEST_NOISE = 1024
 """Bytes without an answer among them after which a line is given up for this request."""
+LONGEST_FRAME = 256
+"""Bytes of the longest RTU frame."""
+
+
+_PARITY = {Parity.NONE: "N", Parity.EVEN: "E", Parity.ODD: "O"}
 
 
 async def open_serial_port(
-    protocol: Callable[[], asyncio.Protocol], port: str, baudrate: int, parity: Parity, stop_bits: int
+    protocol: asyncio.Protocol, port: str, baudrate: int, parity: Parity, stop_bits: int, aside: HandOff
 ) -> None:
-    """Connect a protocol to a serial port, 8 data bits. Raises OSError where the port is absent or taken."""
-    await create_serial_connection(
-        asyncio.get_running_loop(),
-        protocol,
-        port,
-        baudrate=baudrate,
-        bytesize=8,
-        parity={Parity.NONE: "N", Parity.EVEN: "E", Parity.ODD: "O"}[parity],
-        stopbits=stop_bits,
-        timeout=0,
+    """Connect a protocol to a serial port, 8 data bits; a driver that hangs in it holds nobody.
+
+    Raises OSError where the port is absent or taken, LateError while an earlier attempt hangs.
+    """
+    loop = asyncio.get_running_loop()
+    transport = await aside.run(
+        lambda: SerialTransport(loop, protocol, port, baudrate, 8, _PARITY[parity], stop_bits, 0),
+        undo=lambda late: late.sync_serial.close(),
     )
+    loop.call_soon(transport.setup)
+
+
+def _drop(transport: asyncio.Transport) -> None:
+    """Close a line at once: what was not sent yet is thrown away, as closing a serial port would wait for it."""
+    if isinstance(transport, SerialTransport) and transport.sync_serial:
+        transport.sync_serial.reset_output_buffer()
+    transport.close()
 
 
 class PymodbusLink(asyncio.Protocol):
@@ -90,13 +102,19 @@ class PymodbusLink(asyncio.Protocol):
         self._framer = (FramerRTU if self._rtu else FramerSocket)(self._decoder)
         self._transport: asyncio.Transport | None = None
         self._received = b""
+        self._stray = b""
         self._request = b""
+        self._what: object = None
         self._waiter: asyncio.Future[bytes] | None = None
+        self._timer: asyncio.TimerHandle
         self._transaction = 0
-        self._owed = 0
+        self._unanswered = 0
         self._last_byte = 0.0
         self._opened = asyncio.Event()
+        self._aside = HandOff(f"bus {settings.name}")
         self._loop = asyncio.get_running_loop()
+        self.owed = OwedAnswers(self._loop.time, settings.timeout, _check_sum) if self._rtu else None
+        """What the line may still say to requests that were given up; None where answers are numbered."""
 
     @property
     def connected(self) -> bool:
@@ -108,19 +126,15 @@ class PymodbusLink(asyncio.Protocol):
         settings = self._settings
         try:
             async with asyncio.timeout(settings.timeout):
+                self._opened.clear()
                 if settings.transport is Transport.RTU:
-                    self._opened.clear()
-                    port = settings.serial_port
-                    await open_serial_port(lambda: self, port, settings.baudrate, settings.parity, settings.stop_bits)
-                    await self._opened.wait()  # pyserial's transport reports in a later turn of the event loop
+                    port = (settings.serial_port, settings.baudrate, settings.parity, settings.stop_bits)
+                    await open_serial_port(self, *port, self._aside)
                 else:
-                    tls = _tls_context(settings) if settings.transport is Transport.TLS else None
-                    name = (settings.server_name or settings.host) if tls else None
-                    await self._loop.create_connection(
-                        lambda: self, settings.host, settings.port, ssl=tls, server_hostname=name
-                    )
-        except (OSError, TimeoutError, ValueError) as error:
-            raise NotConnectedError(f"bus {settings.name}: {self._reason(error)}") from error
+                    await open_socket(settings, self, self._aside)
+                await self._opened.wait()  # pyserial's transport reports in a later turn of the event loop
+        except (OSError, TimeoutError, ValueError, LateError) as error:
+            raise NotConnectedError(f"bus {settings.name}: {why_not_open(settings, error)}") from error
 
     def close(self) -> None:
         """Drop the line; an exchange in progress fails with ConnectionLostError."""
@@ -128,7 +142,7 @@ class PymodbusLink(asyncio.Protocol):
         self._received = b""
         if transport is not None:
             self._fail(ConnectionLostError(f"bus {self._settings.name}: the line was closed"))
-            transport.close()
+            _drop(transport)
             self._on_lost()
 
     async def read(self, request: ReadRequest) -> tuple[int, ...]:
@@ -151,15 +165,6 @@ class PymodbusLink(asyncio.Protocol):
         pdu.dev_id = request.device_id
         await self._exchange(pdu, request)
 
-    async def loop_back(self, device_id: int, marker: int) -> None:
-        """Let a unit echo `marker` (0 to 65535; diagnostics, function 8). Raises BusError.
-
-        Function 8 reads and writes no point, so neither its echo nor its refusal can be mistaken for the answer
-        to anything else: once it has come, every older request of the unit has been answered or never will be.
-        """
-        pdu = ReturnQueryDataRequest(message=marker.to_bytes(2, "big"), dev_id=device_id)
-        await self._exchange(pdu, f"unit {device_id}, loop back")
-
     async def drain(self) -> None:
         """Throw away what still comes in, until the line is quiet; at most one timeout long."""
         now = self._loop.time()
@@ -170,42 +175,52 @@ class PymodbusLink(asyncio.Protocol):
             now = self._loop.time()
         self._received = b""
 
-    def _reason(self, error: Exception) -> str:
-        """Return why the line could not be opened, for people."""
-        settings = self._settings
-        if isinstance(error, TimeoutError):
-            return f"no connection to {self._where} within {settings.timeout:g} s"
-        if isinstance(error, OSError) and error.strerror:
-            return f"no connection to {self._where}: {_words(error)}"
-        return str(error)
-
-    @property
-    def _where(self) -> str:
-        settings = self._settings
-        return settings.serial_port or f"{settings.host}:{settings.port}"
-
     async def _exchange(self, pdu: ModbusPDU, what: object) -> ModbusPDU:
         transport = self._transport
         if transport is None or transport.is_closing():
             raise NotConnectedError(f"bus {self._settings.name}: not connected")
         if self._rtu:
-            self._received = b""
+            self._received = self._stray = b""
         else:
-            self._owed += 1
+            self._unanswered += 1
             self._transaction = self._transaction % 0xFFFF + 1
             pdu.transaction_id = self._transaction
         self._request = self._framer.buildFrame(pdu)
+        self._what = what
         self._waiter = waiter = self._loop.create_future()
         transport.write(self._request)
-        timer = self._loop.call_later(self._settings.timeout, self._time_out)
+        self._timer = self._loop.call_later(self._settings.timeout, self._time_out)
+        # Who asked may go away; the line is taken until its answer is here, or its time is over (`abandoned`).
+        with contextlib.suppress(BusError):
+            await asyncio.shield(waiter)
+        return self._finish()
+
+    async def abandoned(self) -> None:
+        """Wait for the end of an exchange whose asker went away; raises BusError as the exchange would have."""
+        if self._waiter is not None:
+            await asyncio.wait((self._waiter,))
+            self._finish()
+
+    @property
+    def exchanging(self) -> bool:
+        """A request was sent, and its answer is neither here nor given up."""
+        return self._waiter is not None
+
+    def _finish(self) -> ModbusPDU:
+        """Return the answer of an exchange that is over; raises BusError."""
+        waiter, what, self._waiter = self._waiter, self._what, None
+        assert waiter is not None
+        self._timer.cancel()
         try:
-            answer = await waiter
+            answer = waiter.result()
         except BusError as error:
+            if self.owed is not None:
+                self.owed.give_up(self._request[:-2])
             raise type(error)(f"{what}: {error}") from None
-        finally:
-            timer.cancel()
-            self._waiter = None
         if answer[0] & 0x80:
+            if self.owed is not None and self.owed.owes_any(self._request[0], self._request[1]):
+                self.owed.give_up(self._request[:-2])
+                raise OldAnswerError(f"{what}: a refusal that may be for an older request", answer[1])
             raise refusal(str(what), answer[1])
         decoded = self._decoder.decode(answer)
         if decoded is None:
@@ -229,7 +244,7 @@ class PymodbusLink(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Take the line into use."""
         self._transport = cast(asyncio.Transport, transport)
-        self._owed = 0
+        self._unanswered = 0
         self._opened.set()
         self._received = b""
 
@@ -237,7 +252,7 @@ class PymodbusLink(asyncio.Protocol):
         """Tell those who wait, at once, and the supervisor."""
         if self._transport is not None:
             self._transport = None
-            self._fail(ConnectionLostError(f"the line broke{f' ({_words(exc)})' if exc else ''}"))
+            self._fail(ConnectionLostError(f"the line broke{f' ({words(exc)})' if exc else ''}"))
             self._on_lost()
 
     def data_received(self, data: bytes) -> None:
@@ -255,10 +270,12 @@ class PymodbusLink(asyncio.Protocol):
             self._fail(BadAnswerError(str(error)))
 
     def _take_from_line(self, data: bytes) -> None:
-        waiter = self._waiter
+        waiter, owed = self._waiter, self.owed
+        assert owed is not None
         if waiter is None or waiter.done():
+            self._stray = owed.arrived(self._stray + data)[-LONGEST_FRAME:]
             return
-        self._received += data
+        self._received = owed.arrived(self._received + data)
         if len(self._received) > LONGEST_NOISE:
             self._received = b""
             raise MisfitError("the line does not stop talking")
@@ -275,10 +292,10 @@ class PymodbusLink(asyncio.Protocol):
         while size := first_tcp_frame(self._received):
             frames.append(self._received[:size])
             self._received = self._received[size:]
-        if self._received and self._owed > 1:
+        if self._received and self._unanswered > 1:
             raise TornStreamError("half a frame while older answers are still to come")
         for frame in frames:
-            self._owed = max(0, self._owed - 1)
+            self._unanswered = max(0, self._unanswered - 1)
             waiter = self._waiter
             if waiter is None or waiter.done() or frame[:2] != self._request[:2]:
                 continue  # the late answer to a request that was given up
@@ -292,18 +309,3 @@ class PymodbusLink(asyncio.Protocol):
 
 def _check_sum(frame: bytes) -> bytes:
     return FramerRTU.compute_CRC(frame).to_bytes(2, "big")
-
-
-def _tls_context(settings: BusSettings) -> ssl.SSLContext:
-    context = ssl.create_default_context(cafile=settings.certificate_authority)
-    if settings.certificate is not None:
-        context.load_cert_chain(settings.certificate, settings.private_key)
-    return context
-
-
-def _words(error: Exception) -> str:
-    """Return an error's reason without what asyncio and pyserial add for programmers."""
-    if not isinstance(error, OSError) or not error.strerror:
-        return str(error)
-    # A name that is not found has a number of its own.
-    return os.strerror(error.errno or 0) if error.errno in errno.errorcode else error.strerror

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import heapq
-from types import TracebackType
 
 from igrow.edge.bus.errors import NotConnectedError, QueueFullError
 from igrow.edge.bus.protocol import Priority
@@ -76,21 +75,3 @@ class RequestSlot:
     def waiting(self) -> int:
         """Number of requests that wait."""
         return sum(not turn.done() for _, _, turn in self._waiting)
-
-
-class Turn:
-    """`async with Turn(slot, priority)`: hold the slot for one request."""
-
-    __slots__ = ("_priority", "_slot")
-
-    def __init__(self, slot: RequestSlot, priority: Priority) -> None:
-        self._slot = slot
-        self._priority = priority
-
-    async def __aenter__(self) -> None:
-        await self._slot.acquire(self._priority)
-
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._slot.release()

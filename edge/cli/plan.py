@@ -14,7 +14,6 @@ from igrow.core.quantities import QUANTITIES
 from igrow.edge.cli.common import add_configuration, configuration_of, parse_time
 from igrow.edge.configuration import Configuration
 from igrow.edge.planning.make_plan import make_plan
-from igrow.edge.planning.open_meteo import read_forecast
 from igrow.edge.ports import Plan, PlanRequest
 from igrow.edge.sources.recipe import recipe_course
 from igrow.edge.store import read_telemetry
@@ -54,14 +53,13 @@ def compute(configuration: Configuration, bundle: Path | None, at: str | None) -
     step = settings.step.total_seconds()
     start = now - now % step
     steps = round(site.planning.horizon.total_seconds() / step)
-    forecast = configuration.forecast_file
     request = PlanRequest(
         time=start,
         step_seconds=step,
         telemetry=read_telemetry(configuration.store_folder, now - settings.history.total_seconds(), now + 1.0),
         recipe=recipe_course(configuration.file.recipe, configuration.zone, start, step, steps),
         bundle=folder,
-        forecast=read_forecast(forecast) if forecast and forecast.exists() else (),
+        forecast=configuration.forecast_file,
         seed=settings.seed,
     )
     return make_plan(site, request)
@@ -81,8 +79,7 @@ def table(plan: Plan, zone: ZoneInfo) -> Iterator[str]:
     yield f"expected  {plan.expected_profit:.4f} EUR m-2 by the plan, {plan.recipe_profit:.4f} by the recipe"
     if plan.leaves_range:
         yield "careful: this plan leaves the range of the data that the simulator was made from"
-    if plan.note:
-        yield plan.note
+    yield from filter(None, (plan.note, plan.problem))
     heads = [f"{name} ({QUANTITIES[name].unit})" for name in names] + [f"-> {name}" for name in predicted]
     yield "  ".join(["time            ", *heads])
     for step in range(len(plan.setpoints[names[0]])):

@@ -21,6 +21,7 @@ from igrow.core.whole_files import write_whole
 from igrow.edge.exchange.courier import STATUS_FILE, Order
 from igrow.edge.exchange.outbox import REPORTS
 from igrow.edge.exchange.sealing import GRACE_SECONDS
+from igrow.edge.hand_off import HandOff, LateError
 
 SOON_SECONDS = 2.0
 """Least time between two rounds, by the wall clock, also for a plant whose days pass in seconds."""
@@ -80,6 +81,8 @@ class ExchangeService:
         self._newest: float | None = None
         self._report_waits = False
         self._problem = ""
+        # Starting a process and reading what it left touch the gateway's own disk, which may hang as well.
+        self._aside = HandOff("exchange")
 
     @property
     def bundles(self) -> Path:
@@ -89,7 +92,7 @@ class ExchangeService:
     @property
     def health(self) -> str:
         """Empty when all is well, else one line."""
-        return self._problem
+        return self._aside.problem or self._problem
 
     @property
     def busy(self) -> bool:
@@ -98,6 +101,10 @@ class ExchangeService:
 
     def tick(self, time: float | None) -> None:
         """Start a round where one is due at `time` (seconds since 1970 UTC, None where unknown); never blocks."""
+        with contextlib.suppress(LateError):
+            self._aside.ask(lambda: self._tick(time))
+
+    def _tick(self, time: float | None) -> None:
         self._reap()
         self._newest = time
         if self._process is not None:
@@ -122,11 +129,18 @@ class ExchangeService:
 
     def close(self) -> None:
         """Give a last round a few seconds; what it does not finish, the first one after the next start does."""
+        with contextlib.suppress(LateError):
+            self._aside.post(self._last_round)
+        self._aside.close(CLOSING_SECONDS + 1.0)
+
+    def _last_round(self) -> None:
         until = self._monotonic() + CLOSING_SECONDS
-        if self._process is None or self._waited(until):
-            self._start(self._newest, partly=True)
-            self._waited(until)
-        self._end()
+        try:
+            if self._process is None or self._waited(until):
+                self._start(self._newest, partly=True)
+                self._waited(until)
+        finally:
+            self._end()
 
     def _start(self, time: float | None, *, partly: bool) -> None:
         self._store.flush()

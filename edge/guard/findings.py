@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -51,3 +52,19 @@ class Hand:
     """How long it still is."""
     stands: bool
     """It is what the PLC shows; otherwise something else has moved the point away."""
+
+
+def moved_and_stood(findings: Sequence[Finding], *, briefly: float) -> tuple[set[str], dict[str, float]]:
+    """Return the points whose ramps begin where the PLC now stands, and those that go on, with where they stood.
+
+    A PLC that was unseen for at most `briefly` seconds and has started anew was off for a moment only.
+    """
+    moved: set[str] = set()
+    stood: dict[str, float] = {}
+    for found in findings:
+        off = found.outcome is Outcome.RESTARTED and found.unseen <= briefly
+        if found.expected is not None and (found.outcome is Outcome.CROSSED or off):
+            stood[found.point] = found.expected
+        elif found.outcome not in (Outcome.CONFIRMED, Outcome.HAND_ENDED):
+            moved.add(found.point)
+    return moved, stood

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import QUANTITIES, WEATHER
 from igrow.core.telemetry import Telemetry, to_grid
+from igrow.edge.hand_off import HandOff, LateError
+from igrow.edge.planning.open_meteo import read_forecast
 
 NEEDED = WEATHER[:6]
 """The weather that plans are made from, in the registry's order."""
@@ -19,7 +22,28 @@ DAYS = 3
 ANOMALY_HOURS = 12.0
 """Time in which what differs from those days now is expected to fade to a third."""
 
+READ_SECONDS = 10.0
+"""How long a plan waits for the forecast's file."""
+
 Values = NDArray[np.float64]
+
+
+def forecast_in_time(path: Path | None) -> tuple[tuple[Telemetry, ...], str]:
+    """Return the members of the forecast in a file and an empty text, or none and one line that says why.
+
+    A forecast makes a plan better; one that is late, broken or on a share that hangs does not cost the plan.
+    """
+    if path is None:
+        return (), ""
+    try:
+        return HandOff("the forecast", patience=READ_SECONDS, share=1.0).do(lambda: read_forecast(path)), ""
+    except LateError:
+        problem = f"{path}: not read within {READ_SECONDS:g} s"
+    except IgrowError as error:
+        problem = str(error)
+    except Exception as error:
+        problem = f"{path}: cannot be read: {type(error).__name__}"
+    return (), f"planned with the weather of the last days, as there is no forecast: {problem}"
 
 
 def persistence(log: Telemetry, start: int, hours: int) -> Values:

@@ -31,7 +31,7 @@ from igrow.core.simulator.growth import GrowthBalance
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Greenhouse, Site
 from igrow.core.telemetry import Telemetry
-from igrow.edge.planning.forecast import from_forecast, hourly, persistence, without_gaps
+from igrow.edge.planning.forecast import forecast_in_time, from_forecast, hourly, persistence, without_gaps
 from igrow.edge.ports import Plan, PlanRequest
 
 HOUR = 3600
@@ -53,7 +53,8 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
     horizon = round(len(next(iter(request.recipe.values()))) * request.step_seconds)
     # The simulator knows whole days; the hours beyond the horizon are planned too, and not used.
     hours = 24 * math.ceil(horizon / (24 * HOUR))
-    courses = [from_forecast(one, request.telemetry, start, hours) for one in request.forecast]
+    members, problem = forecast_in_time(request.forecast)
+    courses = [from_forecast(one, request.telemetry, start, hours) for one in members]
     courses = courses or [persistence(request.telemetry, start, hours)]
     forecast = np.mean(courses, axis=0)
     state = PlanningState(
@@ -94,6 +95,7 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
         recipe_profit=result.recipe_profit,
         leaves_range=result.leaves_range,
         note=_note(result, binding, corrected),
+        problem=problem,
         predicted={
             name: tuple(float(values[:, 0, hour].mean()) for hour in hour_of_step)
             for name, values in (

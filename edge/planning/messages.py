@@ -1,4 +1,7 @@
-"""Messages between the daemon and its planning process: a length and a pickle, over pipes that only they hold."""
+"""Messages between the daemon and its planning process: a length and a pickle, over pipes that only they hold.
+
+Neither side waits for ever: the other one may have been stopped, or be swapping.
+"""
 
 from __future__ import annotations
 
@@ -17,12 +20,15 @@ class MessageError(Exception):
     """The other side is gone, too slow, or sends what is no message."""
 
 
-def send(descriptor: int, message: object) -> None:
-    """Write one message; raises MessageError when the other side is gone."""
+def send(descriptor: int, message: object, timeout: float) -> None:
+    """Write one message; raises MessageError after `timeout` seconds, or when the other side is gone."""
     body = pickle.dumps(message, protocol=5)
     view = memoryview(_LENGTH.pack(len(body)) + body)
+    until = time.monotonic() + timeout
+    os.set_blocking(descriptor, False)
     try:
         while view:
+            _wait(descriptor, select.POLLOUT, until)
             view = view[os.write(descriptor, view) :]
     except OSError as error:
         raise MessageError(f"the process is gone ({error.strerror})") from None
@@ -40,12 +46,18 @@ def receive(descriptor: int, timeout: float) -> Any:
 def _read(descriptor: int, count: int, until: float) -> bytes:
     chunks = []
     while count:
-        ready, _, _ = select.select([descriptor], [], [], max(0.0, until - time.monotonic()))
-        if not ready:
-            raise MessageError("it took too long")
+        _wait(descriptor, select.POLLIN, until)
         chunk = os.read(descriptor, min(count, 1 << 20))
         if not chunk:
             raise MessageError("it ended")
         chunks.append(chunk)
         count -= len(chunk)
     return b"".join(chunks)
+
+
+def _wait(descriptor: int, events: int, until: float) -> None:
+    """Wait until the pipe can be read or written; raises MessageError when it is too late."""
+    poll = select.poll()
+    poll.register(descriptor, events)
+    if not poll.poll(max(0.0, until - time.monotonic()) * 1000.0):
+        raise MessageError("it took too long")

@@ -1,55 +1,92 @@
-"""The planning process: reads requests from its standard input, answers each with a plan or one line of error.
+"""The planning process: reads calls from its standard input, answers each with a result or one error.
 
-`python -m igrow.edge.planning.worker MODULE FUNCTION IDLE MEMORY` calls MODULE.FUNCTION(site, request) for each
-request, ends after IDLE seconds without one, and never takes more than MEMORY bytes of data.
+`python -m igrow.edge.planning.worker PARENT IDLE MEMORY` imports the function that a call names and calls it, ends
+after IDLE seconds without a call or when the process PARENT is gone, and never takes more than MEMORY bytes of data.
 """
 
 from __future__ import annotations
 
+import contextlib
 import importlib
+import math
 import os
+import pickle
 import resource
 import sys
 import threading
 import time
+from pathlib import Path
 
 from igrow.core.errors import IgrowError
 from igrow.edge.planning.messages import MessageError, receive, send
 
+ANSWER_SECONDS = 60.0
+"""Longest time that the daemon may take to fetch an answer."""
+
 
 def main(arguments: list[str]) -> int:
-    """Serve requests until the daemon is gone or has nothing to ask."""
-    module, function, idle, memory = arguments
-    # A plan is never urgent: the control cycle and everything else come first.
-    os.nice(10)
-    resource.setrlimit(resource.RLIMIT_DATA, (int(memory), int(memory)))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    """Serve calls until the daemon is gone or has nothing to ask."""
+    parent, idle, memory = int(arguments[0]), float(arguments[1]), int(arguments[2])
+    threading.Thread(target=_end_with_parent, args=(parent,), daemon=True).start()
+    _give_way(memory)
     # Whatever a library prints must not end up between two messages.
     answers = os.dup(1)
     os.dup2(2, 1)
-    threading.Thread(target=_end_with_parent, args=(os.getppid(),), daemon=True).start()
-    plan = getattr(importlib.import_module(module), function)
     while True:
         try:
-            site, request = receive(0, float(idle))
+            function, given, seconds = receive(0, idle)
         except MessageError:
             return 0
         try:
-            answer: tuple[str, object] = ("plan", plan(site, request))
-        except IgrowError as error:
-            answer = ("error", str(error))
-        except MemoryError:
-            answer = ("error", f"the plan needs more than {int(memory) >> 20} MiB")
-        except Exception as error:
-            answer = ("error", f"{type(error).__name__}: {error}")
-        try:
-            send(answers, answer)
+            send(answers, _answer(function, given, seconds, memory), ANSWER_SECONDS)
         except MessageError:
             return 0
+
+
+def _answer(function: str, given: tuple[object, ...], seconds: float, memory: int) -> tuple[str, object]:
+    _bound_processor(seconds)
+    try:
+        module, name = function.split(":")
+        return "done", getattr(importlib.import_module(module), name)(*given)
+    except IgrowError as error:
+        return "raised", _portable(error)
+    except MemoryError:
+        return "failed", f"it needs more than {memory >> 20} MiB"
+    except Exception as error:
+        return "failed", f"{type(error).__name__}: {error}"
+
+
+def _portable(error: IgrowError) -> IgrowError:
+    """Return the error, or its text as a plain one where it does not survive the way."""
+    try:
+        copy = pickle.loads(pickle.dumps(error))
+    except Exception:
+        return IgrowError(str(error))
+    return error if isinstance(copy, IgrowError) else IgrowError(str(error))
+
+
+def _give_way(memory: int) -> None:
+    """Come last for processor and memory: the control cycle and everything else come first."""
+    os.nice(10)
+    resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    with contextlib.suppress(OSError):
+        # Where the machine's memory runs out in spite of that, this process goes, and not the daemon.
+        Path("/proc/self/oom_score_adj").write_text("1000")
+
+
+def _bound_processor(seconds: float) -> None:
+    """Let the kernel end this process when one call takes more processor time than it may take at all.
+
+    The daemon ends it by the wall's clock; this holds while the daemon is stopped or busy with its own end.
+    """
+    usage = resource.getrusage(resource.RUSAGE_SELF)
+    _, hard = resource.getrlimit(resource.RLIMIT_CPU)
+    resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(usage.ru_utime + usage.ru_stime + seconds) + 1, hard))
 
 
 def _end_with_parent(parent: int) -> None:
-    """End at once when the daemon is gone, also in the middle of a plan."""
+    """End at once when the daemon is gone, also in the middle of a call and before the first."""
     while os.getppid() == parent:
         time.sleep(0.5)
     os._exit(0)

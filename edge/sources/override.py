@@ -2,20 +2,23 @@
 
 `igrow-edge override` leaves a small file; the daemon looks at it in each cycle. A lease counts from when the daemon
 first sees it, on the monotonic clock; the daemon then notes in the file when that was, so that a restart does not
-begin it again, and a date that jumps does not end it.
+begin it again, and a date that jumps does not end it. The file is read and written aside: while its disk hangs, what
+was last read from it goes on.
 """
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from igrow.edge.hand_off import LateError
 from igrow.edge.image import Image
 from igrow.edge.moment import Moment, from_json, to_json
 from igrow.edge.sources.decision import Offer
-from igrow.edge.state_file import read_state, write_state
+from igrow.edge.state_file import StateFile, read_state, write_state
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,13 +51,14 @@ def read_leases(path: Path) -> dict[str, Lease]:
 
 def write_leases(path: Path, leases: Mapping[str, Lease]) -> str:
     """Replace the file; return an empty text or one line that says why it could not be written."""
-    return write_state(
-        path,
-        {
-            name: {"value": x.value, "seconds": x.seconds, "until": x.until, "seen": x.seen and to_json(x.seen)}
-            for name, x in leases.items()
-        },
-    )
+    return write_state(path, _plain(leases))
+
+
+def _plain(leases: Mapping[str, Lease]) -> dict[str, object]:
+    return {
+        name: {"value": x.value, "seconds": x.seconds, "until": x.until, "seen": x.seen and to_json(x.seen)}
+        for name, x in leases.items()
+    }
 
 
 class GrowerOverride:
@@ -62,9 +66,9 @@ class GrowerOverride:
 
     name = "override"
 
-    def __init__(self, path: Path, boot: str = "") -> None:
+    def __init__(self, file: StateFile, boot: str = "") -> None:
         """`boot` names this start of the machine, while its monotonic clock is the daemon's."""
-        self._path = path
+        self._file = file
         self._boot = boot
         self._stamp: tuple[int, int] | None = None
         self._leases: dict[str, Lease] = {}
@@ -81,10 +85,17 @@ class GrowerOverride:
         return Offer(why, {name: lease.value for name, lease in running.items()})
 
     def _look(self, image: Image) -> None:
+        """Take over what the file holds when it has changed."""
+        with contextlib.suppress(LateError):
+            stamp, leases = self._file.do(self._changed)
+            if leases is not None:
+                self._stamp = stamp
+                self._take(leases, image)
+
+    def _changed(self) -> tuple[tuple[int, int] | None, dict[str, Lease] | None]:
+        """Return the file's stamp, and its leases where it has changed (aside)."""
         stamp = self._file_stamp()
-        if stamp != self._stamp:
-            self._take(read_leases(self._path) if stamp else {}, image)
-            self._stamp = self._file_stamp()
+        return stamp, (read_leases(self._file.path) if stamp else {}) if stamp != self._stamp else None
 
     def _take(self, leases: dict[str, Lease], image: Image) -> None:
         now = Moment(self._boot, image.monotonic, image.true_time)
@@ -100,11 +111,13 @@ class GrowerOverride:
             dated[name] = replace(lease, until=end if lease.until is None else lease.until, seen=lease.seen or now)
         self._leases = dated
         if dated != leases:
-            write_leases(self._path, dated)
+            read = self._stamp
+            # Not over another override that the grower has left in the meantime.
+            self._file.write(_plain(dated), unless=lambda: self._file_stamp() != read)
 
     def _file_stamp(self) -> tuple[int, int] | None:
         try:
-            status = self._path.stat()
+            status = self._file.path.stat()
         except OSError:
             return None
         return status.st_mtime_ns, status.st_ino

@@ -14,6 +14,7 @@ from datetime import UTC, tzinfo
 from enum import Enum
 from pathlib import Path
 
+from igrow.edge.hand_off import HandOff, LateError
 from igrow.edge.ports import Snapshot
 from igrow.edge.status.history import History
 from igrow.edge.status.metrics import render_metrics
@@ -22,12 +23,16 @@ from igrow.edge.status.page import render_page
 _log = logging.getLogger("igrow.edge.status")
 CONNECTIONS = 16
 """At once; more are turned away, as a page must never cost the cycle its time."""
+MOST_CONNECTIONS = 64
+"""At once; more are hung up on without a word, as each costs a handle for as long as its visitor says nothing."""
 REQUEST_BYTES = 8192
 REQUEST_SECONDS = 5.0
 STATE_FILE_SECONDS = 10.0
 OWN_NAMES = ("localhost", "127.0.0.1", "[::1]")
 """What a visitor of this very machine calls it. A page of another site that had its own name point here (DNS rebinding)
 would say that name."""
+CLOSE_SECONDS = 2.0
+"""How long the stop waits for the last state to be left."""
 
 
 class StatusServer:
@@ -64,12 +69,13 @@ class StatusServer:
         self._snapshot: Snapshot | None = None
         self._history = History()
         self._server: asyncio.Server | None = None
-        self._open = 0
+        self._visits: set[asyncio.Task[None]] = set()
+        self._aside = HandOff("status file")
 
     @property
     def health(self) -> str:
         """Empty while it listens and can leave its file, else one line."""
-        return "; ".join(filter(None, (self._unreachable, self._unwritten)))
+        return "; ".join(filter(None, (self._unreachable, self._aside.problem or self._unwritten)))
 
     async def start(self) -> None:
         """Begin to listen; a port that is taken is a problem to report, not a reason to stop."""
@@ -88,51 +94,66 @@ class StatusServer:
         self._history.add(snapshot)
         if self._state_file is not None and self._published_at - self._written_at >= STATE_FILE_SECONDS:
             self._written_at = self._published_at
-            self._write_state()
+            self._leave_state()
 
     async def close(self) -> None:
-        """Stop listening, and leave the last state."""
-        self._write_state()
+        """Stop listening, turn visitors away, and leave the last state where the disk takes it."""
         if self._server is not None:
             self._server.close()
-            await self._server.wait_closed()
+        for task in tuple(self._visits):
+            task.cancel()
+        self._leave_state()
+        self._aside.close(CLOSE_SECONDS)
 
-    def _write_state(self) -> None:
-        if self._state_file is None or self._snapshot is None:
+    def _leave_state(self) -> None:
+        """Have the newest state written, unless an older one is still being written."""
+        if self._state_file is None or self._snapshot is None or self._aside.waiting:
             return
-        partial = self._state_file.with_name(self._state_file.name + ".part")
+        file, text = self._state_file, json.dumps({"port": self.port, "state": plain(self._snapshot)})
+        with contextlib.suppress(LateError):
+            self._aside.do(lambda: self._write_state(file, text))
+
+    def _write_state(self, file: Path, text: str) -> None:
+        partial = file.with_name(file.name + ".part")
         try:
             # Not synchronised: it is made anew all the time, and a power cut may take it.
-            partial.write_text(json.dumps({"port": self.port, "state": plain(self._snapshot)}))
-            partial.replace(self._state_file)
+            partial.write_text(text)
+            partial.replace(file)
             self._unwritten = ""
         except OSError as error:
-            self._unwritten = f"status file: {self._state_file}: {error.strerror or error}"
+            self._unwritten = f"status file: {file}: {error.strerror or error}"
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self._open += 1
+        visit = asyncio.current_task()
+        assert visit is not None
         try:
-            async with asyncio.timeout(REQUEST_SECONDS):
-                status, kind, body = await self._answer(reader)
-                head = (
-                    f"HTTP/1.1 {status}\r\nContent-Type: {kind}; charset=utf-8\r\nContent-Length: {len(body)}\r\n"
-                    "Cache-Control: no-store\r\nConnection: close\r\nX-Content-Type-Options: nosniff\r\n"
-                    "Content-Security-Policy: default-src 'none'; style-src 'unsafe-inline'; img-src data:\r\n\r\n"
-                )
-                writer.write(head.encode() + body)
-                await writer.drain()
+            if len(self._visits) < MOST_CONNECTIONS:
+                self._visits.add(visit)
+                async with asyncio.timeout(REQUEST_SECONDS):
+                    await self._visit(reader, writer)
         except (OSError, TimeoutError, asyncio.IncompleteReadError, asyncio.LimitOverrunError):
             pass  # the visitor is gone, slow, or no browser; none of it is the daemon's concern
         finally:
-            self._open -= 1
-            writer.close()
-            with contextlib.suppress(OSError):
-                await writer.wait_closed()
+            self._visits.discard(visit)
+            # Not closed in good order: a visitor who does not read what was written would have to be waited for.
+            writer.transport.abort()
+
+    async def _visit(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        status, kind, body = await self._answer(reader)
+        head = (
+            f"HTTP/1.1 {status}\r\nContent-Type: {kind}; charset=utf-8\r\nContent-Length: {len(body)}\r\n"
+            "Cache-Control: no-store\r\nConnection: close\r\nX-Content-Type-Options: nosniff\r\n"
+            "Content-Security-Policy: default-src 'none'; style-src 'unsafe-inline'; img-src data:\r\n\r\n"
+        )
+        writer.write(head.encode() + body)
+        await writer.drain()
+        writer.close()
+        await writer.wait_closed()
 
     async def _answer(self, reader: asyncio.StreamReader) -> tuple[str, str, bytes]:
         request = (await reader.readuntil(b"\r\n\r\n")).decode("latin-1")
         parts = request.split("\r\n", 1)[0].split(" ")
-        if self._open > CONNECTIONS:
+        if len(self._visits) > CONNECTIONS:
             return "503 Service Unavailable", "text/plain", b"too many visitors\n"
         if len(parts) != 3 or parts[0] not in {"GET", "HEAD"}:
             return "405 Method Not Allowed", "text/plain", b"read-only: GET it is\n"

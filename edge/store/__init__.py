@@ -9,11 +9,13 @@ Whatever happens to the disk, the daemon goes on: a corrupt file is set aside, w
 over, and the fact is recorded; with a full or read-only disk records wait in memory and `health` says so.
 """
 
+from igrow.edge.store.aside import StoreAside
 from igrow.edge.store.maintenance import backup, export, restore
 from igrow.edge.store.store import SqliteStore, StoreError, StoreLimits, read_records, read_telemetry
 
 __all__ = [
     "SqliteStore",
+    "StoreAside",
     "StoreError",
     "StoreLimits",
     "backup",

@@ -157,6 +157,15 @@ class Ledger:
         with suppress(sqlite3.Error):
             yield from _newest(file.open(), category)
 
+    def last_time(self) -> float | None:
+        """Return the time of the newest record that has one, as far as a file can be read."""
+        for file in self._files:
+            with suppress(sqlite3.Error, OSError):
+                query = "SELECT time FROM records WHERE time IS NOT NULL ORDER BY sequence DESC LIMIT 1"
+                line = file.open().execute(query).fetchone()
+                return None if line is None else float(line[0])
+        return None
+
     def close(self) -> None:
         """Write what waits and close."""
         self.flush()

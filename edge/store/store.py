@@ -12,6 +12,7 @@ from typing import TypeVar
 
 from igrow.core.errors import IgrowError
 from igrow.core.telemetry import Telemetry, concatenate
+from igrow.edge.earlier import Earlier
 from igrow.edge.image import Value
 from igrow.edge.ports import AlarmRecord, WriteRecord
 from igrow.edge.sentences import log_event
@@ -22,6 +23,9 @@ from igrow.edge.store.telemetry_file import TelemetryFile, read_file, read_first
 
 TELEMETRY_FILE = "telemetry.db"
 T = TypeVar("T")
+DAY = 86_400.0
+OLDER_IN_A_ROW = 100
+"""Writes of earlier days, one after the other, after which the ledger is searched no further."""
 
 
 class StoreError(IgrowError):
@@ -70,8 +74,12 @@ class SqliteStore:
 
     def append(self, time: float, values: Mapping[str, Value]) -> None:
         """Add one row of telemetry; at most the last batch is lost by a power cut."""
+        self.add(pack(time, values))
+
+    def add(self, row: Row) -> None:
+        """Add one row that is packed already."""
         with self._lock:
-            self._batch.append(pack(time, values))
+            self._batch.append(row)
             span = self._batch[-1].milliseconds - self._batch[0].milliseconds
             # A clock set back makes the span negative; the number of rows then bounds the batch.
             if span >= 1000 * self._limits.batch_seconds or len(self._batch) % self._limits.batch_rows == 0:
@@ -125,20 +133,38 @@ class SqliteStore:
         newest = self.records("state", 1)
         return newest[0].body if newest else None
 
-    def writes_of_last_day(self) -> Sequence[WriteRecord]:
-        """Return the rows with outcome "written" of the 24 h before the newest such row, oldest first."""
+    def writes_of_last_day(self, now: float | None) -> Sequence[WriteRecord]:
+        """Return the rows with outcome "written" of the 24 h before `now`, oldest first.
+
+        Without a clock (None), those of the 24 h before the newest such row. What a clock that was ahead has dated
+        later counts as well.
+        """
         with self._lock:
             found: list[WriteRecord] = []
-            newest: float | None = None
+            older = 0
             for record in self._written():
-                if record.time is not None:
-                    newest = record.time if newest is None else max(newest, record.time)
-                    if record.time < newest - 86_400.0:
+                now = record.time if now is None else now
+                if now is not None and record.time is not None and record.time < now - DAY:
+                    older += 1
+                    # One old date may be that of a clock that was behind; many in a row are the day before.
+                    if older >= OLDER_IN_A_ROW:
                         break
+                    continue
+                older = 0
                 found.append(record)
                 if len(found) >= 100_000:
                     break
             return found[::-1]
+
+    def earlier(self, log_seconds: float) -> Earlier:
+        """Return what an earlier run has left, with the log of so many seconds before its end."""
+        with self._lock:
+            time = self._ledger.last_time()
+            end = 0.0 if time is None else time + DAY
+            # A day more on both sides: rows are committed before and after records are.
+            wanted = log_seconds and time is not None
+            log = self.telemetry(end - 2 * DAY - log_seconds, end) if wanted else concatenate([])
+            return Earlier(time, self.newest_state(), self.writes_of_last_day(time), log)
 
     def records(self, category: str, count: int) -> list[Record]:
         """Return the newest records of one category ("event", "write", "alarm", "state"), newest first."""

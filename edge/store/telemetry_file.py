@@ -51,7 +51,7 @@ class TelemetryFile:
         except sqlite3.Error as error:
             if is_damage(error):
                 self._start_over(error)
-            elif is_full(error) and self._drop_oldest_day():
+            elif is_full(error) and self._drop_a_day(rows[-1].milliseconds):
                 pass
             else:
                 self.close()
@@ -103,7 +103,7 @@ class TelemetryFile:
             if connection.in_transaction:
                 connection.execute("ROLLBACK")
             raise
-        self._keep_bounded(connection)
+        self._keep_bounded(connection, rows[-1].milliseconds)
 
     def _layout(self, connection: sqlite3.Connection, names: tuple[str, ...]) -> int:
         if names not in self._layouts:
@@ -113,21 +113,30 @@ class TelemetryFile:
             self._layouts[names] = layout
         return self._layouts[names]
 
-    def _keep_bounded(self, connection: sqlite3.Connection) -> None:
-        """Drop the oldest days above nine tenths of the bound, so that a commit seldom meets it."""
+    def _keep_bounded(self, connection: sqlite3.Connection, now: int) -> None:
+        """Drop days above nine tenths of the bound, so that a commit seldom meets it."""
         (pages,) = connection.execute("PRAGMA page_count").fetchone()
         (free,) = connection.execute("PRAGMA freelist_count").fetchone()
         (page_size,) = connection.execute("PRAGMA page_size").fetchone()
         if (pages - free) * page_size > 0.9 * self._max_bytes:
-            self._drop_oldest_day()
+            self._drop_a_day(now)
 
-    def _drop_oldest_day(self) -> bool:
-        """Delete the oldest day, never the newest row's own; tell whether there was one."""
+    def _drop_a_day(self, now: int) -> bool:
+        """Delete a day, never that of the row of `now` (milliseconds); tell whether there was one.
+
+        The last day of those that lie ahead, which a clock that was wrong has left, and only then the oldest one: else
+        they would stay for ever, and what is measured now would be the first to go.
+        """
         connection = self._open()
         oldest, newest = connection.execute("SELECT min(milliseconds), max(milliseconds) FROM rows").fetchone()
-        if oldest is None or oldest // DAY == newest // DAY:
+        if oldest is None:
             return False
-        connection.execute("DELETE FROM rows WHERE milliseconds < ?", ((oldest // DAY + 1) * DAY,))
+        if newest // DAY > now // DAY + 1:
+            connection.execute("DELETE FROM rows WHERE milliseconds >= ?", (newest // DAY * DAY,))
+        elif oldest // DAY < now // DAY:
+            connection.execute("DELETE FROM rows WHERE milliseconds < ?", ((oldest // DAY + 1) * DAY,))
+        else:
+            return False
         connection.execute("PRAGMA incremental_vacuum").fetchall()
         return True
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 
 @dataclass(frozen=True)
@@ -29,13 +29,23 @@ class UpdateRules:
     """Grid on which predictions are compared with measurements."""
 
 
+class Graphs(Protocol):
+    """Where graphs run (`igrow.edge.planning.GraphProcess`)."""
+
+    def call(self, function: str, *arguments: object, seconds: float) -> Any:
+        """Return what `function`, a "module:name", returns for the arguments.
+
+        Raises the IgrowError that it raises, ProcessError for what takes too much, NotCalledError at the stop.
+        """
+
+
 class UpdateStore(Protocol):
     """What updates need of the store."""
 
     folder: Path
 
     def flush(self) -> None:
-        """Commit the rows in memory."""
+        """Commit the rows in memory; raises LateError while the disk does not answer."""
 
     def record_event(self, time: float | None, kind: str, detail: Mapping[str, object]) -> None:
         """Add one event, durably."""

@@ -7,7 +7,7 @@ import json
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from igrow.core.whole_files import write_whole
+from igrow.core.whole_files import sync_folder, write_whole
 
 
 @dataclass
@@ -23,11 +23,21 @@ class UpdateState:
     """Adoption of the active bundle, while it is still on probation."""
     live_before: dict[str, float] = field(default_factory=dict)
     """Live errors of the previous bundle just before that adoption."""
+    attempt: str | None = None
+    """A bundle that is being tried: noted before it begins, so that one that takes the gateway down is known after."""
     rejected: dict[str, str] = field(default_factory=dict)
     """Bundles that are never tried again, and why."""
     last_verdict: str = ""
     live_errors: list[tuple[float, dict[str, float]]] = field(default_factory=list)
     """Time and live errors of the bundle then in force, oldest first."""
+
+    def keep_up(self, time: float) -> None:
+        """Let nothing lie ahead of `time`: a clock that was ahead has been set right, and what it dated begins now."""
+        self.candidate_since = min(self.candidate_since, time)
+        if self.watch_since is not None:
+            self.watch_since = min(self.watch_since, time)
+        if self.live_errors and self.live_errors[-1][0] > time:
+            self.live_errors = [entry for entry in self.live_errors if entry[0] <= time]
 
 
 def load_state(path: Path) -> UpdateState:
@@ -44,5 +54,6 @@ def load_state(path: Path) -> UpdateState:
 
 
 def save_state(path: Path, state: UpdateState) -> None:
-    """Replace the state file; raises OSError."""
+    """Replace the state file, and return once that will outlive a power cut; raises OSError."""
     write_whole(path, json.dumps(dataclasses.asdict(state)).encode())
+    sync_folder(path.parent)

@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol, cast
 
 from igrow.edge.bus.pymodbus_link import open_serial_port
+from igrow.edge.hand_off import HandOff
 from igrow.edge.registers.model import Function, Parity
 from igrow.edge.virtual_plc.memory import AnswerWithExceptionError
 
@@ -188,7 +189,12 @@ class ModbusServer:
     async def serve_serial(self, serial_port: str, baudrate: int, parity: Parity, stop_bits: int) -> None:
         """Answer on a serial port. Raises OSError."""
         await open_serial_port(
-            lambda: _SerialConnection(self._units, self._connections), serial_port, baudrate, parity, stop_bits
+            _SerialConnection(self._units, self._connections),
+            serial_port,
+            baudrate,
+            parity,
+            stop_bits,
+            HandOff("serial port"),
         )
 
     def drop_connections(self) -> None:

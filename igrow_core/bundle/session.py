@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import onnxruntime
 from numpy.typing import NDArray
 
 from igrow.core.bundle.manifest import BundleError
@@ -15,8 +15,10 @@ from igrow.core.bundle.manifest import BundleError
 def new_session(graph: Path | bytes, *, threads: int = 1) -> Any:
     """Open a graph, a file or a serialised model, in onnxruntime; raises what onnxruntime raises.
 
-    A gateway shares its cores with the control cycle, so the thread count is never left to the library.
+    A gateway shares its cores with the control cycle, so the thread count is never left to the library. Nor is its
+    memory: the library is loaded by whoever opens a graph, and the daemon opens none.
     """
+    onnxruntime = importlib.import_module("onnxruntime")
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads
     options.inter_op_num_threads = 1

@@ -96,6 +96,8 @@ class FaultProxy:
         self.random = random.Random(seed)
         self.faults: list[Fault] = []
         """What was done, answer by answer."""
+        self.slow = 0.0
+        """Seconds that each answer takes, one after the other."""
         self.storm = 0
         """How many of the next connections are hung up on at once."""
         self.old_answers: list[Frame] = []
@@ -197,7 +199,9 @@ class _Front(asyncio.Protocol):
     def send(self, data: bytes, after: float = 0.0) -> None:
         """Deliver `after` seconds from now; on a serial line never before what was sent earlier."""
         at = self.loop.time() + after
-        if self.proxy.rtu:
+        if self.proxy.slow:
+            at = self.proxy.last_sent = max(self.loop.time(), self.proxy.last_sent) + self.proxy.slow
+        elif self.proxy.rtu:
             at = self.proxy.last_sent = max(at, self.proxy.last_sent + 1e-6)
         self.loop.call_at(at, self.deliver, data)
 

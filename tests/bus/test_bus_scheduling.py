@@ -10,7 +10,7 @@ from bus.simulated_loop import run
 from igrow.edge.bus.errors import NotConnectedError, QueueFullError
 from igrow.edge.bus.pacing import Pacer
 from igrow.edge.bus.protocol import Priority
-from igrow.edge.bus.request_slot import RequestSlot, Turn
+from igrow.edge.bus.request_slot import RequestSlot
 from igrow.edge.bus.unit_health import HealthBook
 
 
@@ -28,15 +28,17 @@ async def served_in_order(priorities: list[Priority], longest_queue: int = 64) -
 
     async def job(priority: Priority) -> None:
         try:
-            async with Turn(slot, priority):
-                served.append(priority)
-                await asyncio.sleep(0.001)
+            await slot.acquire(priority)
+            served.append(priority)
+            await asyncio.sleep(0.001)
+            slot.release()
         except QueueFullError:
             served.append(f"{priority.name} refused")
 
-    async with Turn(slot, Priority.LOG):
-        jobs = [asyncio.ensure_future(job(priority)) for priority in priorities]
-        await asyncio.sleep(0.001)
+    await slot.acquire(Priority.LOG)
+    jobs = [asyncio.ensure_future(job(priority)) for priority in priorities]
+    await asyncio.sleep(0.001)
+    slot.release()
     await asyncio.gather(*jobs)
     return served
 

@@ -17,7 +17,9 @@ from bus.fault_proxy import NETWORK, SERIAL, Fault, FaultProxy
 from bus.simulated_loop import run
 from igrow.edge.bus.errors import BusError
 from igrow.edge.bus.modbus_bus import ModbusBus
+from igrow.edge.bus.owed import OwedAnswers
 from igrow.edge.bus.protocol import Priority, ReadRequest, WriteRequest
+from igrow.edge.bus.pymodbus_link import PymodbusLink
 from igrow.edge.registers.model import BusSettings, Function, Transport
 from igrow.edge.virtual_plc.modbus_server import ModbusServer
 
@@ -138,12 +140,9 @@ def test_no_value_goes_astray_and_no_write_is_invented_under_faults(start: int) 
 
 
 def test_these_sequences_do_find_a_bus_that_trusts_a_late_answer(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without the loop back and the rest after a missing answer, values do go astray: the judge is not asleep."""
-
-    async def careless(self: ModbusBus, device_id: int) -> None:
-        self._unsure.discard(device_id)
-
-    monkeypatch.setattr(ModbusBus, "_settle", careless)
+    """Where nothing is owed and the line is free once nobody waits, values go astray: the judge is awake."""
+    monkeypatch.setattr(OwedAnswers, "give_up", lambda self, request: None)
+    monkeypatch.setattr(PymodbusLink, "exchanging", property(lambda self: False))
     monkeypatch.setattr("igrow.edge.bus.unit_health.HealthBook.rest_left", lambda self, device_id: 0.0)
     with pytest.raises(AssertionError, match="wrong values"):
         play(range(1, 401, 2))

@@ -10,6 +10,7 @@ import pytest
 
 from bus.coded_unit import CodedUnit, code
 from bus.fault_proxy import Fault, FaultProxy
+from bus.late_line import LateLine
 from bus.simulated_loop import run
 from igrow.edge.bus.errors import (
     AddressRefusedError,
@@ -19,6 +20,7 @@ from igrow.edge.bus.errors import (
     GatewayRefusedError,
     NoAnswerError,
     NotConnectedError,
+    OldAnswerError,
     RefusedError,
     UnitBusyError,
     UnitRestingError,
@@ -280,29 +282,137 @@ def test_a_write_that_failed_is_never_repeated_by_the_bus(transport: Transport, 
     run(main())
 
 
-def test_a_unit_that_ignores_loop_backs_is_still_read() -> None:
-    """Function 8 is optional, and some devices do not even refuse what they do not know."""
-
+def test_after_a_missing_answer_a_block_is_asked_for_with_a_register_more_until_no_late_one_can_come() -> None:
     async def main() -> None:
-        await serve(CodedUnit(1), transport=Transport.RTU_OVER_TCP)
-        script = [Fault.NO_ANSWER, Fault.NO_ANSWER]  # the read, then the loop back
-        proxy = FaultProxy(PORT, rtu=True, seed=1, rate=0.0, timeout=1.0)
-        proxy.next_fault = lambda: script.pop(0) if script else Fault.NONE  # type: ignore[method-assign]
-        bus = make_bus(Transport.RTU_OVER_TCP, await proxy.listen())
-        for rest in (1.1, 2.1):
-            with pytest.raises(NoAnswerError):
-                await read(bus)
-            await asyncio.sleep(rest)
-        assert await read(bus) == coded()
-        script.append(Fault.NO_ANSWER)
+        bus, unit = await behind_proxy(Fault.NO_ANSWER, transport=Transport.RTU_OVER_TCP)
         with pytest.raises(NoAnswerError):
             await read(bus)
-        with pytest.raises(UnitRestingError):
+        await asyncio.sleep(1.1)
+        assert await read(bus) == coded()
+        await asyncio.sleep(20.0)
+        assert await read(bus) == coded()
+        assert [count for _, _, count in unit.reads] == [2, 3, 2]
+
+    run(main())
+
+
+def test_a_late_answer_that_has_come_is_waited_for_no_longer() -> None:
+    async def main() -> None:
+        bus, unit = await behind_proxy(Fault.LATE, transport=Transport.RTU_OVER_TCP)
+        with pytest.raises(NoAnswerError):
+            await read(bus)
+        await asyncio.sleep(2.0)
+        assert await read(bus) == coded()
+        assert [count for _, _, count in unit.reads] == [2, 2]
+
+    run(main())
+
+
+def test_a_unit_that_holds_nothing_more_is_left_alone_until_no_late_answer_can_come() -> None:
+    async def main() -> float:
+        bus, unit = await behind_proxy(Fault.NO_ANSWER, transport=Transport.RTU_OVER_TCP)
+        last = 254  # of two registers, the last ones of the unit
+        with pytest.raises(NoAnswerError):
+            await read(bus, last)
+        await asyncio.sleep(1.1)
+        begin = now()
+        with pytest.raises(OldAnswerError):
+            await read(bus, last)
+        while True:
+            try:
+                assert await read(bus, last) == coded(last)
+                break
+            except UnitRestingError:
+                await asyncio.sleep(0.5)
+        assert [count for _, _, count in unit.reads] == [2, 3, 2]
+        return now() - begin
+
+    assert run(main()) == pytest.approx(19.0, abs=1.0)
+
+
+def test_a_refusal_that_may_be_an_older_requests_is_not_taken_for_the_address_s() -> None:
+    """A block that is refused is split for good, and a point for ten minutes: not for somebody else's refusal."""
+
+    async def main() -> None:
+        bus, _ = await behind_proxy(Fault.NO_ANSWER, Fault.EXCEPTION, transport=Transport.RTU_OVER_TCP)
+        with pytest.raises(NoAnswerError):
             await read(bus)
         await asyncio.sleep(1.1)
-        script.append(Fault.NONE)
+        with pytest.raises(OldAnswerError):
+            await read(bus)
+        await asyncio.sleep(21.0)
         assert await read(bus) == coded()
-        assert script == []  # it was not asked for a loop back again
+
+    run(main())
+
+
+def test_a_late_echo_does_not_confirm_the_next_write_to_the_same_registers() -> None:
+    """The echo of several registers names where they stand, and not what was written."""
+
+    async def main() -> None:
+        line = LateLine({1: CodedUnit(1)}, seed=1, share=0.0, timeout=1.0, latest=1.0, in_order=False)
+        bus = make_bus(Transport.RTU_OVER_TCP, await line.listen())
+        echoes = iter((2.2, 60.0))  # the second request is lost, as good as
+        line.say = lambda answer: asyncio.get_running_loop().call_later(  # type: ignore[method-assign]
+            next(echoes), LateLine.say, line, answer
+        )
+        first, second = (WriteRequest(1, Function.HOLDING, 300, values) for values in ((1, 1), (2, 2)))
+        with pytest.raises(NoAnswerError):
+            await bus.write(first, Priority.WRITE)
+        await asyncio.sleep(1.01)
+        with pytest.raises(NoAnswerError) as caught:
+            await bus.write(second, Priority.WRITE)
+        assert caught.value.sent
+
+    run(main())
+
+
+@TRANSPORTS
+def test_a_request_whose_asker_goes_away_keeps_the_line_until_it_is_answered(transport: Transport) -> None:
+    async def main() -> None:
+        bus, unit = await behind_proxy(*[Fault.SLOW] * 9, transport=transport)
+        await read(bus)
+        job = asyncio.ensure_future(read(bus, 50))
+        await asyncio.sleep(0.01)
+        job.cancel()
+        assert await read(bus, 60) == coded(60)
+        assert [address for _, address, _ in unit.reads] == [5, 50, 60]
+        assert bus.health.unit(1).answers == 3
+
+    run(main())
+
+
+@TRANSPORTS
+def test_a_bus_is_closed_while_nobody_waits_for_the_answer_any_more(transport: Transport) -> None:
+    async def main() -> None:
+        bus, _ = await behind_proxy(Fault.NONE, Fault.NO_ANSWER, transport=transport)
+        await read(bus)
+        job = asyncio.ensure_future(read(bus, 50))
+        await asyncio.sleep(0.01)
+        job.cancel()
+        begin = now()
+        await bus.close()
+        assert now() - begin < 0.5
+
+    run(main())
+
+
+def test_last_orders_wait_for_no_unit_that_rests_and_no_attempt_to_connect() -> None:
+    async def main() -> None:
+        bus = make_bus()
+        for _ in range(10):
+            with pytest.raises(NotConnectedError):
+                await read(bus)
+            await asyncio.sleep(5.0)
+        unit = CodedUnit(1)
+        await serve(unit)
+        bus.health.failed(1, silent=True)
+        bus.health.failed(1, silent=True)
+        bus.last_orders()
+        begin = now()
+        await bus.write(WriteRequest(1, Function.HOLDING, 300, (7,)), Priority.WRITE)
+        assert now() - begin < 0.5
+        assert unit.writes == [(Function.HOLDING, 300, (7,))]
 
     run(main())
 

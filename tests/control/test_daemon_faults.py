@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import signal
 import sys
 from pathlib import Path
@@ -12,7 +13,7 @@ from daemon_bench import MAP, Plant, free_port, running, until, write_files
 
 from igrow.edge.daemon import Daemon
 from igrow.edge.image import Quality
-from igrow.edge.planning import PlanningProcess, ProcessLimits
+from igrow.edge.planning import GraphProcess, PlanningProcess
 from igrow.edge.ports import ActiveBundle
 from igrow.edge.store import read_records, read_telemetry
 from igrow.edge.virtual_plc.pace import Realtime
@@ -269,7 +270,7 @@ async def test_a_bus_that_is_down_while_another_one_is_up_falls_back_and_that_is
     assert "plc_fell_back" in kinds(tmp_path)
 
 
-async def test_a_planner_that_hangs_delays_no_cycle_and_the_recipe_rules(tmp_path):
+async def test_a_planner_that_hangs_delays_no_cycle_and_the_recipe_rules(tmp_path, monkeypatch):
     port = free_port()
     path = write_files(tmp_path, port, clock="system", interval="1 s")
     plant = Plant(tmp_path, port, pace=Realtime())
@@ -278,12 +279,13 @@ async def test_a_planner_that_hangs_delays_no_cycle_and_the_recipe_rules(tmp_pat
         await until(lambda: daemon.cycles >= 2)
         daemon.services.planning.close()
         planner = PlanningProcess(
-            daemon.configuration.site, ProcessLimits(timeout_seconds=3.0), planner=("hanging_planner", "make_plan")
+            daemon.configuration.site, GraphProcess(), seconds=3.0, planner="hanging_planner:make_plan"
         )
         daemon.services.planning = daemon._control.schedule._service = planner
         daemon.services.updates.active = lambda: ActiveBundle("test", tmp_path)
         # A day of log is asked for before a first plan; this test has no day.
-        daemon._control.schedule._began = -1e6
+        monkeypatch.setattr("igrow.edge.planning_schedule.LEAST_HISTORY", 0.0)
+        daemon._control.schedule._due = daemon._control.schedule._young_until = -math.inf
         await until(lambda: planner.busy)
         cycles = daemon.cycles
         await until(lambda: daemon.cycles >= cycles + 3)

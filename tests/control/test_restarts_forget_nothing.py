@@ -234,7 +234,8 @@ async def noted_and_recalled(old: Moment, new: Moment, hand_for: float = 3600.0)
     first.plc.values["heating_setpoint"] = 23.0
     await first.run(1)
     second.clock.now = new.monotonic
-    date = StateNotes(ledger, new.boot, dict.fromkeys(RULES, "same")).recall(second.cycle, new, respect_hand=7200.0)
+    notes = StateNotes(ledger, new.boot, dict.fromkeys(RULES, "same"))
+    date = notes.recall(second.cycle, ledger.newest_state(), new, respect_hand=7200.0)
     return second.cycle.readback.held(new.monotonic).get("heating_setpoint"), date
 
 

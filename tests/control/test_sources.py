@@ -7,6 +7,7 @@ import pytest
 from control_fakes import image_of
 
 from igrow.core.yaml_schema import SchemaError, parse
+from igrow.edge.hand_off import HandOff
 from igrow.edge.image import Image, Quality, Value
 from igrow.edge.ports import Plan
 from igrow.edge.sources import (
@@ -23,10 +24,15 @@ from igrow.edge.sources import (
     recipe_course,
 )
 from igrow.edge.sources.override import read_leases, write_leases
+from igrow.edge.state_file import StateFile
 
 T0 = 1_772_323_200.0
 AMSTERDAM = ZoneInfo("Europe/Amsterdam")
 SAFE = {"heating_setpoint": 18.0, "co2_setpoint": 400.0}
+
+
+def override_in(path, boot=""):
+    return GrowerOverride(StateFile(path, HandOff("state files")), boot)
 
 
 def plan_of(start=T0, hours=24, valid=12):
@@ -43,7 +49,7 @@ def plan_of(start=T0, hours=24, valid=12):
 def sources(plan, tmp_path):
     keeper = PlanKeeper(lambda: plan)
     return [
-        GrowerOverride(tmp_path / "override.json"),
+        override_in(tmp_path / "override.json"),
         FreshPlan(keeper, fresh_for=6 * 3600.0),
         LastValidPlan(keeper),
         RecipeSource(Recipe(), AMSTERDAM),
@@ -102,10 +108,10 @@ def test_a_plan_shorter_than_its_validity_ends_with_its_last_step(tmp_path):
 def test_a_lease_survives_a_restart_without_beginning_again(tmp_path):
     path = tmp_path / "override.json"
     write_leases(path, {"heating_setpoint": Lease(21.0, 7200.0)})
-    first = GrowerOverride(path)
+    first = override_in(path)
     assert first.offer(image_of(0.0, T0)).setpoints == {"heating_setpoint": 21.0}
     assert read_leases(path)["heating_setpoint"].until == T0 + 7200.0
-    again = GrowerOverride(path)
+    again = override_in(path)
     assert again.offer(image_of(50.0, T0 + 7100.0)).setpoints
     assert not again.offer(image_of(151.0, T0 + 7201.0)).setpoints
 
@@ -114,8 +120,8 @@ def test_a_lease_survives_a_restart_without_beginning_again(tmp_path):
 def test_a_lease_survives_a_restart_with_its_remaining_time_whatever_the_date_does(tmp_path, jump):
     path = tmp_path / "override.json"
     write_leases(path, {"heating_setpoint": Lease(21.0, 7200.0)})
-    assert GrowerOverride(path, "this boot").offer(image_of(1000.0, T0)).setpoints
-    again = GrowerOverride(path, "this boot")
+    assert override_in(path, "this boot").offer(image_of(1000.0, T0)).setpoints
+    again = override_in(path, "this boot")
     date = None if jump is None else T0 + jump
     assert again.offer(image_of(8100.0, date)).setpoints == {"heating_setpoint": 21.0}
     assert not again.offer(image_of(8201.0, date)).setpoints
@@ -126,13 +132,13 @@ def test_a_lease_of_no_finite_length_is_none(tmp_path):
     path.write_text(
         '{"heating_setpoint": {"value": 21, "seconds": NaN}, "co2_setpoint": {"value": 7, "seconds": 1e999}}'
     )
-    assert not GrowerOverride(path).offer(image_of(0.0, T0)).setpoints
+    assert not override_in(path).offer(image_of(0.0, T0)).setpoints
 
 
 def test_a_lease_ends_on_time_although_the_date_jumps_back(tmp_path):
     path = tmp_path / "override.json"
     write_leases(path, {"heating_setpoint": Lease(21.0, 7200.0)})
-    source = GrowerOverride(path)
+    source = override_in(path)
     assert source.offer(image_of(0.0, T0)).setpoints
     assert not source.offer(image_of(7201.0, T0 - 1e6)).setpoints
 
@@ -140,7 +146,7 @@ def test_a_lease_ends_on_time_although_the_date_jumps_back(tmp_path):
 def test_a_new_lease_replaces_the_old_one(tmp_path):
     path = tmp_path / "override.json"
     write_leases(path, {"heating_setpoint": Lease(21.0, 7200.0)})
-    source = GrowerOverride(path)
+    source = override_in(path)
     source.offer(image_of(0.0, T0))
     write_leases(path, {"heating_setpoint": Lease(17.0, 60.0)})
     assert source.offer(image_of(1.0, T0 + 1)).setpoints == {"heating_setpoint": 17.0}
@@ -152,7 +158,7 @@ def test_a_new_lease_replaces_the_old_one(tmp_path):
 def test_a_broken_override_file_overrides_nothing(tmp_path, content):
     path = tmp_path / "override.json"
     path.write_text(content)
-    assert not GrowerOverride(path).offer(image_of(0.0, T0)).setpoints
+    assert not override_in(path).offer(image_of(0.0, T0)).setpoints
 
 
 RECIPE = """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from pathlib import Path
 
 from igrow.core.errors import IgrowError
 from igrow.edge.ports import Plan
@@ -23,7 +24,7 @@ def good(site, request) -> Plan:
 
 def hang_once(site, request) -> Plan:
     if request.seed == 0:
-        time.sleep(60)
+        time.sleep(600)
     return good(site, request)
 
 
@@ -52,3 +53,17 @@ def fail(site, request) -> Plan:
 def slow(site, request) -> Plan:
     time.sleep(1.5)
     return good(site, request)
+
+
+def note_and_hang(path) -> None:
+    Path(path).touch()
+    time.sleep(600)
+
+
+def burn() -> None:
+    while True:
+        pass
+
+
+def oom_score() -> int:
+    return int(Path("/proc/self/oom_score_adj").read_text())

@@ -86,8 +86,9 @@ def test_an_unknown_unit_is_refused(tmp_path: Path) -> None:
         read_forecast(write(tmp_path, content(wind_speed_10m="furlong")))
 
 
-def test_a_plan_holds_against_the_spread_of_an_ensemble(tmp_path: Path) -> None:
+def test_a_plan_holds_against_the_spread_of_an_ensemble(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Members that differ add to the doubt that caution takes off."""
+    monkeypatch.setattr("igrow.edge.planning.make_plan.forecast_in_time", lambda members: (members, ""))
     path = write(tmp_path, content("", "_member01", "_member02", unix=True))
     members = read_forecast(path)
     wild = tuple(

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import datetime
+import os
 import pickle
 from dataclasses import fields, replace
+from pathlib import Path
 from zoneinfo import ZoneInfo
 
 import numpy as np
@@ -46,8 +48,14 @@ def request(step: float = 3600.0, steps: int = 24, names: tuple[str, ...] = SETP
     return PlanRequest(float(START), step, log(), recipe, default_bundle_folder())
 
 
-def test_a_plan_stays_within_the_site_s_limits_and_is_worth_no_less_than_the_recipe() -> None:
-    plan = make_plan(SITE, request())
+def test_a_plan_without_its_forecast_stays_within_the_limits_and_is_worth_no_less_than_the_recipe(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The forecast lies on a share that hangs: the plan is made all the same, and says so."""
+    monkeypatch.setattr("igrow.edge.planning.forecast.READ_SECONDS", 0.2)
+    os.mkfifo(tmp_path / "forecast.csv")
+    plan = make_plan(SITE, replace(request(), forecast=tmp_path / "forecast.csv"))
+    assert "not read within 0.2 s" in plan.problem
     assert set(plan.setpoints) == set(SETPOINTS)
     for name, course in plan.setpoints.items():
         limits = SITE.limits[name]

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from igrow.core.errors import IgrowError
-from igrow.core.telemetry import Telemetry
-from igrow.edge.planning.forecast import NEEDED, from_forecast, persistence
+from igrow.core.telemetry import Telemetry, write_csv
+from igrow.edge.planning.forecast import NEEDED, forecast_in_time, from_forecast, persistence
 
 START = 1_780_012_800
 COLUMN = {name: column for column, name in enumerate(NEEDED)}
@@ -76,3 +79,33 @@ def test_a_forecast_is_taken_and_its_gaps_are_filled() -> None:
     expected = from_forecast(forecast, log(), START, 24)
     assert (expected[:12, COLUMN["outdoor_temperature"]] == 30.0).all()
     assert (expected[12:, COLUMN["outdoor_temperature"]] < 20.0).all()
+
+
+def test_a_forecast_that_can_be_read_is_read(tmp_path: Path) -> None:
+    seconds = np.arange(START, START + 12 * 3600, 3600)
+    path = tmp_path / "forecast.csv"
+    write_csv(path, Telemetry(seconds.astype("datetime64[s]"), {"outdoor_temperature": np.full(12, 30.0)}))
+    members, problem = forecast_in_time(path)
+    assert [len(member) for member in members] == [12]
+    assert problem == ""
+    assert forecast_in_time(None) == ((), "")
+
+
+def test_a_forecast_that_is_missing_broken_or_too_large_costs_the_forecast_and_says_so(tmp_path: Path) -> None:
+    for content, said in ((None, "No such file"), ("nonsense\n", "first column must be time")):
+        path = tmp_path / "forecast.csv"
+        if content is not None:
+            path.write_text(content)
+        members, problem = forecast_in_time(path)
+        assert members == ()
+        assert said in problem
+        assert "weather of the last days" in problem
+
+
+def test_a_forecast_on_a_share_that_hangs_costs_the_forecast_and_says_so(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr("igrow.edge.planning.forecast.READ_SECONDS", 0.2)
+    path = tmp_path / "forecast.csv"
+    os.mkfifo(path)
+    members, problem = forecast_in_time(path)
+    assert members == ()
+    assert f"{path}: not read within 0.2 s" in problem

@@ -115,7 +115,7 @@ def test_writes_of_the_last_day_are_counted_across_a_restart(tmp_path: Path) -> 
         store.record_write(write_record(START + 3600 * hours))
         store.record_write(write_record(START + 3600 * hours, "clamped"))
     store.close()
-    found = SqliteStore(tmp_path).writes_of_last_day()
+    found = SqliteStore(tmp_path).writes_of_last_day(None)
     assert [record.time for record in found] == [START + 3600 * hours for hours in range(5, 30)]
     assert {record.outcome for record in found} == {"written"}
 

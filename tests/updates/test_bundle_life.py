@@ -106,7 +106,7 @@ def test_a_bundle_that_fails_its_self_test_is_refused_reported_and_marked(gatewa
     bad = make(gateway, "bad", 5.0)
     publish(bad.folder, gateway.exchange_root, gateway.keys)
     # The archive is right but this machine computes something else: played by a stricter manifest check.
-    gateway.updates._shelf._site = "other"
+    gateway.updates._bundles._shelf._site = "other"
     gateway.run(3)
     assert bad.identity in gateway.updates.describe()["rejected"]
     assert gateway.kinds().count("update_refused") == 1

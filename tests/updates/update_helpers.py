@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from igrow.edge.exchange import ExchangeService
 from igrow.edge.image import Quality, Value
 from igrow.edge.store import SqliteStore, StoreLimits
 from igrow.edge.updates import BundleUpdates, SignedSource, UpdateRules
+from igrow.edge.updates.rules import Graphs
 from igrow.trainer.publishing import create_keys, initialise
 
 START = 1_780_012_800.0
@@ -32,6 +34,18 @@ class TinyPredictor:
         return {"air_temperature": predicted.astype(np.float64)}
 
 
+class DirectCalls:
+    """Calls what the process for graphs would, here and now; `calls` keeps what was asked for."""
+
+    def __init__(self) -> None:
+        self.calls: list[str] = []
+
+    def call(self, function: str, *arguments: object, seconds: float) -> object:
+        self.calls.append(function)
+        module, name = function.split(":")
+        return getattr(importlib.import_module(module), name)(*arguments)
+
+
 @dataclass
 class Gateway:
     """A store, an exchange and the bundle updates around them, on a plant whose offset can change."""
@@ -40,6 +54,7 @@ class Gateway:
     rules: UpdateRules
     offset: float = 5.0
     now: float = START
+    graphs: Graphs = field(default_factory=DirectCalls)
 
     def __post_init__(self) -> None:
         self.exchange_root = self.folder / "exchange"
@@ -62,12 +77,14 @@ class Gateway:
             site="demo",
             igrow_version="0.1.0",
             store=self.store,
+            graphs=self.graphs,
             predictor=TinyPredictor(),
             source=SignedSource(self.repository, self.folder / "updates" / "tuf", self.trusted_root),
             reports=self.exchange,
             rules=self.rules,
             first_bundle=first_bundle,
         )
+        wait_for(self.updates)
 
     def stop(self) -> None:
         self.updates.close()

@@ -1,0 +1,51 @@
+"""Reads the configuration again while control goes on: a file on a share that hangs must not hold a cycle."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from pathlib import Path
+
+from igrow.core.errors import IgrowError
+from igrow.edge.configuration import Configuration, load_configuration
+from igrow.edge.hand_off import HandOff
+
+RELOAD_SECONDS = 30.0
+"""How long the files of a configuration are waited for."""
+
+
+class Reloading:
+    """The newest attempt to read the configuration."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._task: asyncio.Task[Configuration] | None = None
+
+    def start(self) -> bool:
+        """Begin to read; tell whether nobody was at it already."""
+        if self._task is not None:
+            return False
+        self._task = asyncio.get_running_loop().create_task(self._read())
+        return True
+
+    def take(self) -> Configuration | None:
+        """Return a configuration that has been read, once; None while there is none.
+
+        Raises IgrowError or OSError, once, for one that is faulty or could not be read in time.
+        """
+        if self._task is None or not self._task.done():
+            return None
+        task, self._task = self._task, None
+        return task.result()
+
+    def close(self) -> None:
+        """Wait for nothing any more."""
+        if self._task is not None:
+            self._task.cancel()
+
+    async def _read(self) -> Configuration:
+        # A thread of its own each time: one that hung in an earlier attempt is left behind.
+        reading = HandOff("configuration").run(lambda: load_configuration(self._path))
+        with contextlib.suppress(TimeoutError):
+            return await asyncio.wait_for(reading, RELOAD_SECONDS)
+        raise IgrowError(f"{self._path}: its files could not be read within {RELOAD_SECONDS:g} s")

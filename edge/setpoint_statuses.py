@@ -1,0 +1,43 @@
+"""How each setpoint stands after a cycle, as the status page shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+from igrow.edge.guard import GuardState, Verdict
+from igrow.edge.image import Image
+from igrow.edge.ports import SetpointStatus
+from igrow.edge.sources import Choice
+
+
+def setpoint_statuses(
+    points: Iterable[str],
+    choices: Mapping[str, Choice],
+    image: Image,
+    verdict: Verdict,
+    state: GuardState,
+    held: Mapping[str, float],
+) -> dict[str, SetpointStatus]:
+    """Return the status of each point; `held` maps those that a hand has set to the seconds that it is respected.
+
+    `state` is what the guard remembers after the cycle.
+    """
+    forced = {clamp.point: clamp.reason for clamp in verdict.clamps if clamp.kind == "interlock"}
+    statuses = {}
+    for name in points:
+        choice, memory = choices.get(name), state.points.get(name)
+        status = SetpointStatus(
+            requested=choice.value if choice else None,
+            applied=memory.written if memory else None,
+            shown=image.value_of(name).value,
+            source=choice.source if choice else "",
+            why=choice.why if choice else "",
+            held_until=image.monotonic + held[name] if name in held else None,
+        )
+        if name in forced:
+            status = replace(status, source="interlock", why=forced[name])
+        elif memory is not None and memory.taken is not None:
+            status = replace(status, source="interlock", why=f"on its way back to {memory.taken:g}")
+        statuses[name] = status
+    return statuses

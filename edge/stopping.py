@@ -1,0 +1,124 @@
+"""The stop: the safe setpoints within seconds, first those that stand elsewhere, and the truth about the rest.
+
+A slow PLC answers one request at a time. So nothing is asked any more once the setpoints were looked at; the writes
+leave together, each as soon as its line is free, and what was not confirmed is written again while there is time.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from igrow.edge.bus.errors import BusError, RefusedError, UnitBusyError, UnknownPointError, ValueDoesNotFitError
+from igrow.edge.guard import GuardedWriter, Write, WriteOutcome
+
+STOP_SECONDS = 10.0
+"""Longest time that the safe setpoints may take on the way out."""
+LOOK_SECONDS = 3.8
+"""How much of that the look at the setpoints may take: a hand may have been there since the last cycle. Three answers
+of a PLC that needs 1.2 s for each; four writes then fit in behind it."""
+ROUNDS = 3
+"""How often a write is sent at the most that nobody has confirmed."""
+BETWEEN_ROUNDS = 0.3
+"""Seconds for a line that was lost to be opened again."""
+
+
+class OutOfTimeError(BusError):
+    """The time of the stop was over before the write was confirmed; it may have been done."""
+
+    sent = True
+
+
+@dataclass(frozen=True)
+class StopReport:
+    """What a stop left behind."""
+
+    seen: bool
+    """Something of the PLC was read since the start."""
+    manual: bool = False
+    """Somebody operates it by hand, so nothing was written."""
+    by_hand: tuple[str, ...] = ()
+    """The points that were left as a hand has set them."""
+    written: Mapping[str, float] = field(default_factory=dict)
+    """What the PLC has confirmed."""
+    failed: Mapping[str, str] = field(default_factory=dict)
+    """By point: why its safe value was not written, or not confirmed."""
+
+    @staticmethod
+    def after(outcomes: Sequence[WriteOutcome], *, by_hand: tuple[str, ...], manual: bool) -> StopReport:
+        """Return the report on what became of the writes of a stop."""
+        return StopReport(
+            seen=True,
+            manual=manual,
+            by_hand=by_hand,
+            written={o.write.point: o.write.value for o in outcomes if o.error is None},
+            failed={o.write.point: str(o.error) for o in outcomes if o.error is not None},
+        )
+
+    def words(self) -> str:
+        """Return in one line how the setpoints were left."""
+        if not self.seen:
+            return "the PLC does not answer, so its own safe setpoints rule after its timeout"
+        if self.manual:
+            return "nothing was written, as somebody operates the PLC by hand"
+        hands = f", but for {', '.join(self.by_hand)}, which a hand has set" if self.by_hand else ""
+        if not self.failed:
+            return f"the safe setpoints were written{hands}"
+        failed = "; ".join(f"{name}: {why}" for name, why in self.failed.items())
+        rest = f"written: {', '.join(self.written)}{hands}" if self.written else "nothing was written"
+        begin = "" if self.written else "the PLC does not answer: "
+        return f"{begin}{rest}; not confirmed, so there the PLC's own safe setpoints rule after its timeout: {failed}"
+
+
+def furthest_first(writes: Sequence[Write], shown: Mapping[str, float | None]) -> list[Write]:
+    """Return the writes in the order in which they matter: what is known to stand elsewhere before what is unknown."""
+
+    def rank(write: Write) -> int:
+        stands = shown.get(write.point)
+        return 1 if stands is None else 2 if stands == write.value else 0
+
+    return sorted(writes, key=rank)
+
+
+async def write_at_once(writer: GuardedWriter, writes: Sequence[Write], seconds: float) -> list[WriteOutcome]:
+    """Write all values within so many seconds; the lines work side by side, each in the order of `writes`."""
+    loop = asyncio.get_running_loop()
+    until = loop.time() + seconds
+    outcomes: dict[str, WriteOutcome] = {}
+    pending = list(writes)
+    for _ in range(ROUNDS):
+        if not pending or loop.time() >= until:
+            break
+        if outcomes:
+            await asyncio.sleep(min(BETWEEN_ROUNDS, until - loop.time()))
+        outcomes |= await _one_round(writer, pending, until - loop.time(), seconds)
+        pending = [write for write in pending if _worth_another_try(outcomes[write.point])]
+    return [outcomes[write.point] for write in writes if write.point in outcomes]
+
+
+async def _one_round(
+    writer: GuardedWriter, writes: Sequence[Write], left: float, seconds: float
+) -> dict[str, WriteOutcome]:
+    tasks = {write.point: asyncio.ensure_future(writer.carry_out([write])) for write in writes}
+    await asyncio.wait(tasks.values(), timeout=max(0.0, left))
+    outcomes = {}
+    for write in writes:
+        task = tasks[write.point]
+        if task.done():
+            (outcomes[write.point],) = task.result()
+        else:
+            task.cancel()
+            error = OutOfTimeError(f"no answer within the {seconds:.0f} s that were left")
+            outcomes[write.point] = WriteOutcome(write, error)
+    return outcomes
+
+
+def _worth_another_try(outcome: WriteOutcome) -> bool:
+    """Tell whether a write may succeed when it is sent again."""
+    error = outcome.error
+    if isinstance(error, RefusedError):
+        return isinstance(error, UnitBusyError)
+    return isinstance(error, BusError) and not isinstance(
+        error, OutOfTimeError | UnknownPointError | ValueDoesNotFitError
+    )
