@@ -32,13 +32,12 @@ ROOT = HERE.parents[1]
 BIN = Path(sys.executable).parent
 sys.path.insert(0, str(HERE))
 
-from result import summarise  # noqa: E402  # stands beside this file
+from ideal import LOG  # noqa: E402  # stands beside this file
+from result import summarise  # noqa: E402  # and so does this
 
 WEEKS_BEFORE, DAYS_AFTER, SHADOW_DAYS = 4, 14, 2
 EFFECT = "wind_infiltration=0.12"
 NOTHING, NAMED = 0, 10
-LOG = "trainer/archive/telemetry/site=demo"
-"""Where the trainer has collected the log."""
 
 
 class DemoError(Exception):
