@@ -116,8 +116,10 @@ def test_the_benchmark_gives_the_posterior_of_the_function(short: Telemetry, mon
 
     class Season:
         measured = short
+        crop = None
 
     monkeypatch.setattr(logs, "simulate_many", lambda *_, **__: [Season])
+    monkeypatch.setattr(logs, "history_of", lambda *_: None)
     monkeypatch.setattr(logs, "enr_units", lambda *_: {})
     greenhouse = VirtualGreenhouse(SITE, GreenhouseParameters(), np.datetime64("2020-03-01T00:00:00"), 1)
     found, wanted = logs.reference(greenhouse).model, calibrate(prepare_log(short, SITE))
