@@ -9,7 +9,7 @@ from igrow.core.bundle import BundleError, read_bundle
 from igrow.edge.cli.common import DEFAULT_CONFIGURATION, configuration_of
 from igrow.edge.updates.state import UpdateState, load_state
 
-EXAMPLE = "sudo -u igrow igrow-edge model list"
+EXAMPLE = "igrow-edge model list"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

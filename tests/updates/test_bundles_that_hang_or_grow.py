@@ -35,7 +35,7 @@ def gateway(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
 
 def send(gateway: Gateway, graph: bytes | None = None, offset: float = 5.0):
     made = write_tiny_bundle(gateway.folder / f"made-{time.monotonic_ns()}", offset=offset, graph=graph)
-    return publish(made.folder, gateway.repository, gateway.keys)
+    return publish(made.folder, gateway.exchange_root, gateway.keys)
 
 
 def memory_of(pid: int) -> int:
