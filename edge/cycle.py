@@ -159,11 +159,15 @@ class ControlCycle:
             return StopReport(seen=False)
         outcomes = await self._stop_by(image, until)
         held = () if self._manual else tuple(sorted(self.readback.held(image.monotonic)))
-        return StopReport.after(outcomes, by_hand=held, manual=self._manual)
+        settled = {*held, *(outcome.write.point for outcome in outcomes)}
+        unseen = [name for name in self._setpoints if image.value_of(name).age > 0.0 and name not in settled]
+        return StopReport.after(outcomes, by_hand=held, unseen=unseen, manual=self._manual)
 
     async def _stop_by(self, image: Image, until: float) -> list[WriteOutcome]:
         """Write the guard's verdict on a stop, also to units that were silent lately."""
-        before, shown = self.state, self.readback.shown()
+        before, points = self.state, self.readback.points
+        # What is still on its way may arrive after all, or never.
+        shown = {name: None if points[name].sent else stands for name, stands in self.readback.shown().items()}
         held = {**self._hands(image.monotonic)[0], **self.readback.held(image.monotonic)}
         verdict = guard({}, shown, held, image, before, self._rules, stopping=True, manual=self._manual)
         self.state = verdict.state

@@ -33,9 +33,9 @@ LOCK_SECONDS = 5.0
 """Longest time for the disk to say whether another daemon has the state folder; then control comes first."""
 LEAST_STOP = 5.0
 """Seconds that the safe setpoints get however long the cycle took to give way."""
-LINE_SECONDS = 2.0
+LINE_SECONDS = 1.0
 """Longest time for a line, or the status page, to be closed."""
-CLOSE_SECONDS = 16.0
+CLOSE_SECONDS = 15.0
 """Longest time for the services to be closed once the safe setpoints are written. What hangs is left behind."""
 LOCKSTEP_WAIT = 900.0
 """Longest time, by the wall clock, that a lock-step plant is kept waiting for a plan or an update."""

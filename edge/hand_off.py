@@ -102,7 +102,7 @@ class HandOff:
             return future.result(self._budget)
         except TimeoutError:
             if future.done():
-                raise
+                return future.result()  # in this very instant; or the work itself raises such an error
             raise LateError(f"{self.name}: not done within {self._patience:g} s") from None
         finally:
             self._budget_at = self._monotonic()

@@ -44,14 +44,19 @@ class StopReport:
     """What the PLC has confirmed."""
     failed: Mapping[str, str] = field(default_factory=dict)
     """By point: why its safe value was not written, or not confirmed."""
+    unseen: tuple[str, ...] = ()
+    """The points that stood at their safe value when they were last seen, and could not be looked at now."""
 
     @staticmethod
-    def after(outcomes: Sequence[WriteOutcome], *, by_hand: tuple[str, ...], manual: bool) -> StopReport:
+    def after(
+        outcomes: Sequence[WriteOutcome], *, by_hand: Sequence[str], unseen: Sequence[str], manual: bool
+    ) -> StopReport:
         """Return the report on what became of the writes of a stop."""
         return StopReport(
             seen=True,
             manual=manual,
-            by_hand=by_hand,
+            by_hand=tuple(by_hand),
+            unseen=tuple(unseen),
             written={o.write.point: o.write.value for o in outcomes if o.error is None},
             failed={o.write.point: str(o.error) for o in outcomes if o.error is not None},
         )
@@ -62,13 +67,17 @@ class StopReport:
             return "the PLC does not answer, so its own safe setpoints rule after its timeout"
         if self.manual:
             return "nothing was written, as somebody operates the PLC by hand"
-        hands = f", but for {', '.join(self.by_hand)}, which a hand has set" if self.by_hand else ""
+        notes = f", but for {', '.join(self.by_hand)}, which a hand has set" if self.by_hand else ""
+        if self.unseen:
+            notes += f"; {', '.join(self.unseen)} stood there already when last seen, and cannot be looked at now"
         if not self.failed:
-            return f"the safe setpoints were written{hands}"
+            return f"the safe setpoints were written{notes}"
+        begin = (
+            f"written: {', '.join(self.written)}" if self.written else "the PLC does not answer: nothing was written"
+        )
         failed = "; ".join(f"{name}: {why}" for name, why in self.failed.items())
-        rest = f"written: {', '.join(self.written)}{hands}" if self.written else "nothing was written"
-        begin = "" if self.written else "the PLC does not answer: "
-        return f"{begin}{rest}; not confirmed, so there the PLC's own safe setpoints rule after its timeout: {failed}"
+        rule = "not confirmed, so there the PLC's own safe setpoints rule after its timeout"
+        return f"{begin}{notes}; {rule}: {failed}"
 
 
 def furthest_first(writes: Sequence[Write], shown: Mapping[str, float | None]) -> list[Write]:

@@ -20,7 +20,7 @@ from igrow.edge.planning.messages import MessageError, receive, send
 
 SEND_SECONDS = 30.0
 """Longest time for a call to reach a process that has just been started on a busy machine."""
-END_SECONDS = 2.0
+END_SECONDS = 1.0
 """How long a killed process is waited for."""
 
 

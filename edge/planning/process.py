@@ -12,7 +12,7 @@ from igrow.edge.hand_off import HandOff, settled
 from igrow.edge.planning.graph_process import GraphProcess
 from igrow.edge.ports import Plan, PlanRequest
 
-CLOSE_SECONDS = 3.0
+CLOSE_SECONDS = 2.0
 """How long a plan that is being made is waited for at the stop, after its process was ended."""
 
 _log = logging.getLogger("igrow.edge.planning")

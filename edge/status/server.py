@@ -31,7 +31,7 @@ STATE_FILE_SECONDS = 10.0
 OWN_NAMES = ("localhost", "127.0.0.1", "[::1]")
 """What a visitor of this very machine calls it. A page of another site that had its own name point here (DNS rebinding)
 would say that name."""
-CLOSE_SECONDS = 2.0
+CLOSE_SECONDS = 1.0
 """How long the stop waits for the last state to be left."""
 
 

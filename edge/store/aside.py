@@ -20,7 +20,7 @@ from igrow.edge.ports import AlarmRecord, WriteRecord
 from igrow.edge.store.packing import pack
 from igrow.edge.store.store import SqliteStore, StoreError, StoreLimits, read_telemetry
 
-CLOSE_SECONDS = 4.0
+CLOSE_SECONDS = 3.0
 """How long the stop waits for what is still to be written."""
 READ_SECONDS = 60.0
 """How long the daemon's own threads, never its cycle, wait until what is in memory has been committed."""

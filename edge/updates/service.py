@@ -23,7 +23,7 @@ LATE_AFTER = 1800.0
 """Seconds after which the thread counts as held by a share: longer than the longest comparison."""
 RETRY = 600.0
 """Seconds after a start that failed until it is tried again."""
-CLOSE_SECONDS = 3.0
+CLOSE_SECONDS = 2.0
 """How long work under way is waited for at the stop, after the process for graphs was ended."""
 
 
