@@ -78,4 +78,4 @@ def test_a_needed_sensor_that_stood_still_for_most_of_the_log_is_a_fault_of_the_
     air[200:] = 19.5
     (fault,) = screen(Telemetry(TIME, {"air_temperature": air, "outdoor_temperature": wavy(5.0, 3.0)})).faults
     assert (fault.kind, fault.quantity) == ("sensor", "air_temperature")
-    assert "65 % of its readings were set aside" in str(fault)
+    assert "the sensor of air_temperature does not work, 65 % of its readings were set aside (stuck)" in str(fault)

@@ -103,12 +103,14 @@ def screen(telemetry: Telemetry) -> Screening:
             values[rows] = np.nan
         left = int(np.isfinite(values).sum())
         if name in (*NEEDED, *SENSED) and before and left < LARGEST_LOSS * before:
-            lost = f"{name}: {100 * (1 - left / before):.0f} % of its readings were set aside"
+            lost = f"{100 * (1 - left / before):.0f} % of its readings were set aside"
             if name in NEEDED:
-                faults.append(DataFault("sensor", name, lost, "look at the sensor, and at how its readings are logged"))
+                why = " and ".join(reason for reason, rows in checks if rows.any())
+                seen = f"the sensor of {name} does not work, {lost}{f' ({why})' if why else ''}"
+                faults.append(DataFault("sensor", name, seen, "look at it, and at how its readings are logged"))
             else:
                 values[:] = np.nan
-                notes.append(f"{lost}; nothing is said of it")
+                notes.append(f"{name}: {lost}; nothing is said of it")
         columns[name] = values
     if out.any():
         notes.insert(0, f"{int(out.sum())} rows in which all sensors read 0 were set aside whole: an outage")
