@@ -8,10 +8,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+import numpy as np
+
 from igrow.edge.guard.rules import PointRule
 
 COARSEST = 1.0 / 20.0
 """The coarsest resolution, as a share of a point's range, that a device is believed to have (0.5 K of 16 K)."""
+
+FLOAT32_STEP = float(np.finfo(np.float32).eps)
+"""The relative difference of neighbouring float32 values. A finer register than that is one."""
 
 
 def matches(rule: PointRule, shown: float, value: float) -> bool:
@@ -20,9 +25,14 @@ def matches(rule: PointRule, shown: float, value: float) -> bool:
 
 
 def rounds(rule: PointRule, written: float, shown: float) -> bool:
-    """Tell whether `shown` is `written` on a grid of round steps (1, 2, 2.5, 5 times a power of ten), up or down."""
+    """Tell whether `shown` is `written` on a grid of round steps (1, 2, 2.5, 5 times a power of ten), up or down.
+
+    A device goes by what its register holds: 25.4 in a float32 is a little less, which it cuts off to 25.3.
+    """
+    held = written if rule.resolution > FLOAT32_STEP * abs(written) else float(np.float32(written))
     return any(
-        abs(shown - written) < step and _is_multiple(shown, step) for step in _steps(COARSEST * (rule.high - rule.low))
+        abs(round(shown / step) * step - held) < step * (1.0 - 1e-9) and _is_multiple(shown, step)
+        for step in _steps(COARSEST * (rule.high - rule.low))
     )
 
 

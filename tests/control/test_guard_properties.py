@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 from control_fakes import image_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -141,8 +142,19 @@ def test_every_change_of_a_request_leaves_a_row(rule, asked, times):
 @settings(max_examples=300, deadline=None)
 def test_what_a_devices_resolution_makes_of_a_write_is_its_answer(grid, written, way):
     rule = PointRule(low=12.0, high=28.0, safe=18.0)
-    shown = float(np.float32(grid * way(written / grid)))
+    shown = float(np.float32(grid * way(float(np.float32(written)) / grid)))
     assert rounds(rule, written, shown) or rule.same(written, shown)
+
+
+@pytest.mark.parametrize(("written", "shown"), [(25.4, 25.3), (13.2, 13.15), (20.4, 20.3)])
+def test_a_float_that_is_a_little_less_than_what_was_written_is_cut_off_a_whole_step(written, shown):
+    assert rounds(PointRule(low=12.0, high=28.0, safe=18.0), written, shown)
+
+
+@pytest.mark.parametrize("resolution", [1e-6, 0.1])
+def test_a_whole_step_away_from_what_the_register_holds_is_no_answer(resolution):
+    rule = PointRule(low=12.0, high=28.0, safe=18.0, resolution=resolution)
+    assert not any(rounds(rule, 20.0, 20.0 + step) for step in (0.5, 0.25, 0.2, 0.1, -0.1, -0.2, -0.5))
 
 
 @given(written=st.floats(12.0, 28.0), shown=st.floats(12.0, 28.0))
