@@ -155,8 +155,9 @@ class Daemon:
         if other.quality is Quality.GOOD and other.value is not None:
             control.clock.witness(other.value)
         self._journal.alarm("clock", control.clock.doubt)
-        with self._contained("climate alarms"):
+        with self._contained("alarms"):
             control.climate_alarms.tick(image, self._journal.alarm)
+            control.acknowledged.look()
         with self._contained("updates"):
             self.services.updates.tick(image.true_time)
             if control.lockstep and self.services.updates.busy:
@@ -168,8 +169,8 @@ class Daemon:
             await self._plan_ahead(control, result)
         with self._contained("status"):
             problems = (self._configuration_problem,)
-            services, journal = self.services, self._journal
-            services.status.publish(snapshot_of(control, result, services, journal, self.cycles, problems))
+            snapshot = snapshot_of(control, result, self.services, self._journal, self.cycles, problems)
+            self.services.status.publish(snapshot)
         self._notifier.cycle_completed(f"{result.decision.source}: {result.decision.why}")
 
     @contextlib.contextmanager

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from igrow.core.errors import IgrowError
 from igrow.edge.configuration import Configuration
-from igrow.edge.sources.override import Lease, read_leases, write_leases
+from igrow.edge.sources.override import RECIPE, Lease, read_leases, write_leases
 
 OVERRIDE_FILE = "override.json"
 
@@ -18,7 +18,13 @@ def override_file(state_folder: Path) -> Path:
 
 
 def override(
-    configuration: Configuration, values: Mapping[str, float], seconds: float, give_back: Collection[str] = ()
+    configuration: Configuration,
+    values: Mapping[str, float],
+    seconds: float,
+    give_back: Collection[str] = (),
+    *,
+    by: str,
+    recipe: bool = False,
 ) -> dict[str, Lease]:
     """Override setpoints for some time, and give others back; a running daemon sees it in its next cycle.
 
@@ -26,10 +32,12 @@ def override(
         configuration: of the daemon.
         values: by setpoint.
         seconds: how long they last.
-        give_back: setpoints whose override ends now.
+        give_back: setpoints whose override ends now, or `RECIPE`: plans may rule again.
+        by: who asks, for the journal.
+        recipe: let the recipe rule instead of plans for that time.
 
     Returns:
-        All overrides that then stand.
+        All overrides that then stand, also those that have run out since; `RECIPE` among them.
 
     Raises:
         IgrowError: no such setpoint, a value outside the site's limits, or nowhere to write to.
@@ -45,8 +53,10 @@ def override(
         rule = configuration.guard_rules.points[name]
         if not rule.low <= value <= rule.high:
             raise IgrowError(f"{name}={value:g}: the site's limits are {rule.low:g} to {rule.high:g}")
-        leases[name] = Lease(value, seconds)
-    problem = write_leases(path, leases)
+        leases[name] = Lease(value, seconds, by=by)
+    if recipe:
+        leases[RECIPE] = Lease(1.0, seconds, by=by)
+    problem = write_leases(path, leases, by if give_back else "")
     if problem:
         raise IgrowError(problem)
     return leases

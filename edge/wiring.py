@@ -22,6 +22,7 @@ from igrow.edge.guard.writer import HEARTBEAT
 from igrow.edge.hand_off import PATIENCE, SHARE, HandOff
 from igrow.edge.journal import Journal
 from igrow.edge.moment import this_boot
+from igrow.edge.notifications.acknowledged import ACKNOWLEDGED_FILE, AcknowledgementWatch
 from igrow.edge.overriding import override_file
 from igrow.edge.pace import FollowedPlant, Pace, TickPace
 from igrow.edge.planning import GraphProcess, PlanningProcess
@@ -31,7 +32,15 @@ from igrow.edge.ports import Exchange, Plan, PlanningService, StatusService, Sto
 from igrow.edge.registers.model import TWIN_SUFFIX
 from igrow.edge.remembering import StateNotes, registers_of
 from igrow.edge.sensors import ImageBuilder, TwinSensors
-from igrow.edge.sources import FreshPlan, GrowerOverride, HandsOff, LastValidPlan, PlanKeeper, RecipeSource
+from igrow.edge.sources import (
+    FreshPlan,
+    GrowerOverride,
+    HandsOff,
+    LastValidPlan,
+    PlanKeeper,
+    RecipeSource,
+    WantedRecipe,
+)
 from igrow.edge.state_file import StateFile
 from igrow.edge.status import StatusServer
 from igrow.edge.store import StoreAside, StoreError, StoreLimits
@@ -104,6 +113,7 @@ class Control:
     boot: str
     """Names this start of the machine; empty where the plant's clock and not the machine's is followed."""
     climate_alarms: ClimateAlarms
+    acknowledged: AcknowledgementWatch
 
     @property
     def lockstep(self) -> bool:
@@ -201,6 +211,11 @@ def build_control(
     boot = this_boot() if isinstance(clock, SystemClock) else ""
     notes = StateNotes(services.store, boot, registers_of(register_map, rules.points))
     heartbeat = register_map.points.get(HEARTBEAT)
+    override = GrowerOverride(
+        StateFile(override_file(configuration.state_folder), services.state_files), boot, journal.event
+    )
+    recipe = RecipeSource(file.recipe, configuration.zone)
+    hands_off = HandsOff({name: rules.points[name].safe for name in configuration.setpoints})
     cycle = ControlCycle(
         readable,
         clock,
@@ -208,11 +223,12 @@ def build_control(
             configuration.sensor_rules, _twins(configuration), sun_elevation(site.latitude, site.longitude), units
         ),
         [
-            GrowerOverride(StateFile(override_file(configuration.state_folder), services.state_files), boot),
+            override,
+            WantedRecipe(override, recipe, hands_off),
             FreshPlan(keeper, fresh_for=1.5 * every),
             LastValidPlan(keeper),
-            RecipeSource(file.recipe, configuration.zone),
-            HandsOff({name: rules.points[name].safe for name in configuration.setpoints}),
+            recipe,
+            hands_off,
         ],
         rules,
         Readback(
@@ -233,6 +249,9 @@ def build_control(
     return Control(
         configuration, plc, clock, pace, cycle, keeper, _schedule(configuration, services), notes, boot,
         ClimateAlarms(usual_climate_alarms(site.crop) if file.climate_alarms is None else file.climate_alarms),
+        AcknowledgementWatch(
+            StateFile(configuration.state_folder / ACKNOWLEDGED_FILE, services.state_files), journal.event
+        ),
     )  # fmt: skip
 
 

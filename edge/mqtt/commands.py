@@ -36,7 +36,7 @@ class Commands:
         if monotonic - self._last.get(setpoint, -math.inf) < LEAST_SECONDS:
             return f"{setpoint[:40]!r}: another message came less than {LEAST_SECONDS:.0f} s ago"
         try:
-            override(self._configuration, {setpoint: value}, settings.override_for.total_seconds())
+            override(self._configuration, {setpoint: value}, settings.override_for.total_seconds(), by="MQTT")
         except IgrowError as error:
             return str(error)
         self._last[setpoint] = monotonic

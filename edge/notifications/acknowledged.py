@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+import contextlib
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from igrow.edge.state_file import read_state, write_state
+from igrow.edge.hand_off import LateError
+from igrow.edge.state_file import StateFile, read_state, write_state
 
 ACKNOWLEDGED_FILE = "acknowledged.json"
 
@@ -34,3 +36,22 @@ def acknowledge(path: Path, names: Collection[str], by: str, time: float, active
     kept = {name: one for name, one in read_acknowledged(path).items() if name in active}
     kept |= {name: Acknowledgement(by, time) for name in names}
     return write_state(path, {name: {"by": one.by, "time": one.time} for name, one in kept.items()})
+
+
+class AcknowledgementWatch:
+    """Tells of each acknowledgement once, in the daemon's cycle; what a start finds was told before."""
+
+    def __init__(self, file: StateFile, tell: Callable[..., None]) -> None:
+        """`tell` takes the kind of an event, and its details by name."""
+        self._file = file
+        self._tell = tell
+        self._known: dict[str, Acknowledgement] | None = None
+
+    def look(self) -> None:
+        """Tell what is new; while its disk hangs, later."""
+        with contextlib.suppress(LateError):
+            found = self._file.do(lambda: read_acknowledged(self._file.path))
+            for name, one in found.items():
+                if self._known is not None and self._known.get(name) != one:
+                    self._tell("acknowledged", alarm=name, by=one.by)
+            self._known = found

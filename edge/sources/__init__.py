@@ -1,8 +1,11 @@
-"""Where setpoints come from, in order: override, valid plan, last valid plan, recipe, hands off."""
+"""Where setpoints come from, in order.
+
+Override, the recipe where the grower wants it, valid plan, last valid plan, recipe, hands off.
+"""
 
 from igrow.edge.sources.decision import Choice, Decision, Offer, Source, decide
 from igrow.edge.sources.hands_off import HandsOff
-from igrow.edge.sources.override import GrowerOverride, Lease
+from igrow.edge.sources.override import GrowerOverride, Lease, WantedRecipe
 from igrow.edge.sources.plans import FreshPlan, LastValidPlan, PlanKeeper
 from igrow.edge.sources.recipe import Period, Recipe, RecipeSource, recipe_at, recipe_course
 
@@ -20,6 +23,7 @@ __all__ = [
     "Recipe",
     "RecipeSource",
     "Source",
+    "WantedRecipe",
     "decide",
     "recipe_at",
     "recipe_course",

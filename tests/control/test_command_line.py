@@ -76,6 +76,8 @@ def test_an_override_is_left_for_the_daemon_and_given_back(tmp_path, capsys):
     assert "is no setpoint of this site" in call(capsys, "override", path, "lamp_on=1")[2]
     assert call(capsys, "override", path, "--clear")[1] == "nothing is overridden\n"
     assert read_leases(leases) == {}
+    assert call(capsys, "override", path, "--recipe", "--for", "1 day")[1] == "the recipe rules for 1 day\n"
+    assert call(capsys, "override", path, "--clear", "recipe")[1] == "nothing is overridden\n"
 
 
 async def test_an_override_reaches_the_plc_and_status_says_so(tmp_path, capsys):

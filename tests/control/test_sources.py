@@ -19,10 +19,12 @@ from igrow.edge.sources import (
     PlanKeeper,
     Recipe,
     RecipeSource,
+    WantedRecipe,
     decide,
     recipe_at,
     recipe_course,
 )
+from igrow.edge.sources.override import RECIPE as WISH
 from igrow.edge.sources.override import read_leases, write_leases
 from igrow.edge.state_file import StateFile
 
@@ -222,3 +224,72 @@ def test_a_recipe_that_makes_no_sense_is_refused_with_its_place(text, message):
     with pytest.raises(SchemaError) as error:
         parse(text, Recipe)
     assert message in str(error.value)
+
+
+def wanting(path, plan, told=None):
+    """The order of the daemon, with a journal that only listens."""
+    said = [] if told is None else told
+    override = GrowerOverride(
+        StateFile(path, HandOff("state files")), tell=lambda kind, **detail: said.append((kind, detail))
+    )
+    keeper = PlanKeeper(lambda: plan)
+    recipe, hands_off = RecipeSource(Recipe(irrigation_on=()), AMSTERDAM), HandsOff({**SAFE, "irrigation_on": 0.0})
+    return [override, WantedRecipe(override, recipe, hands_off), FreshPlan(keeper, 6 * 3600.0), recipe, hands_off]
+
+
+def test_the_recipe_goes_before_a_plan_while_the_grower_wants_it(tmp_path):
+    path = tmp_path / "override.json"
+    every = wanting(path, plan_of())
+    assert heating(every, 0.0, T0) == ("plan", 16.0)
+    write_leases(path, {WISH: Lease(1.0, 600.0)})
+    decision = decide(every, Image(10.0, T0), ("heating_setpoint", "irrigation_on"))
+    assert {choice.source for choice in decision.choices.values()} == {"recipe"}
+    # What the recipe leaves open is not the plan's to fill.
+    assert decision.choices["irrigation_on"].value == 0.0
+    assert decision.why == "the recipe, wanted by the grower for 10 min more"
+    assert heating(every, 611.0, T0 + 611.0) == ("plan", 16.0)
+
+
+def test_a_setpoint_by_hand_goes_before_the_wanted_recipe(tmp_path):
+    path = tmp_path / "override.json"
+    every = wanting(path, plan_of())
+    write_leases(path, {WISH: Lease(1.0, 600.0), "heating_setpoint": Lease(21.0, 600.0)})
+    assert heating(every, 0.0, T0) == ("override", 21.0)
+
+
+def test_the_wanted_recipe_is_safe_where_nobody_knows_the_time_of_day(tmp_path):
+    path = tmp_path / "override.json"
+    write_leases(path, {WISH: Lease(1.0, 600.0)})
+    assert heating(wanting(path, plan_of()), 0.0, None) == ("recipe", 18.0)
+
+
+def test_who_takes_and_gives_back_is_told_once(tmp_path):
+    path, told = tmp_path / "override.json", []
+    every = wanting(path, None, told)
+    write_leases(path, {"heating_setpoint": Lease(21.0, 600.0, by="Anna"), WISH: Lease(1.0, 600.0, by="Anna")})
+    for second in range(3):
+        heating(every, float(second), T0 + second)
+    assert told == [
+        ("overridden", {"setpoint": "heating_setpoint", "value": 21.0, "seconds": 600.0, "by": "Anna"}),
+        ("recipe_wanted", {"seconds": 600.0, "by": "Anna"}),
+    ]
+    again: list = []
+    heating(wanting(path, None, again), 5.0, T0 + 5.0)
+    assert again == []  # a restart finds what it has told before
+    write_leases(path, {}, "Bert")
+    heating(every, 6.0, T0 + 6.0)
+    assert sorted(told[2:]) == [
+        ("given_back", {"setpoint": "heating_setpoint", "by": "Bert"}),
+        ("plans_wanted", {"by": "Bert"}),
+    ]
+
+
+def test_what_ends_by_itself_was_given_back_by_nobody(tmp_path):
+    path, told = tmp_path / "override.json", []
+    every = wanting(path, None, told)
+    write_leases(path, {"heating_setpoint": Lease(21.0, 60.0, by="Anna")})
+    heating(every, 0.0, T0)
+    heating(every, 61.0, T0 + 61.0)
+    write_leases(path, {}, "Bert")
+    heating(every, 62.0, T0 + 62.0)
+    assert [kind for kind, _ in told] == ["overridden"]
