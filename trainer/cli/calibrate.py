@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,8 @@ import numpy as np
 from igrow.core.errors import IgrowError
 from igrow.trainer.cli.log_arguments import add_log_arguments, log_of
 from igrow.trainer.exporting import export, read_model
-from igrow.trainer.fit import calibrate
+from igrow.trainer.fit import FittedModel, calibrate
+from igrow.trainer.fit.population import read_population
 
 EXAMPLE = "igrow-trainer calibrate DATA/agc2019 --compartment Reference --out out/reference"
 
@@ -20,6 +22,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_log_arguments(parser)
     parser.add_argument(
         "--bundle", type=Path, help="bundle of what is known of the greenhouse before (default: its description alone)"
+    )
+    parser.add_argument(
+        "--population", type=Path, metavar="FILE", help="what `igrow-trainer fleet learn` wrote of greenhouses like it"
     )
     parser.add_argument(
         "--fit-weeks", type=int, help="fit to so many first weeks of the log only (default: all; see evaluate)"
@@ -37,7 +42,14 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.fit_weeks < 1:
             raise IgrowError("--fit-weeks: one week at least")
         log = log.select(None, log.telemetry.time[0] + np.timedelta64(7 * arguments.fit_weeks, "D"))
-    before = read_model(arguments.bundle, log.known_site) if arguments.bundle else None
+    before = None
+    if arguments.bundle and arguments.population:
+        raise IgrowError("--bundle and --population: one of them says what is known before, not both")
+    if arguments.bundle:
+        before = read_model(arguments.bundle, log.known_site)
+    elif arguments.population:
+        prior = read_population(arguments.population).prior(log.known_site)
+        before = replace(FittedModel.described(log.known_site), posterior=prior)
     model = calibrate(log, prior_model=before, progress=lambda line: print(line, flush=True))
     print(f"\n{model.summary()}\n")
     bundle = export(model, arguments.out)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from igrow.trainer.fleet.overview import SiteRow, overview, utc
 from igrow.trainer.fleet.registry import Entry, Registry, load_registry
 from igrow.trainer.fleet.runner import run_tasks
 from igrow.trainer.fleet.tasks import Ending, Outcome, Task
+from igrow.trainer.fleet.work import LEARNED
 from igrow.trainer.service import history
 from igrow.trainer.service.recalibration import DAYS, site_folder, utc_now
 
@@ -30,12 +31,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     collect = actions.add_parser("collect", help="bring what the gateways left into the archive")
     diagnose = actions.add_parser("diagnose", help="diagnose now, publish nothing")
     recalibrate = actions.add_parser("recalibrate", help="diagnose the sites that are due, and publish what is better")
+    calibrate = actions.add_parser("calibrate", help="calibrate sites without a bundle of their own, and publish it")
+    learn = actions.add_parser("learn", help="learn from the sites that share it where greenhouses like these lie")
     publish = actions.add_parser("publish", help="sign again what expires soon")
-    for one in (status, collect, diagnose, recalibrate, publish):
+    for one in (status, collect, diagnose, recalibrate, calibrate, learn, publish):
         one.add_argument("fleet", type=Path, help="folder with fleet.yaml and sites/")
         one.add_argument("--site", action="append", default=[], metavar="NAME", help="only this one; may be repeated")
     status.add_argument("--page", type=Path, metavar="FOLDER", help="write the page and the reports into this folder")
-    for one in (diagnose, recalibrate):
+    for one in (diagnose, recalibrate, calibrate, learn):
         one.add_argument("--days", type=int, default=DAYS, help=f"newest days of the log (default {DAYS})")
     recalibrate.add_argument("--force", action="store_true", help="also the sites that are not due")
     publish.add_argument("--again", action="store_true", help="publish each site's bundle again, as after a new key")
@@ -55,7 +58,8 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     for name, problem in registry.problems.items():
         print(f"{name}: error; {problem}", flush=True)
-    tasks = [make_task(arguments, registry, entry, now) for entry in registry.entries if not entry.paused]
+    entries = [entry for entry in registry.entries if takes_part(entry, arguments.action)]
+    tasks = [make_task(arguments, registry, entry, now) for entry in entries]
     failed = len(registry.problems)
     file = registry.file
     outcomes = run_tasks(tasks, file.backend, workers=file.workers, address=file.ray_address)
@@ -64,6 +68,8 @@ def run(arguments: argparse.Namespace) -> int:
         remember(registry, arguments.action, outcome, now)
         print(f"[{number}/{len(tasks)}] {sentence(outcome)}", flush=True)
     print(f"{len(tasks) + len(registry.problems)} sites, {failed} failed", file=sys.stderr)
+    if arguments.action == "learn":
+        print(write_population(registry, entries))
     return int(failed > 0)
 
 
@@ -84,6 +90,12 @@ def make_task(arguments: argparse.Namespace, registry: Registry, entry: Entry, n
             "recalibrate_site",
             {"file": str(entry.file.resolve()), "keys": keys, "publish": False, "force": True, "days": arguments.days},
         ),
+        "learn": lambda: ("learn_from_site", {"file": str(entry.file.resolve()), "days": arguments.days}),
+        "calibrate": lambda: (
+            "calibrate_site",
+            {"file": str(entry.file.resolve()), "keys": keys, "days": arguments.days,
+             "population": str(registry.population.resolve()) if knows_others(registry, entry) else None},
+        ),
         "recalibrate": lambda: (
             "recalibrate_site",
             {"file": str(entry.file.resolve()), "keys": keys, "publish": True, "force": arguments.force,
@@ -102,9 +114,29 @@ def make_task(arguments: argparse.Namespace, registry: Registry, entry: Entry, n
     )
 
 
+def takes_part(entry: Entry, action: str) -> bool:
+    """Tell whether a site has a task in this action."""
+    return not entry.paused and (action != "learn" or entry.learning)
+
+
+def knows_others(registry: Registry, entry: Entry) -> bool:
+    """Tell whether what was learned from others is this site's prior."""
+    return entry.learning and registry.population.exists()
+
+
+def write_population(registry: Registry, entries: Sequence[Entry]) -> str:
+    """Put together what sites have learned; returns a sentence. Raises IgrowError where too few have."""
+    from igrow.trainer.fit.population import learn_population, read_learned  # noqa: PLC0415  (status needs no scipy)
+
+    files = [site_folder(registry.state, entry.site.name) / LEARNED for entry in entries]
+    population = learn_population([read_learned(file) for file in files if file.exists()])
+    population.write(registry.population)
+    return f"wrote {registry.population}: {len(population.mean)} parameters of {population.sites} sites"
+
+
 def remember(registry: Registry, action: str, outcome: Outcome, now: datetime) -> None:
     """Write into a site's history what its task could not write itself."""
-    written = action in ("diagnose", "recalibrate") and outcome.ending is Ending.FAILED
+    written = action in ("diagnose", "recalibrate", "calibrate") and outcome.ending is Ending.FAILED
     if outcome.ending is Ending.DONE or written:
         return
     command = "recalibrate" if action == "diagnose" else action

@@ -46,6 +46,9 @@ class SiteOptions:
 
     exchange: str | None = setting(default=None, help="an exchange of its own, or null")
     paused: bool = setting(default=False, help="true leaves the site alone")
+    learning: bool = setting(
+        default=False, help="true: what its calibration says goes to other sites that learn, and theirs to it"
+    )
 
 
 @dataclass(frozen=True)
@@ -73,6 +76,7 @@ class Entry:
     file: Path
     exchange: str
     paused: bool
+    learning: bool
 
 
 @dataclass(frozen=True)
@@ -94,6 +98,11 @@ class Registry:
     def keys(self) -> Path:
         """The folder of the signing keys."""
         return self.folder / self.file.keys
+
+    @property
+    def population(self) -> Path:
+        """The file of what was learned from the sites that share it."""
+        return self.state / "population.json"
 
     def path(self, text: str | None) -> str | None:
         """Return a path of the file, which is relative to the folder."""
@@ -118,7 +127,7 @@ def load_registry(folder: Path, only: Sequence[str] = ()) -> Registry:
             problems[found.stem] = str(error)
             continue
         options = file.sites.get(site.name, SiteOptions())
-        entries[site.name] = Entry(site, found, options.exchange or file.exchange, options.paused)
+        entries[site.name] = Entry(site, found, options.exchange or file.exchange, options.paused, options.learning)
     known = {*entries, *problems}
     if not known:
         raise IgrowError(f"{folder / 'sites'}: no site file (*.yaml) in it")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from datetime import UTC, datetime, timedelta
 from functools import partial
 from pathlib import Path
@@ -21,6 +22,8 @@ from igrow.trainer.service.places import open_place
 from igrow.trainer.service.recalibration import recalibrate, site_folder
 
 COLLECTED = "collected.json"
+LEARNED = "learned.json"
+"""What a site's own log said of its parameters; no row of the log."""
 REFRESH_BEFORE = timedelta(days=30)
 """Signatures that hold for less than this are made again."""
 
@@ -75,6 +78,54 @@ def recalibrate_site(
         now=datetime.fromtimestamp(now, UTC),
         days=days,
         force=force,
+    )
+    if turn.verdict == "error":
+        raise IgrowError(turn.note)  # its line is in the history already
+    return turn.to_json()
+
+
+def learn_from_site(file: str, state: str, exchange: dict[str, str | None], now: float, *, days: int) -> dict[str, Any]:
+    """Fit one site by itself, and keep what that says beyond its description: means and variances in `learned.json`."""
+    from igrow.trainer.data import prepare_log  # noqa: PLC0415  (collecting needs no fits)
+    from igrow.trainer.fit import calibrate  # noqa: PLC0415
+    from igrow.trainer.fit.population import learned_of  # noqa: PLC0415
+
+    del exchange  # what was collected is enough
+    site, moment = load_site(file), datetime.fromtimestamp(now, UTC)
+    start, end = (moment - timedelta(days=days)).date(), moment.date() + timedelta(days=2)
+    log = Archive(Path(state) / "archive").read(site.name, start, end)
+    if len(log.telemetry) == 0:
+        raise IgrowError(f"no telemetry of site {site.name} in the last {days} days: nothing was collected of it")
+    learned = learned_of(site, calibrate(prepare_log(log.telemetry, site, name=site.name)).posterior)
+    folder = site_folder(Path(state), site.name)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_whole(folder / LEARNED, json.dumps(asdict(learned)).encode())
+    return {"site": site.name, "note": f"{len(learned.shift)} parameters were seen in its log"}
+
+
+def calibrate_site(
+    file: str,
+    state: str,
+    exchange: dict[str, str | None],
+    keys: str,
+    now: float,
+    *,
+    days: int,
+    population: str | None,
+) -> dict[str, Any]:
+    """Calibrate a site that has no bundle of its own yet, and publish it."""
+    from igrow.trainer.publishing import publish_in  # noqa: PLC0415
+    from igrow.trainer.service.first_calibration import calibrate_first  # noqa: PLC0415
+
+    site = load_site(file)
+    turn = calibrate_first(
+        site,
+        Archive(Path(state) / "archive"),
+        site_folder(Path(state), site.name),
+        partial(publish_in, repository=_repository(exchange, site.name), keys=Path(keys)),
+        now=datetime.fromtimestamp(now, UTC),
+        days=days,
+        population=None if population is None else Path(population),
     )
     if turn.verdict == "error":
         raise IgrowError(turn.note)  # its line is in the history already

@@ -1,0 +1,90 @@
+"""What a new greenhouse gains by what others of its builder have shared: errors of its first weeks' model, later on.
+
+`python -m benchmarks.population [--shared N] [--new N]` draws a builder whose greenhouses lie a fifth off the described
+one, each a little in its own way, calibrates N of them on four weeks, and then new ones on a few days of log, once with
+their description as the prior and once with what the others shared. Both are judged on the two weeks that follow.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from igrow.core.greenhouse import GreenhouseParameters, generate_weather, recipe, simulate_many
+from igrow.core.site import Greenhouse, Lamps, Site
+from igrow.trainer.data import Log, prepare_log
+from igrow.trainer.fit import FittedModel, calibrate, evaluate
+from igrow.trainer.fit.population import learn_population, learned_of
+
+START = np.datetime64("2020-02-10T00:00:00")
+BUILDER, OWN = 0.2, 0.06
+"""How far the builder's greenhouses lie from the described one, and each of them from the others, relative."""
+FIRST_DAYS = (8, 14)
+SHARED_DAYS, JUDGED_DAYS = 28, 14
+QUANTITIES = ("air_temperature", "air_humidity", "air_co2")
+
+
+@dataclass(frozen=True)
+class Error:
+    """Mean absolute errors a day ahead of one new greenhouse."""
+
+    days: int
+    described: dict[str, float]
+    shared: dict[str, float]
+
+
+def simulate(plants: Sequence[GreenhouseParameters], days: int, seed: int) -> list[Log]:
+    """Return the logs of greenhouses under one sky."""
+    end = START + np.timedelta64(days, "D")
+    weather = generate_weather(START, end, seed=seed)
+    seasons = simulate_many(plants, weather, recipe, START, end, count=len(plants), seed=seed)
+    return [prepare_log(one.measured, site_of(plant)) for one, plant in zip(seasons, plants, strict=True)]
+
+
+def site_of(plant: GreenhouseParameters) -> Site:
+    """Return what a grower would write down."""
+    described = Greenhouse(mean_height=float(np.mean(plant.air_height)), lamps=Lamps())
+    return Site(name="new", latitude=plant.latitude, longitude=plant.longitude, greenhouse=described)
+
+
+def judge(log: Log, days: int, prior: FittedModel) -> dict[str, float]:
+    """Calibrate on the first days of a log; returns the errors a day ahead on its last two weeks."""
+    end = START + np.timedelta64(days, "D")
+    model = calibrate(log.select(None, end), prior_model=prior)
+    later = log.select(log.telemetry.time[-1] - np.timedelta64(JUDGED_DAYS, "D")).record(model.alignment or 0.0)
+    errors = evaluate(later, model.posterior.values, {}, ("24_h",))
+    return {name: errors[name]["24_h"].mae for name in QUANTITIES}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--shared", type=int, default=8, help="greenhouses that share what they learned (default 8)")
+    parser.add_argument("--new", type=int, default=6, help="greenhouses that begin (default 6)")
+    parser.add_argument("--seed", type=int, default=44_000)
+    options = parser.parse_args()
+    rng = np.random.default_rng(options.seed)
+    builder = GreenhouseParameters().varied(rng, BUILDER)
+    plants = [builder.varied(rng, OWN) for _ in range(options.shared + options.new)]
+    shared = simulate(plants[: options.shared], SHARED_DAYS, options.seed + 1)
+    population = learn_population([learned_of(one.known_site, calibrate(one).posterior) for one in shared])
+    found = []
+    for log in simulate(plants[options.shared :], max(FIRST_DAYS) + JUDGED_DAYS, options.seed + 2):
+        described = FittedModel.described(log.known_site)
+        prior = replace(described, posterior=population.prior(log.known_site))
+        found += [Error(days, judge(log, days, described), judge(log, days, prior)) for days in FIRST_DAYS]
+    print(f"{options.new} new greenhouses, {options.shared} that shared; error a day ahead, median (better in)")
+    print(f"{'days of log':>12}" + "".join(f"{name:>34}" for name in QUANTITIES))
+    for days in FIRST_DAYS:
+        cells = []
+        for name in QUANTITIES:
+            pairs = [(one.described[name], one.shared[name]) for one in found if one.days == days]
+            before, after = np.median(pairs, axis=0)
+            cells.append(f"{before:.3g} -> {after:.3g} ({sum(b < a for a, b in pairs)} of {len(pairs)})")
+        print(f"{days:>12}" + "".join(f"{cell:>34}" for cell in cells))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,119 @@
+"""The first bundle of a site's own: calibrated on its log once four weeks of it are there.
+
+A new gateway plans with the built-in bundle, which knows its greenhouse by description alone. From the first bundle on
+that was calibrated on the site itself, `recalibration.py` goes on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from igrow.core.bundle import Bundle
+from igrow.core.errors import IgrowError
+from igrow.core.site import Site
+from igrow.trainer.service import history
+from igrow.trainer.service.archive import Archive, SiteLog
+from igrow.trainer.service.recalibration import LEAST_GAIN, Publish, Turn, bundle_in_force
+
+if TYPE_CHECKING:
+    from igrow.trainer.data import Log
+    from igrow.trainer.fit import FittedModel
+
+COMMAND = "calibrate"
+LEAST_DAYS = 28
+"""Of log, so that every fourth week can be held back and the errors on it be told."""
+
+
+def calibrate_first(
+    site: Site,
+    archive: Archive,
+    folder: Path,
+    publish_bundle: Publish,
+    *,
+    now: datetime,
+    days: int,
+    population: Path | None = None,
+) -> Turn:
+    """Calibrate a site that has no bundle of its own, and publish it where it is better than the built-in one.
+
+    Never raises for what the site sent: an error is a line of its history.
+
+    Args:
+        site: whose log it is.
+        archive: where its log was collected.
+        folder: of this site's memory.
+        publish_bundle: is called with the folder of a bundle that passed.
+        now: the time, UTC.
+        days: newest days of the log to look at.
+        population: file of what the fleet has learned of its greenhouses; None: the site's description is the prior.
+    """
+    log = archive.read(site.name, (now - timedelta(days=days)).date(), now.date() + timedelta(days=2))
+    bundle, notes = bundle_in_force(folder, log.reports)
+    if bundle.manifest.calibrated_on == site.name:
+        note = f"{bundle.label} was calibrated on it already; recalibrate corrects it"
+        return Turn(site.name, now, "waiting", False, note, notes=notes)
+    time = log.telemetry.time
+    length = 0.0 if len(time) == 0 else float((time[-1] - time[0]) / np.timedelta64(1, "D"))
+    if length < LEAST_DAYS:
+        note = f"{length:.0f} days of log are there, {LEAST_DAYS} are needed"
+        return Turn(site.name, now, "waiting", False, note, notes=notes)
+    try:
+        turn = _calibrate(site, log, bundle, folder, publish_bundle, now, population)
+    except (IgrowError, OSError) as error:
+        turn = Turn(site.name, now, "error", False, str(error))
+    history.append(folder, turn.to_json() | {"command": COMMAND})
+    return turn
+
+
+def _calibrate(
+    site: Site,
+    log: SiteLog,
+    bundle: Bundle,
+    folder: Path,
+    publish_bundle: Publish,
+    now: datetime,
+    population: Path | None,
+) -> Turn:
+    from igrow.trainer.data import prepare_log  # noqa: PLC0415  (scipy is slow to import)
+    from igrow.trainer.exporting import export, read_model  # noqa: PLC0415
+    from igrow.trainer.fit import FittedModel, calibrate  # noqa: PLC0415
+    from igrow.trainer.fit.population import read_population  # noqa: PLC0415
+
+    before = FittedModel.described(site)
+    if population is not None:
+        before = replace(before, posterior=read_population(population).prior(site))
+    prepared = prepare_log(log.telemetry, site, name=site.name)
+    model = calibrate(prepared, prior_model=before)
+    gain = _gain(prepared, model, read_model(bundle, site))
+
+    def turn(note: str, *, published: bool = False) -> Turn:
+        return Turn(site.name, now, "calibrated", published, note, gain=gain, notes=(*log.notes, *model.notes))
+
+    if gain < LEAST_GAIN:
+        return turn(f"the bundle in force stays: on unseen weeks the calibration is only {100 * gain:.1f} % better")
+    fresh = folder / "bundles" / now.strftime("%Y%m%dT%H%M%SZ")
+    fresh.parent.mkdir(parents=True, exist_ok=True)
+    export(model, fresh)
+    publish_bundle(fresh)
+    return turn(f"published {fresh.name}: {100 * gain:.1f} % less error a day ahead on unseen weeks", published=True)
+
+
+def _gain(log: Log, model: FittedModel, deployed: FittedModel) -> float:
+    """Return the relative fall of the 24 h error on weeks that the fit did not see, mean over quantities."""
+    from igrow.trainer.data.splits import alternate_weeks  # noqa: PLC0415
+    from igrow.trainer.fit import evaluate  # noqa: PLC0415
+
+    record = log.record(model.alignment or 0.0)
+    held_out = alternate_weeks(record.time).held_out
+    errors = evaluate(record, deployed.posterior.values, deployed.active_effects, ("24_h",), held_out)
+    falls = [
+        1.0 - one.after / errors[one.quantity]["24_h"].mae
+        for one in model.errors
+        if one.horizon == "24_h" and errors[one.quantity]["24_h"].mae > 0.0
+    ]
+    return sum(falls) / len(falls) if falls else 0.0
