@@ -58,7 +58,7 @@ def others(count: int, first: int = OTHERS_SEED) -> dict[str, VirtualGreenhouse]
         if number % 2:
             plant = replace(plant, lamp_capacity=0.0)
         day = np.datetime64("2020-03-01T00:00:00") + np.timedelta64(int(rng.integers(0, 300)), "D")
-        name = f"greengreenhouse-{number}"
+        name = f"greenhouse-{number}"
         greenhouses[name] = VirtualGreenhouse(_site(name, plant), plant, day, first + 500 + number)
     return greenhouses
 

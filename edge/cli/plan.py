@@ -98,7 +98,7 @@ def reasons(plan: Plan, zone: ZoneInfo) -> Iterator[str]:
         for head, amounts in (("plan", explained.plan), ("recipe", explained.recipe)):
             yield f"{head:12s}" + "".join(f"{amount.mean:12.4f}" for amount in amounts.values())
         low, high = explained.gain.interval
-        yield f"gain {explained.gain.mean:+.4f}, 95 % between {low:+.4f} and {high:+.4f} by the simulator's own doubt"
+        yield f"gain {explained.gain.mean:+.4f}, 95 % between {low:+.4f} and {high:+.4f} by its own uncertainty"
         yield ""
         yield "What each change is for, EUR m-2, if it alone were taken back:"
         for change in explained.changes:

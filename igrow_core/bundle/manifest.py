@@ -73,7 +73,7 @@ class EffectRecord:
     """A named effect that the simulator carries."""
 
     name: str
-    kind: Literal["process", "sensor", "remainder"]
+    kind: Literal["process", "sensor"]
     parameters: Mapping[str, Estimate]
     balances: tuple[str, ...] = ()
     onset: Onset | None = None

@@ -1,4 +1,4 @@
-"""What no bundle carries: the remainder, and combinations of runs."""
+"""What no bundle carries: the residual model, and combinations of runs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from igrow.core.simulator.hybrid.nominal import nominal, site_record
 from igrow.trainer.fit.evaluation import errors_of, evaluate, summarise
 from igrow.trainer.research.forecasts.combination import fit_combination
 from igrow.trainer.research.forecasts.disturbance import missing_fluxes, observed_runs
-from igrow.trainer.research.forecasts.remainder import fit_remainder
+from igrow.trainer.research.forecasts.residual_model import fit_residual_model
 
 
 def test_the_remainder_finds_a_flux_that_follows_the_weather_and_stays_bounded() -> None:
@@ -19,13 +19,13 @@ def test_the_remainder_finds_a_flux_that_follows_the_weather_and_stays_bounded()
     record = site_record(virtual_log(10, seed=6, added={"heat": lost}), SITE, 300.0)
     fit, later = np.arange(count) < 6 * 288, np.arange(count) >= 7 * 288
     values = nominal(SITE)
-    remainder = fit_remainder([(record, fit, missing_fluxes(record, values, {}))], 0.03)
+    residual_model = fit_residual_model([(record, fit, missing_fluxes(record, values, {}))], 0.03)
     bare = evaluate(record, values, {}, ("24_h",), later)
-    added = remainder.fluxes(record)
+    added = residual_model.fluxes(record)
     runs = observed_runs(record, values, {}, added)
     helped = summarise([errors_of(record, runs, ("24_h",), later)])
     assert helped["air_temperature"]["24_h"].mae < 0.6 * bare["air_temperature"]["24_h"].mae
-    low, high = remainder.bounds["heat"]
+    low, high = residual_model.bounds["heat"]
     assert added["heat"].min() >= low
     assert added["heat"].max() <= high
 

@@ -141,7 +141,7 @@ def read_model(bundle: Bundle | Path | str, site: Site) -> FittedModel:
         alignment=manifest.alignment,
         discrepancy=manifest.discrepancy,
         history=_history_of(bundle),
-        effects=tuple(effect for effect in manifest.effects if effect.kind != "remainder"),
+        effects=manifest.effects,
         actuation={name: float(given.get(f"actuation:{name}", rule.value)) for name, rule in actuation.RULES.items()},
         holding={name: float(given.get(f"holding:{name}", one.value)) for name, one in holding.PARAMETERS.items()},
         crop=_crop_of(bundle),

@@ -107,14 +107,14 @@ def fit_climate(
         [np.tile(observed_scale(part), (part.size, 1)) for part in _split(found.residuals, shapes).values()]
     )
     spread, independent = scale.T
-    doubt = covariance(
+    uncertainty = covariance(
         found.residuals / spread,
         found.jacobian / spread[:, None],
         prior,
         weights=counted * independent / overlap,
         robust=ROBUST,
     )
-    return Gaussian(prior.names, found.posterior.mean, doubt)
+    return Gaussian(prior.names, found.posterior.mean, uncertainty)
 
 
 def observed_scale(errors: Floats) -> tuple[float, float]:

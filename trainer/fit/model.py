@@ -41,7 +41,7 @@ class FittedModel:
     discrepancy: Mapping[str, float] = field(default_factory=dict)
     """What the calibration could not explain on its own log, which is no finding later: amplitude by key."""
     history: Discrepancy | None = None
-    """The same with its doubt and the colour of its noise, at the log's own step; None where it was not learned."""
+    """The same with covariance and the colour of its noise, at the log's own step; None where it was not learned."""
     effects: tuple[EffectRecord, ...] = ()
     actuation: Mapping[str, float] = field(default_factory=actuation.default_rules)
     """Rules of the actuation stage by name."""

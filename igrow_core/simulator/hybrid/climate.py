@@ -177,7 +177,7 @@ def balances(
         state: `STATES` by name.
         drivers: from `derive`.
         parameters: by name.
-        added: what effects, a learned remainder or a disturbance add, by channel.
+        added: what effects, a learned residual model or a disturbance add, by channel.
     """
     temperature, vapour, co2, mass = (state[name] for name in STATES)
     height = drivers["mean_height"]
@@ -272,7 +272,7 @@ def advance(
         effects: the active effects.
         seconds: length of the step; at most 900 s keeps a day within 0.1 K of the limit of small steps.
         lamp_efficacy: umol J-1.
-        added: further fluxes by channel (a learned remainder, a disturbance).
+        added: further fluxes by channel (a learned residual model, a disturbance).
     """
     drivers = derive(xp, state, inputs, parameters, lamp_efficacy)
     total = contributions(xp, drivers, state, effects)

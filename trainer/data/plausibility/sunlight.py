@@ -166,8 +166,8 @@ def _change_of_clocks(telemetry: Telemetry, daylight: _Daylight, site: Site) -> 
             if min(before.sum(), after.sum()) < LEAST_DAYS:
                 continue
             jump = daylight.offset(after) - daylight.offset(before)
-            doubt = ERRORS * float(np.hypot(daylight.error(after), daylight.error(before)))
-            if max(JUMP[0], doubt) <= abs(jump) <= JUMP[1]:
+            error = ERRORS * float(np.hypot(daylight.error(after), daylight.error(before)))
+            if max(JUMP[0], error) <= abs(jump) <= JUMP[1]:
                 date = np.datetime64(int(day), "D")
                 seen = f"noon jumps by {jump:+.1f} h on {date}, when clocks change in {zone}"
                 return DataFault("local_time", "", seen, _name_zone(zone))

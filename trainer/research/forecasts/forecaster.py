@@ -1,4 +1,4 @@
-"""All that one log teaches about a site's forecasts: parameters, remainder, disturbance, rules, intervals and range."""
+"""All that a log teaches about a site's forecasts: parameters, residual model, disturbance, rules, intervals, range."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from igrow.trainer.research.forecasts.output_statistics import (
     corrected_runs,
     fit_output_statistics,
 )
-from igrow.trainer.research.forecasts.remainder import Remainder, fit_remainder
+from igrow.trainer.research.forecasts.residual_model import ResidualModel, fit_residual_model
 from igrow.trainer.research.forecasts.uncertainty import ErrorGrowth, TrainingRange, growth_of_runs, training_range
 
 RANGE_DRIVERS = (
@@ -58,7 +58,7 @@ class Forecaster:
 
     posterior: Gaussian
     effects: ActiveEffects
-    remainder: Remainder | None
+    residual_model: ResidualModel | None
     disturbance: DisturbanceModel
     rules: Mapping[str, float]
     """Of the actuation stage."""
@@ -75,8 +75,8 @@ class Forecaster:
     range: TrainingRange
 
     def added(self, record: Record) -> dict[str, Floats]:
-        """Return the remainder's fluxes along a record, (n,) by channel."""
-        return self.remainder.fluxes(record) if self.remainder is not None else {}
+        """Return the residual model's fluxes along a record, (n,) by channel."""
+        return self.residual_model.fluxes(record) if self.residual_model is not None else {}
 
     def predictor(self, record: Record) -> Predictor:
         """Return `predict(starts, steps)`: runs driven by the measured actuators."""
@@ -121,7 +121,7 @@ def fit_forecaster(
 
     Args:
         parts: records with their setpoints by name, (n,), the rows to fit on, and the rows to choose and to measure
-            the doubt on (selection), which no fit sees.
+            the uncertainty on (selection), which no fit sees.
         prior: the prior of the parameters.
         effects: the active effects.
         actuation: fit the rules too.
@@ -131,9 +131,12 @@ def fit_forecaster(
     posterior = fit_climate([_working(record, fit) for record, _, fit, _ in parts], prior, effects, progress=progress)
     values = posterior.values
     lacking = [(record, fit, missing_fluxes(record, values, effects)) for record, _, fit, _ in parts]
-    remainder = _choose_remainder(parts, lacking, posterior, effects)
-    say("remainder on weather and clock: " + ("kept" if remainder is not None else "of no use on selection weeks"))
-    known = [remainder.fluxes(record) if remainder is not None else {} for record, _, _, _ in parts]
+    residual_model = _choose_residual_model(parts, lacking, posterior, effects)
+    say(
+        "residual model on weather and clock: "
+        + ("kept" if residual_model is not None else "of no use on selection weeks")
+    )
+    known = [residual_model.fluxes(record) if residual_model is not None else {} for record, _, _, _ in parts]
     disturbance = fit_disturbance(
         [
             (record, fit, missing_fluxes(record, values, effects, added))
@@ -143,13 +146,13 @@ def fit_forecaster(
     rules: dict[str, float] = {}
     if actuation:
         rules = fit_actuation([(record, setpoints, fit) for record, setpoints, fit, _ in parts], values)
-        rules = _refined(parts[0], values, rules, remainder, disturbance)
+        rules = _refined(parts[0], values, rules, residual_model, disturbance)
         say("actuation stage fitted in closed loop")
     table = {
         name: np.concatenate([_driver(part[0], part[1], name)[part[2]] for part in parts]) for name in RANGE_DRIVERS
     }
     model = Forecaster(
-        posterior, effects, remainder, disturbance, rules, {}, {}, {}, {}, {}, training_range(_complete(table))
+        posterior, effects, residual_model, disturbance, rules, {}, {}, {}, {}, {}, training_range(_complete(table))
     )
     model = replace(model, growth=growth_of_runs([(part[0], part[3], model.predictor(part[0])) for part in parts]))
     if not actuation:
@@ -172,7 +175,7 @@ def fit_forecaster(
         runs = all_runs(record, by_actuators, by_setpoints, model.combinations, begin, steps)
         return replace(model, statistics=fit_output_statistics(record, setpoints, runs, begin))
 
-    # The doubt is that of a correction which has not seen the selection weeks; the one in use has seen all.
+    # The uncertainty is that of a correction which has not seen the selection weeks; the one in use has seen all.
     doubted = corrected(fit).combined_predictor(record, setpoints, by_actuators, by_setpoints)
     return replace(corrected(fit | selection), combined_growth=growth_of_runs([(record, selection, doubted)]))
 
@@ -180,8 +183,8 @@ def fit_forecaster(
 def adapt(model: Forecaster, record: Record, rows: Mask, widening: float = 1.5) -> Forecaster:
     """Return a model of other compartments brought to a new one of which there are few days.
 
-    Only the parameters move, under their posterior with standard deviations `widening` times as large; remainder and
-    disturbance are kept, since a week tells nothing about them.
+    Only the parameters move, under their posterior with standard deviations `widening` times as large; residual
+    model and disturbance are kept, since a week tells nothing about them.
     """
     known = model.posterior
     prior = Gaussian(known.names, known.mean, known.covariance * widening**2)
@@ -206,7 +209,7 @@ def _refined(
     part: tuple[Record, Mapping[str, Floats], Mask, Mask],
     parameters: Mapping[str, float],
     rules: Mapping[str, float],
-    remainder: Remainder | None,
+    residual_model: ResidualModel | None,
     disturbance: DisturbanceModel,
 ) -> dict[str, float]:
     """Return the rules refitted in closed loop, with what the forecasts take along."""
@@ -216,7 +219,7 @@ def _refined(
     coarse = {
         name: values[: len(record) * factor].reshape(-1, factor).mean(axis=1) for name, values in setpoints.items()
     }
-    added = remainder.fluxes(record) if remainder is not None else {}
+    added = residual_model.fluxes(record) if residual_model is not None else {}
 
     def fluxes(along: Record, starts: Integers, steps: int) -> Mapping[str, Floats]:
         return run_fluxes(along, parameters, {}, starts, steps, added, disturbance)
@@ -224,19 +227,19 @@ def _refined(
     return refine_actuation(record, coarse, parameters, rules, rows=rows, fluxes=fluxes)
 
 
-def _choose_remainder(
+def _choose_residual_model(
     parts: Sequence[tuple[Record, Mapping[str, Floats], Mask, Mask]],
     lacking: Sequence[tuple[Record, Mask | None, Mapping[str, Floats]]],
     posterior: Gaussian,
     effects: ActiveEffects,
-) -> Remainder | None:
-    """Return the remainder that helps most on the selection weeks, or None where none helps."""
+) -> ResidualModel | None:
+    """Return the residual model that helps most on the selection weeks, or None where none helps."""
     usual = DisturbanceModel()
 
-    def score(remainder: Remainder | None) -> float:
+    def score(residual_model: ResidualModel | None) -> float:
         total = 0.0
         for record, _, _, selection in parts:
-            added = remainder.fluxes(record) if remainder is not None else None
+            added = residual_model.fluxes(record) if residual_model is not None else None
             predict = observed_runs(record, posterior.values, effects, added, usual)
             errors = summarise([errors_of(record, predict, ("24_h",), selection, every=18_900.0)])
             total += sum(
@@ -246,7 +249,7 @@ def _choose_remainder(
             )
         return total
 
-    candidates: list[Remainder | None] = [None, *(fit_remainder(lacking, penalty) for penalty in _PENALTIES)]
+    candidates: list[ResidualModel | None] = [None, *(fit_residual_model(lacking, penalty) for penalty in _PENALTIES)]
     return min(candidates, key=score)
 
 

@@ -1,4 +1,4 @@
-"""What a fitted site promises about energy and doubt, against what was measured: daily totals and coverage."""
+"""What a fitted site promises about energy, how certainly, against what was measured: daily totals and coverage."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A bounded learned remainder of the balances on exogenous drivers only: weather, clock and sun.
+"""A bounded learned residual model of the balances on exogenous drivers only: weather, clock and sun.
 
 Actuators and states are left out on purpose: the PLC's control reveals the disturbance, so that a learner given
 its signals finds structure in noise. Ridge regression of the missing fluxes on a few features, hourly means,
@@ -31,11 +31,11 @@ FEATURES = (
     "half_day_sine",
     "half_day_cosine",
 )
-"""What the remainder is a linear function of."""
+"""What the residual model is a linear function of."""
 
 
 @dataclass(frozen=True)
-class Remainder:
+class ResidualModel:
     """Fluxes by channel as bounded linear functions of `FEATURES`."""
 
     centre: Floats
@@ -86,8 +86,10 @@ def features(record: Record) -> Floats:
     return np.stack([columns[name] for name in FEATURES], axis=1)
 
 
-def fit_remainder(parts: Sequence[tuple[Record, Mask | None, Mapping[str, Floats]]], penalty: float) -> Remainder:
-    """Fit the remainder to missing fluxes.
+def fit_residual_model(
+    parts: Sequence[tuple[Record, Mask | None, Mapping[str, Floats]]], penalty: float
+) -> ResidualModel:
+    """Fit the residual model to missing fluxes.
 
     Args:
         parts: records, the rows that may be used (None: all), and their missing fluxes by channel, (n,).
@@ -118,4 +120,4 @@ def fit_remainder(parts: Sequence[tuple[Record, Mask | None, Mapping[str, Floats
         slope = np.linalg.solve(normal, matrix.T @ (np.clip(values, low, high) - values.mean()))
         weights[channel] = np.append(slope, values.mean())
         bounds[channel] = (float(low), float(high))
-    return Remainder(centre, scale, weights, bounds)
+    return ResidualModel(centre, scale, weights, bounds)
