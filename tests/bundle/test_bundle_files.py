@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
-from tiny_bundle import write_tiny_bundle
 
 from igrow.core.bundle import (
     Bundle,
@@ -22,6 +21,7 @@ from igrow.core.bundle import (
     self_test,
     write_bundle,
 )
+from tests.tiny_bundle import write_tiny_bundle
 
 
 def test_a_bundle_is_read_back_as_it_was_written(tmp_path: Path) -> None:

@@ -11,10 +11,10 @@ import random
 from collections.abc import Mapping
 from typing import cast
 
-from bus.coded_unit import CodedUnit
-from bus.fault_proxy import Frame, take_frame
 from igrow.edge.registers.model import Function
 from igrow.edge.virtual_plc.memory import AnswerWithExceptionError
+from tests.bus.coded_unit import CodedUnit
+from tests.bus.fault_proxy import Frame, take_frame
 
 TABLES = {1: Function.COIL, 2: Function.DISCRETE_INPUT, 3: Function.HOLDING, 4: Function.INPUT}
 

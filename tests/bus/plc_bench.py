@@ -6,9 +6,6 @@ import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from control.control_fakes import MemoryStore
-
-from bus.fault_proxy import FaultProxy
 from igrow.edge.bus.modbus_bus import ModbusBus
 from igrow.edge.bus.plc import RegisterPlc
 from igrow.edge.cycle import ControlCycle
@@ -22,6 +19,8 @@ from igrow.edge.sources import HandsOff, Source
 from igrow.edge.stopping import STOP_SECONDS, StopReport
 from igrow.edge.virtual_plc.memory import DeviceMemory
 from igrow.edge.virtual_plc.modbus_server import ModbusServer
+from tests.bus.fault_proxy import FaultProxy
+from tests.control.control_fakes import MemoryStore
 
 TEXT = """
 title: a small greenhouse

@@ -6,12 +6,12 @@ import asyncio
 
 import pytest
 
-from bus.simulated_loop import run
 from igrow.edge.bus.errors import NotConnectedError, QueueFullError
 from igrow.edge.bus.pacing import Pacer
 from igrow.edge.bus.protocol import Priority
 from igrow.edge.bus.request_slot import RequestSlot
 from igrow.edge.bus.unit_health import HealthBook
+from tests.bus.simulated_loop import run
 
 
 class FakeClock:

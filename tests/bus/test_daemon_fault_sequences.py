@@ -12,10 +12,7 @@ import random
 from collections.abc import Sequence
 
 import pytest
-from control.control_fakes import MemoryStore
 
-from bus.fault_proxy import FaultProxy
-from bus.simulated_loop import run
 from igrow.edge.bus.modbus_bus import ModbusBus
 from igrow.edge.bus.plc import RegisterPlc
 from igrow.edge.cycle import ControlCycle
@@ -29,6 +26,9 @@ from igrow.edge.sensors import ImageBuilder, SensorRule
 from igrow.edge.sources import HandsOff, Offer
 from igrow.edge.virtual_plc.memory import DeviceMemory
 from igrow.edge.virtual_plc.modbus_server import ModbusServer
+from tests.bus.fault_proxy import FaultProxy
+from tests.bus.simulated_loop import run
+from tests.control.control_fakes import MemoryStore
 
 MAP = parse_register_map("""
 title: a small greenhouse

@@ -12,9 +12,6 @@ from collections import Counter
 
 import pytest
 
-from bus.coded_unit import CodedUnit, code
-from bus.fault_proxy import NETWORK, SERIAL, Fault, FaultProxy
-from bus.simulated_loop import run
 from igrow.edge.bus.errors import BusError
 from igrow.edge.bus.modbus_bus import ModbusBus
 from igrow.edge.bus.owed import OwedAnswers
@@ -22,6 +19,9 @@ from igrow.edge.bus.protocol import Priority, ReadRequest, WriteRequest
 from igrow.edge.bus.pymodbus_link import PymodbusLink
 from igrow.edge.registers.model import BusSettings, Function, Transport
 from igrow.edge.virtual_plc.modbus_server import ModbusServer
+from tests.bus.coded_unit import CodedUnit, code
+from tests.bus.fault_proxy import NETWORK, SERIAL, Fault, FaultProxy
+from tests.bus.simulated_loop import run
 
 TIMEOUT = 0.5
 PATIENCE = 30.0

@@ -9,14 +9,14 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from bus.coded_unit import CodedUnit, code
-from bus.late_line import LateLine
-from bus.simulated_loop import run
 from igrow.edge.bus.errors import BusError
 from igrow.edge.bus.modbus_bus import ModbusBus
 from igrow.edge.bus.owed import OwedAnswers
 from igrow.edge.bus.protocol import Priority, ReadRequest, WriteRequest
 from igrow.edge.registers.model import BusSettings, Function, Transport
+from tests.bus.coded_unit import CodedUnit, code
+from tests.bus.late_line import LateLine
+from tests.bus.simulated_loop import run
 
 TIMEOUT = 0.5
 LATEST = 20.0

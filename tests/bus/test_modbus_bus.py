@@ -8,10 +8,6 @@ from typing import Any
 
 import pytest
 
-from bus.coded_unit import CodedUnit, code
-from bus.fault_proxy import Fault, FaultProxy
-from bus.late_line import LateLine
-from bus.simulated_loop import run
 from igrow.edge.bus.errors import (
     AddressRefusedError,
     BadAnswerError,
@@ -29,6 +25,10 @@ from igrow.edge.bus.modbus_bus import ModbusBus
 from igrow.edge.bus.protocol import Priority, ReadRequest, WriteRequest
 from igrow.edge.registers.model import BusSettings, Function, Transport
 from igrow.edge.virtual_plc.modbus_server import ModbusServer
+from tests.bus.coded_unit import CodedUnit, code
+from tests.bus.fault_proxy import Fault, FaultProxy
+from tests.bus.late_line import LateLine
+from tests.bus.simulated_loop import run
 
 PORT = 5020
 TRANSPORTS = pytest.mark.parametrize("transport", [Transport.TCP, Transport.RTU_OVER_TCP], ids=lambda t: t.value)

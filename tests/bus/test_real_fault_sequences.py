@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from bus import test_fault_sequences
-from bus.test_fault_sequences import Sequence
+from tests.bus import test_fault_sequences
+from tests.bus.test_fault_sequences import Sequence
 
 
 @pytest.mark.parametrize("seed", [20, 21, 22, 23])

@@ -13,12 +13,12 @@ from typing import Any
 
 import pytest
 
-from bus.coded_unit import CodedUnit, code
 from igrow.edge.bus.errors import NotConnectedError
 from igrow.edge.bus.modbus_bus import ModbusBus
 from igrow.edge.bus.protocol import Priority, ReadRequest, WriteRequest
 from igrow.edge.registers.model import BusSettings, Function, Parity, Transport
 from igrow.edge.virtual_plc.modbus_server import ModbusServer, _SerialConnection, _TcpConnection
+from tests.bus.coded_unit import CodedUnit, code
 
 
 async def exchange(settings: BusSettings, unit: CodedUnit) -> None:

@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 
-from bus.simulated_loop import run
 from igrow.edge.bus.errors import (
     AddressRefusedError,
     BusError,
@@ -21,6 +20,7 @@ from igrow.edge.bus.plc import RegisterPlc
 from igrow.edge.bus.protocol import Priority, ReadRequest, WriteRequest
 from igrow.edge.registers.loading import parse_register_map
 from igrow.edge.registers.model import Function
+from tests.bus.simulated_loop import run
 
 MAP = """
 title: a small site

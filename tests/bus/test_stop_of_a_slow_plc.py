@@ -5,14 +5,14 @@ from __future__ import annotations
 import asyncio
 
 import pytest
-from control.control_fakes import FixedSource
 
-from bus.fault_proxy import Fault
-from bus.plc_bench import INTERVAL, RULES, SAFE, PlcBench, make_plc_bench
-from bus.simulated_loop import run
 from igrow.edge.guard import Write
 from igrow.edge.stopping import STOP_SECONDS, furthest_first
 from igrow.edge.virtual_plc.memory import AnswerWithExceptionError
+from tests.bus.fault_proxy import Fault
+from tests.bus.plc_bench import INTERVAL, RULES, SAFE, PlcBench, make_plc_bench
+from tests.bus.simulated_loop import run
+from tests.control.control_fakes import FixedSource
 
 WISHES = {"heating_setpoint": 21.0, "co2_setpoint": 700.0, "lamp_on": 1.0, "irrigation_on": 0.5}
 PLANS = [FixedSource(WISHES)]

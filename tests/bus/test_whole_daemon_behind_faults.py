@@ -12,9 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from control.daemon_bench import Plant, free_port, running, until, write_files
 
-from bus.fault_proxy import NETWORK, Fault, FaultProxy
 from igrow.edge import pace
 from igrow.edge.bus import plc as bus_of_plc
 from igrow.edge.bus.modbus_bus import ModbusBus
@@ -22,6 +20,8 @@ from igrow.edge.registers.codec import decode
 from igrow.edge.registers.model import BusSettings, Device, Function
 from igrow.edge.sources.override import Lease, write_leases
 from igrow.edge.store import read_records, read_telemetry
+from tests.bus.fault_proxy import NETWORK, Fault, FaultProxy
+from tests.control.daemon_bench import Plant, free_port, running, until, write_files
 
 TIMEOUT = 0.05
 SENSORS = {

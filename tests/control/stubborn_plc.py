@@ -6,8 +6,6 @@ import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 
-from control_fakes import Bench, FakePlc, MemoryStore
-
 from igrow.edge.bus.errors import AddressRefusedError, NoAnswerError, NoValueError
 from igrow.edge.bus.plc import Reading
 from igrow.edge.clock import FakeClock
@@ -17,6 +15,7 @@ from igrow.edge.image import Image
 from igrow.edge.journal import Journal
 from igrow.edge.sensors import ImageBuilder, SensorRule
 from igrow.edge.sources import HandsOff, Source
+from tests.control.control_fakes import Bench, FakePlc, MemoryStore
 
 SAFE = {"heating_setpoint": 18.0, "co2_setpoint": 400.0, "lamp_on": 0.0, "irrigation_on": 0.1}
 RULES: Mapping[str, PointRule] = {

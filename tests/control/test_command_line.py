@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from daemon_bench import Plant, free_port, running, until, write_files
 
 from igrow.core.errors import IgrowError
 from igrow.edge.cli import COMMANDS, main
@@ -25,6 +24,7 @@ from igrow.edge.cli.status import lines
 from igrow.edge.ports import Plan
 from igrow.edge.sources.override import read_leases
 from igrow.edge.state_lock import sole_use
+from tests.control.daemon_bench import Plant, free_port, running, until, write_files
 
 
 def call(capsys, *arguments: object) -> tuple[int, str, str]:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import pytest
-from daemon_bench import Plant, free_port, write_files
 
 from igrow.edge.commission import Commissioning
 from igrow.edge.configuration import load_configuration
 from igrow.edge.virtual_plc.pace import Lockstep, Realtime
+from tests.control.daemon_bench import Plant, free_port, write_files
 
 
 class Script:

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from daemon_bench import MAP, write_files
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -20,6 +19,7 @@ from igrow.edge.point_rules import highest_beat, point_rule
 from igrow.edge.registers.codec import decode, encode
 from igrow.edge.registers.loading import parse_register_map
 from igrow.edge.registers.model import DataType, Function, Point
+from tests.control.daemon_bench import MAP, write_files
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from control_fakes import CO2, HEATING, FixedSource, make_bench
 
 from igrow.edge.bus.errors import NoAnswerError, UnitRestingError
 from igrow.edge.guard import Bound, Interlock
+from tests.control.control_fakes import CO2, HEATING, FixedSource, make_bench
 
 FAST = {"heating_setpoint": replace(HEATING, slew=None, minimum_interval=0.0), "co2_setpoint": CO2}
 

@@ -9,7 +9,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from daemon_bench import MAP, Plant, free_port, running, until, write_files
 
 from igrow.edge.daemon import Daemon
 from igrow.edge.image import Quality
@@ -17,6 +16,7 @@ from igrow.edge.planning import GraphProcess, PlanningProcess
 from igrow.edge.ports import ActiveBundle
 from igrow.edge.store import read_records, read_telemetry
 from igrow.edge.virtual_plc.pace import Realtime
+from tests.control.daemon_bench import MAP, Plant, free_port, running, until, write_files
 
 
 def kinds(folder: Path) -> list[str]:
@@ -279,7 +279,7 @@ async def test_a_planner_that_hangs_delays_no_cycle_and_the_recipe_rules(tmp_pat
         await until(lambda: daemon.cycles >= 2)
         daemon.services.planning.close()
         planner = PlanningProcess(
-            daemon.configuration.site, GraphProcess(), seconds=3.0, planner="hanging_planner:make_plan"
+            daemon.configuration.site, GraphProcess(), seconds=3.0, planner="tests.control.hanging_planner:make_plan"
         )
         daemon.services.planning = daemon._control.schedule._service = planner
         daemon.services.updates.active = lambda: ActiveBundle("test", tmp_path)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import tarfile
 
 import pytest
-from daemon_bench import free_port, write_files
 
 import igrow
 from igrow.core.bundle import default_bundle_folder
@@ -14,6 +13,7 @@ from igrow.edge.cli import main
 from igrow.edge.configuration import load_configuration
 from igrow.edge.image import Quality, Value
 from igrow.edge.store import SqliteStore
+from tests.control.daemon_bench import free_port, write_files
 
 
 def test_the_installed_configuration_begins_with_a_bundle_that_is_there():

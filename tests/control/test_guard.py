@@ -4,13 +4,13 @@ import math
 from dataclasses import replace
 
 import pytest
-from control_fakes import image_of
 
 from igrow.edge.guard import Bound, GuardRules, GuardState, Interlock, PointRule, PointState, Request, guard
 from igrow.edge.guard.core import with_earlier_writes
 from igrow.edge.guard.interlocks import DEFAULT_INTERLOCKS, SAFE, InterlockError
 from igrow.edge.guard.rules import GuardRuleError
 from igrow.edge.image import Image, Quality, Value
+from tests.control.control_fakes import image_of
 
 POINT = PointRule(low=10.0, high=30.0, safe=18.0)
 

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from control_fakes import image_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -12,6 +11,7 @@ from igrow.edge.guard import Bound, GuardRules, GuardState, Interlock, PointRule
 from igrow.edge.guard.answers import rounds
 from igrow.edge.guard.core import DAY
 from igrow.edge.image import Image, Quality, Value
+from tests.control.control_fakes import image_of
 
 ANY_FLOAT = st.one_of(
     st.floats(allow_nan=True, allow_infinity=True),

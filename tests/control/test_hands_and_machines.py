@@ -4,11 +4,11 @@ import math
 from dataclasses import replace
 
 import pytest
-from control_fakes import FixedSource
-from stubborn_plc import RULES, SAFE, make_stubborn_bench
 
 from igrow.edge.bus.errors import UnitRestingError
 from igrow.edge.guard import Bound, Interlock
+from tests.control.control_fakes import FixedSource
+from tests.control.stubborn_plc import RULES, SAFE, make_stubborn_bench
 
 WISH = {"heating_setpoint": 21.0, "co2_setpoint": 700.0, "lamp_on": 1.0, "irrigation_on": 0.5}
 

@@ -4,12 +4,12 @@ import itertools
 from dataclasses import replace
 
 import pytest
-from control_fakes import FixedSource
-from stubborn_plc import RULES, make_stubborn_bench
 
 from igrow.edge.guard import DEFAULT_INTERLOCKS, PointRule
 from igrow.edge.image import Quality
 from igrow.edge.sensors import SensorRule
+from tests.control.control_fakes import FixedSource
+from tests.control.stubborn_plc import RULES, make_stubborn_bench
 
 VENT = PointRule(low=0.0, high=100.0, safe=0.0, dead_band=2.0, minimum_interval=180.0, decided=False)
 VENTS = {**RULES, "vent_lee": VENT, "vent_wind": VENT}

@@ -4,12 +4,12 @@ import json
 from dataclasses import replace
 
 import pytest
-from control_fakes import FixedSource
-from stubborn_plc import RULES, SAFE, make_stubborn_bench
 
 from igrow.edge.clock import FakeClock
 from igrow.edge.moment import Moment, from_json, this_boot, to_json
 from igrow.edge.remembering import NOTE_AGAIN, StateNotes
+from tests.control.control_fakes import FixedSource
+from tests.control.stubborn_plc import RULES, SAFE, make_stubborn_bench
 
 WISH = {"heating_setpoint": 21.0, "co2_setpoint": 700.0, "lamp_on": 1.0, "irrigation_on": 0.5}
 
@@ -280,7 +280,7 @@ def test_the_same_is_noted_once_in_a_while_only():
     ledger = Ledger()
     notes = StateNotes(ledger, "a", {})
     clock = FakeClock()
-    from control_fakes import image_of
+    from tests.control.control_fakes import image_of
 
     for _ in range(200):
         clock.advance(10.0)

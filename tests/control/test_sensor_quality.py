@@ -3,7 +3,6 @@
 import math
 
 import pytest
-from control_fakes import image_of
 
 from igrow.edge.bus.errors import NoAnswerError
 from igrow.edge.bus.plc import Reading
@@ -11,6 +10,7 @@ from igrow.edge.guard import DEFAULT_INTERLOCKS, GuardRules, GuardState, PointRu
 from igrow.edge.image import Image, Quality, Value
 from igrow.edge.sensors import CONSEQUENCES, ImageBuilder, SensorRule, TwinSensors, default_rule
 from igrow.edge.sensors.consequences import usable_for_control, usable_for_planning
+from tests.control.control_fakes import image_of
 
 RULE = SensorRule(-20.0, 60.0, rate=0.01, jump=1.0, frozen_after=3600.0, stale_after=30.0, missing_after=600.0)
 

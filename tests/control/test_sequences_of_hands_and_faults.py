@@ -18,12 +18,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import pytest
-from control_fakes import FixedSource
-from stubborn_plc import RULES, SAFE, StubbornBench, make_stubborn_bench
 
 from igrow.edge.bus.errors import UnitRestingError
 from igrow.edge.guard import DEFAULT_INTERLOCKS, PointRule
 from igrow.edge.sensors import default_rule
+from tests.control.control_fakes import FixedSource
+from tests.control.stubborn_plc import RULES, SAFE, StubbornBench, make_stubborn_bench
 
 RESPECT = 600.0
 VENT = PointRule(low=0.0, high=100.0, safe=0.0, dead_band=2.0, minimum_interval=60.0, decided=False)

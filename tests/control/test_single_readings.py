@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from control_fakes import FixedSource
-from stubborn_plc import RULES, make_stubborn_bench
 
 from igrow.edge.guard import DEFAULT_INTERLOCKS, PointRule
 from igrow.edge.image import Quality
 from igrow.edge.sensors import default_rule
+from tests.control.control_fakes import FixedSource
+from tests.control.stubborn_plc import RULES, make_stubborn_bench
 
 VENT = PointRule(low=0.0, high=100.0, safe=0.0, dead_band=2.0, decided=False)
 WISH = {"heating_setpoint": 21.0, "co2_setpoint": 700.0, "lamp_on": 1.0, "irrigation_on": 0.5}

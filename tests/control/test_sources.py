@@ -4,7 +4,6 @@ import datetime
 from zoneinfo import ZoneInfo
 
 import pytest
-from control_fakes import image_of
 
 from igrow.core.yaml_schema import SchemaError, parse
 from igrow.edge.hand_off import HandOff
@@ -27,6 +26,7 @@ from igrow.edge.sources import (
 from igrow.edge.sources.override import RECIPE as WISH
 from igrow.edge.sources.override import read_leases, write_leases
 from igrow.edge.state_file import StateFile
+from tests.control.control_fakes import image_of
 
 T0 = 1_772_323_200.0
 AMSTERDAM = ZoneInfo("Europe/Amsterdam")

@@ -5,11 +5,10 @@ import json
 import socket
 import urllib.request
 
-from daemon_bench import Plant, free_port, running, until, write_files
-
 from igrow.edge.configuration import load_configuration
 from igrow.edge.status import StatusServer
 from igrow.edge.wiring import open_services
+from tests.control.daemon_bench import Plant, free_port, running, until, write_files
 
 
 async def test_the_page_shows_the_time_of_the_site(tmp_path):

@@ -68,10 +68,9 @@ def test_every_place_keeps_files_whole(sides: tuple[Place, Place]) -> None:
 
 
 def test_a_log_arrives_once_is_receipted_and_a_bundle_comes_back(sides: tuple[Place, Place], tmp_path: Path) -> None:
-    from tiny_bundle import write_tiny_bundle
-
     from igrow.core.exchange import Below
     from igrow.edge.updates import SignedSource
+    from tests.tiny_bundle import write_tiny_bundle
 
     gateway, trainer = sides
     world = World(tmp_path / "world", gateway)

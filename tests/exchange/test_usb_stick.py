@@ -6,7 +6,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
-from tiny_bundle import write_tiny_bundle
 
 from igrow.core.exchange import Below, FolderPlace
 from igrow.edge.cli import main
@@ -15,6 +14,7 @@ from igrow.edge.store import SqliteStore, StoreLimits
 from igrow.trainer.publishing import create_keys, publish_in
 from igrow.trainer.service.archive import Archive
 from igrow.trainer.service.collecting import collect
+from tests.tiny_bundle import write_tiny_bundle
 
 ROOT = Path(__file__).resolve().parents[2]
 

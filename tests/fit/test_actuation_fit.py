@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from virtual_log import SITE, virtual_log
 
 from igrow.core.simulator import actuation
 from igrow.core.simulator.hybrid.nominal import nominal, site_record
@@ -12,6 +11,7 @@ from igrow.trainer.fit.actuation import fit_actuation, setpoint_columns
 from igrow.trainer.fit.climate import site_prior
 from igrow.trainer.research.forecasts.forecaster import fit_forecaster
 from igrow.trainer.research.forecasts.totals import daily_totals
+from tests.virtual_log import SITE, virtual_log
 
 
 def test_rules_fitted_to_a_log_do_what_its_computer_did() -> None:

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from virtual_log import SITE, disturbances, virtual_log
 
 from igrow.core.bundle import BUILT_IN, read_bundle
 from igrow.core.errors import IgrowError
@@ -18,6 +17,7 @@ from igrow.core.telemetry import Telemetry, write_csv
 from igrow.trainer import calibrate, diagnosis, export, prepare_log, read_model
 from igrow.trainer.cli import main
 from igrow.trainer.fit import FittedModel
+from tests.virtual_log import SITE, disturbances, virtual_log
 
 DAYS, STEP = 30, 900.0
 PARAMETERS = ("latitude: 52.0", "longitude: 4.5", "name: virtual")

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
-from virtual_log import SITE, disturbances, virtual_log
 
 from igrow.core.errors import IgrowError
 from igrow.core.simulator.hybrid.nominal import nominal
@@ -18,6 +17,7 @@ from igrow.trainer.fit import climate, solver
 from igrow.trainer.fit.climate import bounds, fit_climate, observed_scale, site_prior
 from igrow.trainer.fit.evaluation import evaluate
 from igrow.trainer.fit.gaussian import Gaussian
+from tests.virtual_log import SITE, disturbances, virtual_log
 
 DAYS = 16
 STEP = 900.0

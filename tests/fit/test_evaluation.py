@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from virtual_log import SITE, virtual_log
 
 from igrow.core.errors import IgrowError
 from igrow.core.simulator.hybrid.nominal import nominal, site_record
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.fit.evaluation import evaluate, starts_within
+from tests.virtual_log import SITE, virtual_log
 
 
 @pytest.fixture(scope="module")

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from virtual_log import SITE
 
 from igrow.core.errors import IgrowError
 from igrow.trainer.fit.climate import site_prior
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.population import Learned, Population, learn_population, learned_of, read_population
+from tests.virtual_log import SITE
 
 DESCRIBED = site_prior(SITE)
 NAME = "leakage_wind"

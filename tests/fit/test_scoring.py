@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from virtual_log import SITE, virtual_log
 
 from igrow.core.bundle import Bundle, EffectRecord, Estimate, Span
 from igrow.core.errors import IgrowError
@@ -17,6 +16,7 @@ from igrow.core.telemetry import Telemetry, write_csv
 from igrow.trainer import FittedModel, export, prepare_log
 from igrow.trainer.cli import main
 from igrow.trainer.fit.scoring import ACTUATORS, BY_SETPOINTS, score_bundle, unseen
+from tests.virtual_log import SITE, virtual_log
 
 DAYS = 12
 SITE_FILE = "name: virtual\nlatitude: 52.0\nlongitude: 4.5\n"

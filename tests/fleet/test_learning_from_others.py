@@ -7,7 +7,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
-from virtual_log import SITE, disturbances, virtual_log
 
 from igrow.core.bundle import read_bundle
 from igrow.core.simulator.hybrid.nominal import nominal
@@ -17,6 +16,7 @@ from igrow.trainer.fit.population import read_population
 from igrow.trainer.service import history
 from igrow.trainer.service.archive import Archive
 from tests.fleet.fleet_of_sites import make_fleet
+from tests.virtual_log import SITE, disturbances, virtual_log
 
 STEP = 900.0
 NAMES = ["one", "two", "three", "new"]

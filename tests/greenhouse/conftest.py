@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from greenhouse_seasons import SPRING, WINTER, hours
 
 from igrow.core.greenhouse import generate_weather
 from igrow.core.telemetry import Telemetry
+from tests.greenhouse.greenhouse_seasons import SPRING, WINTER, hours
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from greenhouse_seasons import SPRING, hours
 
 from igrow.core.errors import IgrowError
 from igrow.core.greenhouse import Disturbances, GreenhouseParameters, HiddenEffect, recipe, simulate, simulate_many
@@ -15,6 +14,7 @@ from igrow.core.greenhouse.disturbances import QUIET
 from igrow.core.greenhouse.parameters import KNOWN
 from igrow.core.greenhouse.sensors import EXACT
 from igrow.core.telemetry import Telemetry
+from tests.greenhouse.greenhouse_seasons import SPRING, hours
 
 
 def test_each_of_a_batch_runs_as_it_would_alone(spring: Telemetry) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from greenhouse_seasons import SPRING, WINTER
 
 from igrow.core.effects import EFFECTS
 from igrow.core.greenhouse import Disturbances, GreenhouseParameters, HiddenEffect, recipe
@@ -14,6 +13,7 @@ from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
 from igrow.core.greenhouse.weather_table import WeatherTable
 from igrow.core.sun import unix_seconds
 from igrow.core.telemetry import Telemetry
+from tests.greenhouse.greenhouse_seasons import SPRING, WINTER
 
 SCALE = {"energy": 3e7, "vapour": 0.07, "slab": 8.0, "co2": 0.008, "carbohydrate": 1.6}
 """What a greenhouse holds, J m-2 and kg m-2: the residuals are measured by it."""

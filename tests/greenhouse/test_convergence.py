@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from greenhouse_seasons import SPRING, WINTER, hours
 
 from igrow.core.greenhouse import GreenhouseParameters, recipe, simulate
 from igrow.core.greenhouse.disturbances import QUIET
 from igrow.core.greenhouse.sensors import EXACT
 from igrow.core.telemetry import Telemetry
+from tests.greenhouse.greenhouse_seasons import SPRING, WINTER, hours
 
 
 def day(weather: Telemetry, start: np.datetime64, tick: float) -> Telemetry:

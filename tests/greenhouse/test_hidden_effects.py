@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from greenhouse_seasons import SPRING, hours
 
 from igrow.core.effects import EFFECTS
 from igrow.core.errors import IgrowError
@@ -15,6 +14,7 @@ from igrow.core.greenhouse.namespace import Floats
 from igrow.core.greenhouse.sensors import EXACT
 from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
 from igrow.core.telemetry import Telemetry
+from tests.greenhouse.greenhouse_seasons import SPRING, hours
 
 EVERY = [*EFFECTS, *UNCATALOGUED]
 QUIET_FOR = {"rain_cooling", "photosynthesis_heat_limit"}

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from greenhouse_seasons import SPRING, WINTER, hours
 
 from igrow.core.greenhouse import Disturbances, GreenhouseParameters, generate_weather, recipe, simulate, simulate_many
 from igrow.core.greenhouse.sensors import EXACT
 from igrow.core.greenhouse.weather import WeatherClimate
 from igrow.core.quantities import QUANTITIES
+from tests.greenhouse.greenhouse_seasons import SPRING, WINTER, hours
 
 COUNT = 40
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from greenhouse_seasons import hours
 
 from igrow.core.errors import IgrowError
 from igrow.core.greenhouse import generate_weather
 from igrow.core.greenhouse.weather import WeatherClimate
 from igrow.core.quantities import QUANTITIES, WEATHER
 from igrow.core.sun import azimuth, elevation, extraterrestrial_radiation, solar_hour
+from tests.greenhouse.greenhouse_seasons import hours
 
 YEAR = np.datetime64("2019-07-01T00:00:00", "s")
 

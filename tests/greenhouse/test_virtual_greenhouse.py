@@ -6,12 +6,12 @@ import pickle
 
 import numpy as np
 import pytest
-from greenhouse_seasons import SPRING, WINTER, hours
 
 from igrow.core.errors import IgrowError
 from igrow.core.greenhouse import Disturbances, GreenhouseParameters, HiddenEffect, VirtualGreenhouse, recipe
 from igrow.core.quantities import QUANTITIES
 from igrow.core.telemetry import Telemetry
+from tests.greenhouse.greenhouse_seasons import SPRING, WINTER, hours
 
 
 def greenhouse(weather: Telemetry, start: np.datetime64 = WINTER) -> VirtualGreenhouse:

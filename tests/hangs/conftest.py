@@ -8,13 +8,13 @@ from collections.abc import AsyncIterator, Mapping
 from pathlib import Path
 
 import pytest
-from control.daemon_bench import Plant, free_port, until, write_files
 
 from igrow.edge import daemon as daemon_module
 from igrow.edge.configuration import load_configuration
 from igrow.edge.daemon import Daemon
 from igrow.edge.store import read_records
 from igrow.edge.virtual_plc.pace import Realtime
+from tests.control.daemon_bench import Plant, free_port, until, write_files
 
 PATIENCE = 120.0
 """Seconds; only says when a test has failed, on however busy a machine."""

@@ -16,10 +16,6 @@ import threading
 from pathlib import Path
 
 import pytest
-from control.daemon_bench import until
-from hangs.conftest import PATIENCE, Bench
-from hangs.hanging_disk import HangingDisk
-from tiny_bundle import endless_graph, write_tiny_bundle
 
 from igrow.core.whole_files import write_whole
 from igrow.edge.bus.pymodbus_link import SerialTransport
@@ -27,6 +23,12 @@ from igrow.edge.notify import Notifier
 from igrow.edge.planning import GraphProcess, PlanningProcess
 from igrow.edge.ports import ActiveBundle
 from igrow.edge.sources.override import Lease, write_leases
+from tests.control.daemon_bench import until
+from tests.hangs.conftest import PATIENCE, Bench
+from tests.hangs.hanging_disk import HangingDisk
+from tests.tiny_bundle import endless_graph, write_tiny_bundle
+
+FUNCTIONS = "tests.hangs.hanging_functions"
 
 
 @pytest.fixture
@@ -97,12 +99,11 @@ async def test_a_state_folder_that_hangs_from_the_start(bench: Bench, disk) -> N
 
 async def test_a_forecast_on_a_share_that_hangs(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("igrow.edge.planning_schedule.LEAST_HISTORY", 0.0)
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
     os.mkfifo(bench.folder / "forecast.csv")
     bench.add("planning: {forecast: forecast.csv, timeout: 1 h}\n")
     async with bench.running() as daemon:
         planner = PlanningProcess(
-            daemon.configuration.site, daemon.services.graphs, planner="hanging_functions:wait_for_the_forecast"
+            daemon.configuration.site, daemon.services.graphs, planner=f"{FUNCTIONS}:wait_for_the_forecast"
         )
         daemon.services.planning = daemon._control.schedule._service = planner
         daemon.services.updates.active = lambda: ActiveBundle("test", bench.folder)
@@ -115,12 +116,11 @@ async def test_a_forecast_on_a_share_that_hangs(bench: Bench, monkeypatch: pytes
 
 async def test_a_planning_process_that_was_stopped(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("igrow.edge.planning_schedule.LEAST_HISTORY", 0.0)
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
     async with bench.running() as daemon:
         graphs = GraphProcess()
-        assert graphs.call("hanging_functions:nothing", seconds=PATIENCE) is None
+        assert graphs.call(f"{FUNCTIONS}:nothing", seconds=PATIENCE) is None
         os.kill(graphs.pid, signal.SIGSTOP)
-        planner = PlanningProcess(daemon.configuration.site, graphs, planner="hanging_functions:nothing")
+        planner = PlanningProcess(daemon.configuration.site, graphs, planner=f"{FUNCTIONS}:nothing")
         daemon.services.planning = daemon._control.schedule._service = planner
         daemon.services.updates.active = lambda: ActiveBundle("test", bench.folder)
         daemon._control.schedule._due = daemon._control.schedule._young_until = -math.inf

@@ -11,7 +11,6 @@ import subprocess
 
 import aiomqtt
 import pytest
-from control.daemon_bench import free_port, write_files
 
 from igrow.core.errors import IgrowError
 from igrow.edge.configuration import load_configuration
@@ -21,6 +20,7 @@ from igrow.edge.mqtt.commands import Commands
 from igrow.edge.mqtt.topics import discovery, state_payload
 from igrow.edge.overriding import override_file
 from igrow.edge.sources.override import read_leases
+from tests.control.daemon_bench import free_port, write_files
 
 STATE = {
     "time": 1.0,

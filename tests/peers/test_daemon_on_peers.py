@@ -7,11 +7,11 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
-from control.daemon_bench import running as running_daemon
-from control.daemon_bench import until
 
 from igrow.edge.store import read_records
-from peers.test_peers import HERE, LIBMODBUS, free_port, libmodbus, node_package, running, serial_pair
+from tests.control.daemon_bench import running as running_daemon
+from tests.control.daemon_bench import until
+from tests.peers.test_peers import HERE, LIBMODBUS, free_port, libmodbus, node_package, running, serial_pair
 
 PEERS = ["libmodbus tcp", "libmodbus rtu", "modbus-serial tcp", "modbus-serial rtu", "jsmodbus tcp"]
 

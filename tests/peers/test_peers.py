@@ -12,7 +12,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from virtual_plc.toy_plant import ToyPlant
 
 from igrow.edge.bus.errors import AddressRefusedError, BadAnswerError, BusError, NoAnswerError, UnitBusyError
 from igrow.edge.bus.modbus_bus import ModbusBus
@@ -22,6 +21,7 @@ from igrow.edge.registers.loading import load_register_map, parse_register_map
 from igrow.edge.registers.model import BusSettings, Function, Parity, Transport
 from igrow.edge.virtual_plc.pace import Lockstep
 from igrow.edge.virtual_plc.virtual_plc import VirtualPlc
+from tests.virtual_plc.toy_plant import ToyPlant
 
 HERE = Path(__file__).parent
 MAP = load_register_map(HERE.parents[1] / "config" / "register-maps" / "virtual-plc.yaml")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from toy_greenhouse import HOURS, START
 
 from igrow.core.planner import PlanningState
 from igrow.core.site import Site
+from tests.planner.toy_greenhouse import HOURS, START
 
 
 @pytest.fixture

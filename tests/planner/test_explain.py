@@ -7,10 +7,10 @@ from zoneinfo import ZoneInfo
 
 import numpy as np
 import pytest
-from toy_greenhouse import ToySimulator
 
 from igrow.core.planner import Budget, optimise
 from igrow.core.planner.explain import PARTS, explain, limits_in_force
+from tests.planner.toy_greenhouse import ToySimulator
 
 QUICK = Budget(generations=25, patience=25)
 

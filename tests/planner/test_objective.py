@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from toy_greenhouse import HOURS, START, ToySimulator
 
 from igrow.core.economics import product_price
 from igrow.core.planner import Objective
 from igrow.core.planner.objective import HARM_PER_DEGREE_HOUR, by_day, cautious
 from igrow.core.site import Prices, ProductPrice, Site
+from tests.planner.toy_greenhouse import HOURS, START, ToySimulator
 
 TIME = START + np.arange(HOURS) * np.timedelta64(3600, "s")
 

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from toy_greenhouse import HOURS, START, ToySimulator, with_planning
 
 from igrow.core.errors import IgrowError
 from igrow.core.planner import Budget, NumpyGeneration, Objective, PlanningState, optimise
@@ -14,6 +13,7 @@ from igrow.core.planner.objective import Simulator
 from igrow.core.planner.onnx_generation import OnnxGeneration
 from igrow.core.planner.template import for_site
 from igrow.core.site import Site
+from tests.planner.toy_greenhouse import HOURS, START, ToySimulator, with_planning
 
 QUICK = Budget(generations=40, patience=15)
 

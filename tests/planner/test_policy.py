@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from toy_greenhouse import START, ToySimulator
 
 from igrow.core.errors import IgrowError
 from igrow.core.planner.policy import ACTIONS, OBSERVATIONS, OnnxPolicy, observe, to_setpoints
 from igrow.core.quantities import SETPOINTS
+from tests.planner.toy_greenhouse import START, ToySimulator
 
 
 def test_it_sees_76_numbers_and_gives_96() -> None:

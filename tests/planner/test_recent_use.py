@@ -6,7 +6,6 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from toy_greenhouse import START, ToySimulator
 
 from igrow.core.planner import Outcome
 from igrow.core.planner.recent_use import (
@@ -21,6 +20,7 @@ from igrow.core.planner.recent_use import (
 from igrow.core.simulator.growth import GrowthBalance
 from igrow.core.site import Crop, Greenhouse
 from igrow.core.telemetry import Telemetry
+from tests.planner.toy_greenhouse import START, ToySimulator
 
 
 def days(*values: float) -> dict[str, np.ndarray]:

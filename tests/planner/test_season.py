@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from toy_greenhouse import ToySimulator
 
 from igrow.core.agronomy import Place
 from igrow.core.agronomy.inspection import violations
@@ -18,6 +17,7 @@ from igrow.core.planner.season.crop import fresh, like, live, supplied
 from igrow.core.planner.season.strategy import RANGES
 from igrow.core.planner.template import for_site
 from igrow.core.site import Site
+from tests.planner.toy_greenhouse import ToySimulator
 
 PLANT = GreenhouseParameters()
 START = np.datetime64("2020-01-31T23:00:00", "s")

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_plan_from_bundle import SITE, START, request
 
 from igrow.core.errors import IgrowError
 from igrow.edge.planning.make_plan import make_plan
 from igrow.edge.planning.open_meteo import MOST_MEMBERS, read_forecast
+from tests.planning.test_plan_from_bundle import SITE, START, request
 
 HOURS = 26
 

@@ -21,6 +21,7 @@ from igrow.edge.planning import GraphProcess, NotCalledError, PlanningProcess, P
 from igrow.edge.ports import PlanRequest
 
 LOG = Telemetry(np.array(["2026-03-14"], dtype="datetime64[s]"), {"air_temperature": np.array([20.0])})
+FUNCTIONS = "tests.planning.plan_functions"
 PATIENCE = 300.0
 """Seconds; only says when a test has failed, on however busy a machine."""
 
@@ -30,14 +31,13 @@ def request(seed: int = 0, log: Telemetry = LOG) -> PlanRequest:
 
 
 @pytest.fixture
-def planner(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+def planner():
     made: list[PlanningProcess] = []
 
     def make(function: str, seconds: float = PATIENCE, **limits: float) -> PlanningProcess:
         site = Site(name="demo", latitude=52.0, longitude=4.3)
         graphs = GraphProcess(ProcessLimits(**{"memory_bytes": 2**28, **limits}))  # type: ignore[arg-type]
-        process = PlanningProcess(site, graphs, seconds=seconds, planner=f"plan_functions:{function}")
+        process = PlanningProcess(site, graphs, seconds=seconds, planner=f"{FUNCTIONS}:{function}")
         made.append(process)
         return process
 
@@ -169,9 +169,9 @@ def test_a_call_under_way_when_the_daemon_stops_is_no_fault_of_what_was_called(p
     graphs = planner("hang_once")._graphs
     threading.Timer(1.0, graphs.close).start()
     with pytest.raises(NotCalledError):
-        graphs.call("plan_functions:hang_once", None, request(), seconds=PATIENCE)
+        graphs.call(f"{FUNCTIONS}:hang_once", None, request(), seconds=PATIENCE)
     with pytest.raises(NotCalledError):
-        graphs.call("plan_functions:good", None, request(), seconds=PATIENCE)
+        graphs.call(f"{FUNCTIONS}:good", None, request(), seconds=PATIENCE)
 
 
 def test_a_call_that_burns_processor_time_is_ended_by_the_kernel_though_the_daemon_sleeps(planner) -> None:
@@ -179,12 +179,12 @@ def test_a_call_that_burns_processor_time_is_ended_by_the_kernel_though_the_daem
     graphs = planner("good")._graphs
     with pytest.raises(ProcessError, match=f"signal {signal.SIGXCPU}"):
         graphs._ask = lambda call, seconds: GraphProcess._ask(graphs, (call[0], call[1], 1.0), seconds)
-        graphs.call("plan_functions:burn", seconds=PATIENCE)
+        graphs.call(f"{FUNCTIONS}:burn", seconds=PATIENCE)
 
 
 def test_the_process_is_the_first_to_go_where_the_machine_has_no_memory_left(planner) -> None:
     graphs = planner("good")._graphs
-    assert graphs.call("plan_functions:oom_score", seconds=PATIENCE) == 1000
+    assert graphs.call(f"{FUNCTIONS}:oom_score", seconds=PATIENCE) == 1000
 
 
 @pytest.mark.parametrize("when", ["in the middle of a call", "while its process starts"])
@@ -193,10 +193,10 @@ def test_the_process_ends_with_a_daemon_that_was_killed(tmp_path: Path, when: st
     script = tmp_path / "daemon.py"
     script.write_text(
         "import sys, threading, time\n"
-        f"sys.path[:0] = [{str(Path(__file__).parent)!r}, {str(Path.cwd())!r}]\n"
+        f"sys.path.insert(0, {str(Path(__file__).parents[2])!r})\n"
         "from igrow.edge.planning import GraphProcess\n"
         "graphs = GraphProcess()\n"
-        f"call = lambda: graphs.call('plan_functions:note_and_hang', {str(begun)!r}, seconds=600.0)\n"
+        f"call = lambda: graphs.call('{FUNCTIONS}:note_and_hang', {str(begun)!r}, seconds=600.0)\n"
         "threading.Thread(target=call, daemon=True).start()\n"
         "while graphs.pid is None: time.sleep(0.001)\n"
         "print(graphs.pid, flush=True)\n"

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tiny_bundle import write_tiny_bundle
 
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.site import Site
@@ -16,6 +15,7 @@ from igrow.core.telemetry import Telemetry
 from igrow.trainer.service import history, recalibration
 from igrow.trainer.service.archive import Archive
 from igrow.trainer.service.recalibration import Outcome, bundle_in_force, forget_old, recalibrate, relative_gain
+from tests.tiny_bundle import write_tiny_bundle
 
 SITE = Site(name="house", latitude=52.0, longitude=4.5)
 NOON = datetime(2020, 3, 1, 12, tzinfo=UTC)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import asyncio
 
-from bus.coded_unit import CodedUnit
-from bus.simulated_loop import run
-
 from igrow.edge.probe import Answers, decoded, probe, scan
 from igrow.edge.registers.codec import encode_raw
 from igrow.edge.registers.model import BusSettings, ByteOrder, DataType, Function, Transport
 from igrow.edge.virtual_plc.modbus_server import ModbusServer
+from tests.bus.coded_unit import CodedUnit
+from tests.bus.simulated_loop import run
 
 SETTINGS = BusSettings("probe", Transport.TCP, host="127.0.0.1", port=5020, timeout=1.0)
 

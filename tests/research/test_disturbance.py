@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from virtual_log import SITE, virtual_log
 
 from igrow.core.simulator.hybrid.nominal import nominal, site_record
 from igrow.trainer.research.forecasts.disturbance import DisturbanceModel, expected_fluxes, missing_fluxes
+from tests.virtual_log import SITE, virtual_log
 
 DAY = 288
 

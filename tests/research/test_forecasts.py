@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from virtual_log import SITE, virtual_log
 
 from igrow.core.simulator.hybrid.nominal import nominal, site_record
 from igrow.trainer.fit.evaluation import errors_of, evaluate, summarise
 from igrow.trainer.research.forecasts.combination import fit_combination
 from igrow.trainer.research.forecasts.disturbance import missing_fluxes, observed_runs
 from igrow.trainer.research.forecasts.residual_model import fit_residual_model
+from tests.virtual_log import SITE, virtual_log
 
 
 def test_the_remainder_finds_a_flux_that_follows_the_weather_and_stays_bounded() -> None:

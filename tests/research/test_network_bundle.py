@@ -10,7 +10,6 @@ import numpy as np
 import onnxruntime
 import pytest
 from numpy.typing import NDArray
-from virtual_log import SITE, virtual_log
 
 from igrow.core.bundle import Bundle, BundleError, open_session, self_test
 from igrow.core.errors import IgrowError
@@ -24,6 +23,7 @@ from igrow.trainer.research.network.checkpoint import load_simulator
 from igrow.trainer.research.network.export import CARRIED, NEXT, hourly_outputs, write_network_bundle
 from igrow.trainer.research.network.simulator import CLIMATE, GROWTH, HARVEST, daily_data, derived, hourly_data
 from igrow.trainer.training.stage import run_stage, untrained
+from tests.virtual_log import SITE, virtual_log
 
 DAYS, RUNS = 165, 3
 LENGTH = DAYS * HOURS + 1

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from virtual_log import SITE, virtual_log
 
 from igrow.core.simulator.hybrid.nominal import site_record
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.fit.actuation import setpoint_columns
 from igrow.trainer.research.forecasts.combination import Combination
 from igrow.trainer.research.forecasts.output_statistics import all_runs, corrected_runs, fit_output_statistics
+from tests.virtual_log import SITE, virtual_log
 
 DAY = 288
 

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from running_daemon import RunningDaemon, open_files, resident_bytes
 
 from igrow.edge.store import read_telemetry
+from tests.service.running_daemon import RunningDaemon, open_files, resident_bytes
 
 DAY = 86_400.0
 

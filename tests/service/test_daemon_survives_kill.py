@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from running_daemon import INTERVAL, RunningDaemon
 
 from igrow.edge.store import read_records, read_telemetry
+from tests.service.running_daemon import INTERVAL, RunningDaemon
 
 LOST_ROWS = 13
 """Rows of one batch: on a simulated plant it spans an hour of the plant's time, a row every 300 s."""

@@ -7,9 +7,9 @@ import signal
 from pathlib import Path
 
 import pytest
-from running_daemon import RunningDaemon
 
 from igrow.edge.sentences import SENTENCES, sentence
+from tests.service.running_daemon import RunningDaemon
 
 
 def test_every_line_of_the_journal_has_a_priority_and_no_line_is_a_programmers(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 from pathlib import Path
 
-from running_daemon import COMMAND, RunningDaemon
+from tests.service.running_daemon import COMMAND, RunningDaemon
 
 
 def command(plant: RunningDaemon, name: str, *arguments: object) -> tuple[int, str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from virtual_log import SITE, virtual_log
 
 from igrow.core.effects import EFFECTS
 from igrow.core.simulator.hybrid import climate
@@ -12,6 +11,7 @@ from igrow.core.simulator.hybrid import record as records
 from igrow.core.simulator.hybrid.nominal import leaf_area_curve, nominal, site_record
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.core.site import Crop, Greenhouse, Site
+from tests.virtual_log import SITE, virtual_log
 
 
 def steady_inputs(**changes: float) -> dict[str, float]:

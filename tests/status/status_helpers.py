@@ -1,4 +1,4 @@
-"""A snapshot of a greenhouse in spring, for tests and for looking at the page (`python status_helpers.py FILE`)."""
+"""A greenhouse in spring, for tests and for looking at its page (`python -m tests.status.status_helpers FILE`)."""
 
 from __future__ import annotations
 

@@ -7,11 +7,11 @@ import json
 from xml.etree import ElementTree
 
 import pytest
-from status_helpers import NOW, ZONE, history, snapshot
 
 from igrow.edge.ports import AlarmRecord
 from igrow.edge.status import StatusServer
 from igrow.edge.status.page import render_page
+from tests.status.status_helpers import NOW, ZONE, history, snapshot
 
 
 @pytest.fixture

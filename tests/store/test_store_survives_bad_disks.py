@@ -10,9 +10,11 @@ import sys
 from pathlib import Path
 
 import pytest
-from store_helpers import START, values
 
 from igrow.edge.store import SqliteStore, StoreLimits, read_telemetry
+from tests.store.store_helpers import START, values
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def fill(folder: Path, rows: int = 5000, events: int = 200) -> None:
@@ -127,8 +129,8 @@ def run_with_small_disk(tmp_path: Path, scenario: str) -> None:
         check=False,
         capture_output=True,
         text=True,
-        cwd=Path(__file__).parents[2],
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).parent)},
+        cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.endswith("ok\n")

@@ -9,9 +9,9 @@ import time
 from pathlib import Path
 
 import pytest
-from store_helpers import START
 
 from igrow.edge.store import SqliteStore
+from tests.store.store_helpers import START
 
 BATCH_ROWS = 11
 """50 s of rows every 5 s, and the row that closes the batch."""

@@ -10,11 +10,11 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
-from tiny_bundle import write_tiny_bundle
 
 from igrow.core.bundle import BundleError
 from igrow.edge.updates import Shelf, SignedSource, UpdateError
 from igrow.trainer.publishing import Lifetimes, PublishingError, create_keys, initialise, publish_in, refresh
+from tests.tiny_bundle import write_tiny_bundle
 
 
 class World:

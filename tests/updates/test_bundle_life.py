@@ -8,8 +8,6 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
-from tiny_bundle import write_tiny_bundle
-from update_helpers import START, Gateway
 
 from igrow.core.exchange import FolderPlace
 from igrow.edge.exchange import run_round
@@ -17,6 +15,8 @@ from igrow.edge.updates import UpdateRules
 from igrow.trainer.publishing import publish
 from igrow.trainer.service.archive import Archive
 from igrow.trainer.service.collecting import collect
+from tests.tiny_bundle import write_tiny_bundle
+from tests.updates.update_helpers import START, Gateway
 
 RULES = UpdateRules(check_hours=1.0, shadow_hours=30.0, watch_hours=48.0, live_error_hours=6.0)
 

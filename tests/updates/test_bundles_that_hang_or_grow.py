@@ -12,13 +12,13 @@ import time
 from pathlib import Path
 
 import pytest
-from tiny_bundle import endless_graph, greedy_graph, write_tiny_bundle
-from update_helpers import Gateway, wait_for
 
 from igrow.edge.planning import GraphProcess, ProcessLimits
 from igrow.edge.updates import UpdateRules, bundles, life
 from igrow.edge.updates.state import UpdateState, load_state, save_state
 from igrow.trainer.publishing import publish
+from tests.tiny_bundle import endless_graph, greedy_graph, write_tiny_bundle
+from tests.updates.update_helpers import Gateway, wait_for
 
 RULES = UpdateRules(check_hours=1.0, shadow_hours=30.0, watch_hours=48.0, live_error_hours=6.0)
 PATIENCE = 300.0
@@ -95,10 +95,10 @@ def test_a_bundle_that_took_the_gateway_down_is_not_tried_again_and_the_trainer_
     script = gateway.folder / "gateway.py"
     script.write_text(
         "import sys, time\n"
-        f"sys.path[:0] = {[str(Path(__file__).parent), str(Path(__file__).parents[1]), str(Path.cwd())]!r}\n"
+        f"sys.path.insert(0, {str(Path(__file__).parents[2])!r})\n"
         "from pathlib import Path\n"
-        "from update_helpers import Gateway\n"
-        "from test_bundles_that_hang_or_grow import RULES, GraphProcess\n"
+        "from tests.updates.update_helpers import Gateway\n"
+        "from tests.updates.test_bundles_that_hang_or_grow import RULES, GraphProcess\n"
         f"gateway = Gateway(Path({str(gateway.folder)!r}), RULES, graphs=GraphProcess())\n"
         "gateway.updates.tick(gateway.now)\n"
         "time.sleep(600)\n"

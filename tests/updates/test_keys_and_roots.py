@@ -7,12 +7,12 @@ import shutil
 from pathlib import Path
 
 import pytest
-from tiny_bundle import write_tiny_bundle
 
 from igrow.edge.updates import SignedSource, UpdateError
 from igrow.trainer.cli import main
 from igrow.trainer.publishing import PublishingError, create_keys, publish_in, refresh
 from igrow.trainer.publishing.keys import renew_root, replace_key, status, take_offline
+from tests.tiny_bundle import write_tiny_bundle
 
 
 class Fleet:

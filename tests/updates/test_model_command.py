@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tiny_bundle import write_tiny_bundle
 
 from igrow.edge.cli import main
 from igrow.edge.updates.state import UpdateState, save_state
+from tests.tiny_bundle import write_tiny_bundle
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import asyncio
 
 import pytest
-from bus.coded_unit import CodedUnit, code
 
 from igrow.edge.registers.model import Function
 from igrow.edge.virtual_plc.modbus_server import ModbusServer, answer, crc
+from tests.bus.coded_unit import CodedUnit, code
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bus.simulated_loop import run
 
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import SETPOINTS
@@ -20,7 +19,8 @@ from igrow.edge.registers.loading import load_register_map
 from igrow.edge.registers.model import Function
 from igrow.edge.virtual_plc.pace import Lockstep, Pace, Realtime, parse_pace
 from igrow.edge.virtual_plc.virtual_plc import SAFE_SETPOINTS, VirtualPlc
-from virtual_plc.toy_plant import ToyPlant
+from tests.bus.simulated_loop import run
+from tests.virtual_plc.toy_plant import ToyPlant
 
 MAP = load_register_map(Path(__file__).parents[2] / "config" / "register-maps" / "virtual-plc.yaml")
 START = 1577836800.0  # 2020-01-01T00:00:00Z
