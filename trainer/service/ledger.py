@@ -15,7 +15,7 @@ from igrow.core.exchange.documents import parse_object
 from igrow.core.exchange.receipt import receipt_of
 from igrow.core.whole_files import sync_folder, write_whole
 
-KEPT = 400
+KEPT = 100
 """Newest segments of a chain whose digests are remembered; what is older and comes again is merged again."""
 
 
