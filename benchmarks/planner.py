@@ -99,7 +99,7 @@ def plans(arguments: argparse.Namespace) -> None:
         note("recipe", plant, recipe, objective, time.monotonic())
         began = time.monotonic()
         count = SETTINGS.offspring * arguments.generations
-        genes = rng.random((count, template.genes), dtype=np.float32)
+        genes = template.draw(rng, count)
         best, best_score = recipe, -np.inf
         for first in range(0, count, SETTINGS.offspring):
             candidates = template.decode(genes[first : first + SETTINGS.offspring], recipe, np.full(4, np.nan))
@@ -134,7 +134,7 @@ def daily(arguments: argparse.Namespace) -> None:
     rng = np.random.default_rng(1)
     train = Scenario(np.datetime64("2020-01-24T23:00:00"), 2, 500, seed=900_001)
     template = for_site(replace(site, planning=replace(site.planning, optimise=SETPOINTS)), train.start, HOURS)
-    genes = rng.random((500, template.genes), dtype=np.float32)
+    genes = template.draw(rng, 500)
     scores = np.zeros(500)
     for month in range(3):
         scenario = replace(train, start=train.start + 30 * month * DAY)

@@ -23,7 +23,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from igrow.trainer.policies.environment import hourly_weather
 from numpy.typing import NDArray
 
 from benchmarks.planner import SITE, recipe_table
@@ -46,6 +45,7 @@ from igrow.core.planner.template import for_site
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Site, load_site
 from igrow.core.sun import unix_seconds
+from igrow.trainer.research.policies.environment import hourly_weather
 
 Values = NDArray[np.float64]
 Genes = NDArray[np.float32]

@@ -28,6 +28,7 @@ from igrow.core.agronomy import Memory
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.economics import harvest_income, local_days
 from igrow.core.planner import Objective, Outcome, PlanningState, Simulator, optimise
+from igrow.core.planner.policy import HOURS as POLICY_HOURS
 from igrow.core.planner.policy import OnnxPolicy
 from igrow.core.planner.recent_use import (
     SCALED,
@@ -36,6 +37,7 @@ from igrow.core.planner.recent_use import (
     grown_days,
     growth_of_days,
     totals,
+    warmer,
 )
 from igrow.core.planner.template import for_site
 from igrow.core.quantities import SETPOINTS
@@ -53,8 +55,8 @@ STARTS = ("2020-01-19T23:00:00", "2020-03-09T23:00:00", "2020-04-19T22:00:00")
 """Local midnights at which the weeks begin: winter, early spring, spring."""
 SETTLING = 6
 """Days under the recipe before them."""
-HORIZON = 24
-"""Hours that a strategy looks ahead."""
+HORIZON = 48
+"""Hours that a strategy looks ahead: the day that it chooses, and one beyond."""
 FIRST_SEED = 500
 """Of greenhouses and weather; policies are trained on seeds from a million on, templates on others below."""
 PARTS = ("income", "heat", "electricity", "co2", "upkeep")
@@ -80,8 +82,9 @@ class Situation:
     """What the crop has had, as its limits count it."""
 
 
-Day = tuple[dict[str, Values], dict[str, Values], tuple[float, float]]
-"""What the simulator says of a day that has passed, what it used and grew, and what drove its growth."""
+Day = tuple[dict[str, Values], dict[str, Values], tuple[float, float], tuple[float, float]]
+"""What the simulator says of a day that has passed, what it used and grew, what drove its growth, and how warm the air
+was expected to be and was, degC."""
 Strategy = Callable[[Situation], Values]
 """Returns setpoints (HORIZON, 4)."""
 
@@ -104,11 +107,6 @@ def note(column: dict[str, list[Values]], site: Site, time: np.datetime64, outco
         column.setdefault(name, []).append(getattr(worth.balance, name).mean(axis=0))
     column.setdefault("harm", []).append(worth.harm.mean(axis=0))
     column.setdefault("profit", []).append(worth.profit.mean(axis=0))
-
-
-def first_hours(outcome: Outcome, hours: int) -> Outcome:
-    """Return the beginning of an outcome."""
-    return Outcome(**{one.name: getattr(outcome, one.name)[..., :hours] for one in fields(Outcome)})
 
 
 def beside(outcomes: Sequence[Outcome]) -> Outcome:
@@ -158,13 +156,14 @@ def lead(
                 books[name].seconds += time.monotonic() - began
                 chosen.append(setpoints)
                 states.append(now)
-                expected.append(first_hours(model.simulate(now, weather, setpoints[None], begin), every))
+                expected.append(model.simulate(now, weather, setpoints[None], begin).first(every))
         outcome = houses.advance(np.stack(chosen)[:, :every])
         for row, now in enumerate(states):
-            again = first_hours(simulator.simulate(now, coming[row], chosen[row][None], begin), every)
+            again = simulator.simulate(now, coming[row], chosen[row][None], begin).first(every)
             had = {name: each[[row]] for name, each in totals(outcome).items()}
             driven = (0.0, 0.0) if simulator.growth is None else grown_days(simulator.growth, again)
-            past[row].append((totals(again), had, driven))
+            air = float(again.air_temperature.mean()), float(outcome.air_temperature[:, row].mean())
+            past[row].append((totals(again), had, driven, air))
         for place, book in enumerate(books.values()):
             part = slice(place * scenario.count, (place + 1) * scenario.count)
             mine = Outcome(**{one.name: getattr(outcome, one.name)[:, part] for one in fields(Outcome)})
@@ -187,11 +186,13 @@ def recently(simulator: BundleSimulator, site: Site, days: Iterable[Day]) -> Cor
     factor = factors(
         *({name: np.array([float(day[side][name][0]) for day in found]) for name in SCALED} for side in (0, 1))
     )
+    air = warmer(*np.array([day[3] for day in found]).reshape(-1, 2).T)
     balance = simulator.growth
     if balance is None:
-        return Corrected(simulator, factor)
+        return Corrected(simulator, factor, warmer=air)
     grown = [float(day[1]["net_growth"][0]) for day in found]
-    return Corrected(simulator, factor, balance, growth_of_days(balance, site.crop, [day[2] for day in found], grown))
+    growth = growth_of_days(balance, site.crop, [day[2] for day in found], grown)
+    return Corrected(simulator, factor, balance, growth, air)
 
 
 def _past(weather: Telemetry, now: np.datetime64) -> Telemetry:
@@ -217,7 +218,13 @@ def genetic(site: Site) -> Strategy:
 
 def policy_strategy(site: Site, policy: OnnxPolicy) -> Strategy:
     """Return the policy as a strategy."""
-    return lambda now: policy.plan(site, now.present, now.forecast, now.time)
+    day = slice(0, POLICY_HOURS)
+
+    def choose(now: Situation) -> Values:
+        chosen = policy.plan(site, now.present, now.forecast[day], now.time)
+        return np.concatenate([chosen, now.recipe[POLICY_HOURS:]])
+
+    return choose
 
 
 def best_template(site: Site, simulator: Simulator, count: int = 500) -> Strategy:
@@ -233,7 +240,7 @@ def best_template(site: Site, simulator: Simulator, count: int = 500) -> Strateg
             at = start + day * DAY
             template = for_site(site, at, HORIZON)
             if not genes.size:
-                genes = rng.random((count, template.genes), dtype=np.float32)
+                genes = template.draw(rng, count)
             candidates = template.decode(genes, recipe_table(site, at, HORIZON), np.full(4, np.nan))
             outcome = simulator.simulate({}, hourly_weather(weather, at, HORIZON), candidates, at)
             hours = at + np.arange(HORIZON) * np.timedelta64(3600, "s")

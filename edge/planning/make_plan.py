@@ -24,6 +24,7 @@ from igrow.core.planner.recent_use import (
     growth_of_days,
     totals,
     used_in,
+    warmer,
 )
 from igrow.core.planner.weather_ensemble import WeatherEnsemble
 from igrow.core.quantities import SETPOINTS
@@ -42,6 +43,9 @@ PRESENT_SECONDS = 2 * HOUR
 """A value of the log that is older says nothing about the present (slow quantities excepted)."""
 VALID_HOURS = 24
 """Longest time a plan is followed, where the site's pace of planning is not slower."""
+BEYOND = 24
+"""Hours that are searched beyond the last one that is followed. A night's dark hours count over midnight: a plan that
+ends there burns the lamps until it ends, at the price of the next morning's light, which it does not see."""
 SLOW = ("leaf_area_index", "plant_load", "net_growth", "fruit_fresh_weight")
 """Quantities whose last value counts, however old: they are counted by hand, weekly."""
 
@@ -51,8 +55,9 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
     bundle, simulator, generation = _open(request.bundle, site.greenhouse)
     start = int(request.time)
     horizon = round(len(next(iter(request.recipe.values()))) * request.step_seconds)
+    followed = min(horizon, max(VALID_HOURS * HOUR, round(site.planning.replan_every.total_seconds())))
     # The simulator knows whole days; the hours beyond the horizon are planned too, and not used.
-    hours = 24 * math.ceil(horizon / (24 * HOUR))
+    hours = 24 * math.ceil(max(horizon, followed + BEYOND * HOUR) / DAY)
     members, problem = forecast_in_time(request.forecast)
     courses = [from_forecast(one, request.telemetry, start, hours) for one in members]
     courses = courses or [persistence(request.telemetry, start, hours)]
@@ -79,6 +84,7 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
     steps = round(horizon / request.step_seconds)
     hour_of_step = [int(step * request.step_seconds) // HOUR for step in range(steps)]
     outcome = result.outcome
+    expected_profit, recipe_profit = result.profits(hour_of_step[-1] + 1)
     binding = _by_step(result.binding, hour_of_step)
     return Plan(
         created=request.time,
@@ -89,10 +95,10 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
             for column, name in enumerate(SETPOINTS)
             if name in request.recipe
         },
-        valid_until=request.time + min(horizon, max(VALID_HOURS * HOUR, site.planning.replan_every.total_seconds())),
+        valid_until=request.time + followed,
         bundle=bundle.label,
-        expected_profit=result.expected_profit,
-        recipe_profit=result.recipe_profit,
+        expected_profit=expected_profit,
+        recipe_profit=recipe_profit,
         leaves_range=result.leaves_range,
         note=_note(result, binding, corrected),
         problem=problem,
@@ -149,6 +155,7 @@ def recently(simulator: Simulator, balance: GrowthBalance | None, site: Site, lo
     log = log.with_columns({name: np.full(len(log), site.limits[name].safe) for name in lacking})
     expected: dict[str, list[float]] = {name: [] for name in SCALED}
     used: dict[str, list[float]] = {name: [] for name in SCALED}
+    warmth: list[tuple[float, float]] = []
     driven: list[tuple[float, float]] = []
     grown: list[float] = []
     for back in range(1, RECENT_DAYS + 1):
@@ -166,6 +173,8 @@ def recently(simulator: Simulator, balance: GrowthBalance | None, site: Site, lo
         for column, values in ((expected, totals(outcome)), (used, measured)):
             for name in SCALED:
                 column[name].append(float(np.mean(values[name])))
+        air = hourly(log, morning, 24, ("air_temperature",))
+        warmth.append((float(outcome.air_temperature.mean()), float(air.mean())))
         if balance is not None:
             driven.append(grown_days(balance, outcome))
             grown.append(measured["net_growth"])
@@ -174,7 +183,7 @@ def recently(simulator: Simulator, balance: GrowthBalance | None, site: Site, lo
         {name: np.array(values) for name, values in used.items()},
     )
     growth = None if balance is None else growth_of_days(balance, site.crop, driven, grown)
-    return Corrected(simulator, factor, balance, growth)
+    return Corrected(simulator, factor, balance, growth, warmer(*np.array(warmth, dtype=np.float64).reshape(-1, 2).T))
 
 
 def co2_since_planting(site: Site, log: Telemetry, start: int) -> float:

@@ -16,7 +16,7 @@ Costs are those of `igrow.core.economics`, with CO2 in tiers from what the crop 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import Protocol
 
 import numpy as np
@@ -64,6 +64,10 @@ class Outcome:
     """kg m-2 harvested."""
     outside: Values
     """How far the hour lies outside the training data, in widths of its range; 0 inside."""
+
+    def first(self, hours: int) -> Outcome:
+        """Return what happens in the first hours."""
+        return Outcome(**{one.name: getattr(self, one.name)[..., :hours] for one in fields(self)})
 
 
 class Simulator(Protocol):
@@ -120,6 +124,10 @@ class Objective:
     """kg m-2 of CO2 that the crop has had before; one value, or one for each candidate, (B,)."""
     worth: Worth | None = None
     """What the crop's growth is worth; None takes the average price of the days on which fruit now growing ripens."""
+
+    def first(self, hours: int) -> Objective:
+        """Return the value of the first hours alone."""
+        return replace(self, time=self.time[:hours])
 
     def value(self, outcome: Outcome) -> Valuation:
         """Return what the candidates are worth."""

@@ -77,6 +77,10 @@ class PlanResult:
     """The plan's balance and penalties, arrays (M, 1)."""
     recipe_valuation: Valuation
     """The recipe's."""
+    recipe_outcome: Outcome
+    """What the simulator expects of the recipe, arrays (M, 1, H)."""
+    objective: Objective
+    """By which both were valued."""
     recipe: Setpoints
     """The recipe within all limits, (H, 4)."""
     template: Template
@@ -85,6 +89,12 @@ class PlanResult:
     """Candidates simulated."""
     binding: tuple[Mapping[str, tuple[str, ...]], ...]
     """By hour and setpoint: the crop's limits that kept it from what the search asked for."""
+
+    def profits(self, hours: int) -> tuple[float, float]:
+        """Return what plan and recipe are expected to earn in the first hours, EUR m-2, mean over the ensemble."""
+        objective = self.objective.first(hours)
+        plan, recipe = (objective.value(one.first(hours)).profit.mean() for one in (self.outcome, self.recipe_outcome))
+        return float(plan), float(recipe)
 
 
 def optimise(
@@ -189,6 +199,8 @@ def optimise(
         outcome=outcome,
         valuation=valuation,
         recipe_valuation=recipe_valuation,
+        recipe_outcome=recipe_outcome,
+        objective=objective,
         recipe=followed,
         template=template,
         evaluations=evaluations + 1,
@@ -203,5 +215,5 @@ def _first_candidates(
     known = np.stack([template.encode(start) for start in starts])[:count]
     near = known[rng.integers(len(known), size=max(0, count // 2 - len(known)))]
     near = np.clip(near + 0.2 * rng.standard_normal(near.shape), 0.0, 1.0)
-    free = rng.random((count - len(known) - len(near), template.genes))
+    free = template.draw(rng, count - len(known) - len(near))
     return np.concatenate([known, near, free]).astype(np.float32)

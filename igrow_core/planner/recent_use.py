@@ -4,7 +4,8 @@ No simulator is right on average at every site and in every week, and a search p
 (the winner's curse). Run again over the days that have just passed, from what was measured, under their weather and
 the setpoints that were in force, it shows by how much it errs on what plans did; the next plan is expected to err as
 much (model output statistics; Glahn and Lowry (1972), J. Appl. Meteor. 11, 1203-1211). Resources are corrected by a
-factor each, growth by its conversion and its maintenance (`igrow.core.simulator.growth`).
+factor each, the air's temperature by a difference, growth by its conversion and its maintenance
+(`igrow.core.simulator.growth`).
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ _STEADY_DAYS = 1.0
 """Days of "no error" that count beside those that have passed, so that one odd day does not decide."""
 _LARGEST = 2.0
 """Largest factor, and the inverse of the smallest: beyond it the simulator is wrong, and no factor mends it."""
+_WARMEST = 1.0
+"""Largest difference of the air's temperature, K: what a cold day costs doubles within it."""
 
 
 def factors(expected: Mapping[str, Values], used: Mapping[str, Values]) -> dict[str, float]:
@@ -47,6 +50,16 @@ def factors(expected: Mapping[str, Values], used: Mapping[str, Values]) -> dict[
         above = steady + float(used[name][known].sum())
         result[name] = float(np.clip(above / below, 1.0 / _LARGEST, _LARGEST)) if below > 0.0 < above else 1.0
     return result
+
+
+def warmer(expected: Values, measured: Values) -> float:
+    """Return by how much the air was warmer than expected, K, by means of days (days,), drawn towards nothing.
+
+    The PLC's control leaves an offset that is alike from day to day, and what a cold day costs hangs on tenths of it.
+    """
+    known = np.isfinite(expected) & np.isfinite(measured)
+    difference = float((measured - expected)[known].sum()) / (_STEADY_DAYS + known.sum())
+    return float(np.clip(difference, -_WARMEST, _WARMEST))
 
 
 def totals(outcome: Outcome) -> dict[str, Values]:
@@ -114,7 +127,7 @@ def used_in(log: Telemetry, greenhouse: Greenhouse) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class Corrected:
-    """A simulator whose resources are multiplied by `factor` and whose crop grows as counted."""
+    """A simulator whose resources are multiplied by `factor`, whose air is warmer and whose crop grows as counted."""
 
     simulator: Simulator
     factor: Mapping[str, float]
@@ -123,11 +136,14 @@ class Corrected:
     """What the simulator's growth was computed with; None leaves growth as it is."""
     growth: GrowthFit | None = None
     """What it is to be computed with; its doubt is spread over the ensemble."""
+    warmer: float = 0.0
+    """K by which the air is warmer; growth was counted at the simulator's own temperatures, and stays there."""
 
     def simulate(self, initial: dict[str, float], weather: Values, setpoints: Values, start: np.datetime64) -> Outcome:
         """Return what candidates do; see `objective.Simulator`."""
         outcome = self.simulator.simulate(initial, weather, setpoints, start)
         changes = {name: self.factor[name] * getattr(outcome, name) for name in SCALED}
+        changes["air_temperature"] = outcome.air_temperature + self.warmer
         if self.balance is not None and self.growth is not None:
             changes["net_growth"] = regrown(outcome, self.balance, self.growth)
         return replace(outcome, **changes)

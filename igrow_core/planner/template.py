@@ -2,7 +2,8 @@
 
 Cao et al. (2022) search four actions for each of 3984 hours, 15,936 numbers. Growers think in periods of the day,
 and so does the sun; a plan of two days in eight blocks has 16 genes a setpoint and is searched in seconds. The
-blocks begin and end where the electricity tariff changes too.
+blocks begin and end where the electricity tariff changes too. Lamps have a gene for each hour: when a night's dark
+hours end is a matter of the sunset, which no block knows.
 
 What a gene stands for passes the limits of setpoints and crop (`igrow.core.agronomy`) hour by hour, so that no
 candidate leaves them.
@@ -10,7 +11,7 @@ candidate leaves them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +29,8 @@ Setpoints = NDArray[np.float64]
 
 BLOCK_STARTS = (0, 4, 7, 10, 13, 16, 19, 23)
 """Local hours at which a block begins."""
+BY_HOUR = ("lamp_on",)
+"""Setpoints of which each hour is a block."""
 STEPS = {"heating_setpoint": 0.5, "co2_setpoint": 25.0, "lamp_on": 1.0, "irrigation_on": 0.05}
 """Setpoints are whole multiples of these: finer ones would not show in the greenhouse."""
 
@@ -54,8 +57,8 @@ class Template:
 
     free: tuple[str, ...]
     """Setpoints that the genes choose; the others follow the recipe."""
-    block: NDArray[np.int64]
-    """Block of each hour of the horizon, 0 and up, shape (H,)."""
+    block: Mapping[str, NDArray[np.int64]]
+    """By free setpoint: the block of each hour of the horizon, 0 and up, shape (H,)."""
     low: NDArray[np.float64]
     """Smallest allowed value of each setpoint, shape (4,)."""
     high: NDArray[np.float64]
@@ -70,14 +73,17 @@ class Template:
     """Of the sun above the crop, mol m-2 in each hour, shape (H,)."""
 
     @property
-    def blocks(self) -> int:
-        """Number of blocks."""
-        return int(self.block.max()) + 1
-
-    @property
     def genes(self) -> int:
-        """Number of genes: blocks for each free setpoint, one setpoint after the other."""
-        return len(self.free) * self.blocks
+        """Number of genes: blocks of each free setpoint, one setpoint after the other."""
+        return sum(self._count(name) for name in self.free)
+
+    def place_of(self, setpoint: str) -> slice:
+        """Return where the genes of a free setpoint stand."""
+        first = sum(self._count(name) for name in self.free[: self.free.index(setpoint)])
+        return slice(first, first + self._count(setpoint))
+
+    def _count(self, name: str) -> int:
+        return int(self.block[name].max()) + 1
 
     def decode(
         self,
@@ -92,23 +98,36 @@ class Template:
         """
         return self.limit(self.wanted(genes, recipe), applied, memory)
 
+    def draw(self, rng: np.random.Generator, count: int) -> NDArray[np.float32]:
+        """Return random candidates, (count, G).
+
+        Setpoints of hours burn from one hour on for some hours, each day alike: drawn one by one hours never would.
+        """
+        genes = rng.random((count, self.genes), dtype=np.float32)
+        for name in (name for name in self.free if name in BY_HOUR):
+            _, first = np.unique(self.block[name], return_index=True)
+            clock = np.array([self.moments[hour].clock for hour in first])
+            since = (clock - rng.integers(24, size=(count, 1))) % 24.0
+            genes[:, self.place_of(name)] = since < rng.integers(25, size=(count, 1))
+        return genes
+
     def wanted(self, genes: NDArray[np.float32], recipe: Setpoints) -> Setpoints:
         """Return what candidates (B, G) ask for, (B, H, 4), before any limit."""
         setpoints = np.repeat(recipe[None], len(genes), axis=0)
-        for position, name in enumerate(self.free):
+        for name in self.free:
             column = SETPOINTS.index(name)
-            part = genes[:, position * self.blocks : (position + 1) * self.blocks].astype(np.float64)
+            part = genes[:, self.place_of(name)].astype(np.float64)
             values = self.low[column] + part * (self.high[column] - self.low[column])
-            setpoints[:, :, column] = (np.round(values / STEPS[name]) * STEPS[name])[:, self.block]
+            setpoints[:, :, column] = (np.round(values / STEPS[name]) * STEPS[name])[:, self.block[name]]
         return setpoints
 
     def encode(self, setpoints: Setpoints) -> NDArray[np.float32]:
         """Return the genes (G,) nearest to setpoints (H, 4): the mean over each block."""
-        counts = np.bincount(self.block, minlength=self.blocks)
         parts = []
         for name in self.free:
             column = SETPOINTS.index(name)
-            mean = np.bincount(self.block, setpoints[:, column], minlength=self.blocks) / counts
+            block = self.block[name]
+            mean = np.bincount(block, setpoints[:, column]) / np.bincount(block)
             span = max(self.high[column] - self.low[column], 1e-9)
             parts.append(np.clip((mean - self.low[column]) / span, 0.0, 1.0))
         return np.concatenate(parts).astype(np.float32)
@@ -154,7 +173,7 @@ def for_site(
     starts: Sequence[int] = BLOCK_STARTS,
     radiation: NDArray[np.float64] | None = None,
 ) -> Template:
-    """Return the template of a horizon of `hours` from `start` (UTC), in blocks of the site's local day.
+    """Return the template of a horizon of `hours` from `start` (UTC), in blocks or hours of the site's local day.
 
     Consecutive local days share one pattern of blocks for `days_per_pattern` days: 1 lets each day differ, a large
     number repeats one day over a whole season. `radiation` (H,) is the global radiation to be expected, W m-2; without
@@ -167,12 +186,14 @@ def for_site(
     hour = local.astype("datetime64[h]").astype(np.int64) % 24
     # Hours before the first block's start belong to the last block, which then runs over midnight.
     period = (np.searchsorted(np.array(starts), hour, side="right") - 1) % len(starts)
-    _, block = np.unique(pattern * len(starts) + period, return_inverse=True)
+    free = tuple(name for name in SETPOINTS if name in site.setpoints and name in site.planning.optimise)
+    _, by_period = np.unique(pattern * len(starts) + period, return_inverse=True)
+    _, by_hour = np.unique(pattern * 24 + hour, return_inverse=True)
     limits = [site.limits[name] for name in SETPOINTS]
     place = Place.of(site)
     return Template(
-        free=tuple(name for name in SETPOINTS if name in site.setpoints and name in site.planning.optimise),
-        block=block.astype(np.int64),
+        free=free,
+        block={name: (by_hour if name in BY_HOUR else by_period).astype(np.int64) for name in free},
         low=np.array([limit.low for limit in limits]),
         high=np.array([limit.high for limit in limits]),
         slew=np.array([np.inf if limit.slew is None else limit.slew for limit in limits]),

@@ -16,6 +16,7 @@ from igrow.core.planner.recent_use import (
     growth_of_days,
     totals,
     used_in,
+    warmer,
 )
 from igrow.core.simulator.growth import GrowthBalance
 from igrow.core.site import Crop, Greenhouse
@@ -44,6 +45,22 @@ def test_more_days_that_agree_bring_the_factor_nearer_to_what_they_show() -> Non
 def test_no_factor_is_beyond_belief() -> None:
     assert factors(days(0.01, 0.01), days(9.0, 9.0))["co2"] == 2.0
     assert factors(days(9.0, 9.0), days(0.01, 0.01))["co2"] == 0.5
+
+
+def test_air_that_was_warmer_on_all_days_is_expected_to_be_so_again(weather) -> None:
+    """A plan that the simulator takes for warm enough may be too cold for the crop in this greenhouse."""
+    expected = np.array([18.0, 18.5, 19.0])
+    assert -0.4 < warmer(expected, expected - 0.4) < -0.2
+    assert warmer(expected, expected + np.array([0.3, -0.3, np.nan])) == pytest.approx(0.0)
+    assert warmer(np.zeros(0), np.zeros(0)) == 0.0
+    assert warmer(expected, expected + 20.0) == 1.0
+    setpoints = np.tile([20.0, 600.0, 1.0, 0.5], (1, 24, 1))
+    plain = ToySimulator().simulate({}, weather[:24], setpoints, START)
+    colder = Corrected(ToySimulator(), dict.fromkeys(SCALED, 1.0), warmer=-0.3).simulate(
+        {}, weather[:24], setpoints, START
+    )
+    np.testing.assert_allclose(colder.air_temperature, plain.air_temperature - 0.3)
+    np.testing.assert_array_equal(colder.net_growth, plain.net_growth)
 
 
 def test_amounts_are_scaled_and_the_climate_is_not(weather) -> None:

@@ -17,13 +17,24 @@ UNKNOWN = np.full(4, np.nan)
 
 def test_a_block_holds_from_its_local_hour_to_the_next() -> None:
     template = for_site(SITE, MIDNIGHT, 48)
-    assert template.genes == 3 * 2 * len(BLOCK_STARTS)
-    changes = np.flatnonzero(np.diff(template.block)) + 1
-    assert changes.tolist() == [4, 7, 10, 13, 16, 19, 23, 24, 28, 31, 34, 37, 40, 43, 47]
+    assert template.genes == 2 * 2 * len(BLOCK_STARTS) + 48
+    for name in ("heating_setpoint", "co2_setpoint"):
+        changes = np.flatnonzero(np.diff(template.block[name])) + 1
+        assert changes.tolist() == [4, 7, 10, 13, 16, 19, 23, 24, 28, 31, 34, 37, 40, 43, 47]
+    assert template.block["lamp_on"].tolist() == list(range(48)), "the night's dark hours end at any hour"
 
 
 def test_a_season_of_one_repeated_day_has_the_genes_of_one_day() -> None:
-    assert for_site(SITE, MIDNIGHT, 24 * 100, days_per_pattern=1000).genes == 3 * len(BLOCK_STARTS)
+    assert for_site(SITE, MIDNIGHT, 24 * 100, days_per_pattern=1000).genes == 2 * len(BLOCK_STARTS) + 24
+
+
+def test_lamps_are_drawn_in_stretches() -> None:
+    """Of hours drawn one by one half would burn, and none of a hundred candidates twelve in a row."""
+    template = for_site(SITE, MIDNIGHT, 48)
+    lamps = template.draw(np.random.default_rng(0), 100)[:, template.place_of("lamp_on")]
+    assert (np.abs(np.diff(lamps, axis=1)).sum(axis=1) <= 5).all()
+    assert {0.0, 48.0} < set(lamps.sum(axis=1).tolist())
+    np.testing.assert_array_equal(lamps[:, :24], lamps[:, 24:])
 
 
 @settings(deadline=None)

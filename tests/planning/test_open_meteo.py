@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from igrow.core.errors import IgrowError
+from igrow.core.planner import Budget
 from igrow.edge.planning.make_plan import make_plan
 from igrow.edge.planning.open_meteo import MOST_MEMBERS, read_forecast
 from tests.planning.test_plan_from_bundle import SITE, START, request
@@ -89,6 +90,7 @@ def test_an_unknown_unit_is_refused(tmp_path: Path) -> None:
 def test_a_plan_holds_against_the_spread_of_an_ensemble(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Members that differ add to the doubt that caution takes off."""
     monkeypatch.setattr("igrow.edge.planning.make_plan.forecast_in_time", lambda members: (members, ""))
+    monkeypatch.setattr("igrow.edge.planning.make_plan.Budget", lambda: Budget(generations=4))
     path = write(tmp_path, content("", "_member01", "_member02", unix=True))
     members = read_forecast(path)
     wild = tuple(

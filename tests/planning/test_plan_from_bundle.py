@@ -7,13 +7,14 @@ import os
 import pickle
 from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 from zoneinfo import ZoneInfo
 
 import numpy as np
 import pytest
 
 from igrow.core.bundle import default_bundle_folder
-from igrow.core.planner import Outcome
+from igrow.core.planner import Budget, Outcome, PlanResult, optimise
 from igrow.core.quantities import SETPOINTS
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
@@ -65,6 +66,24 @@ def test_a_plan_without_its_forecast_stays_within_the_limits_and_is_worth_no_les
     assert plan.valid_until == START + 86400
     assert len(plan.predicted["air_temperature"]) == 24
     assert all(5.0 < value < 45.0 for value in plan.predicted["air_temperature"])
+
+
+def test_a_plan_of_one_day_is_searched_with_the_day_after_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Dark hours count over midnight: lamps that burn until then take the next morning's cheap light, unseen."""
+    results: list[PlanResult] = []
+
+    def search(*arguments: Any, **options: Any) -> PlanResult:
+        results.append(optimise(*arguments, **options))
+        return results[-1]
+
+    monkeypatch.setattr("igrow.edge.planning.make_plan.optimise", search)
+    monkeypatch.setattr("igrow.edge.planning.make_plan.Budget", lambda: Budget(generations=4))
+    plan = make_plan(SITE, request())
+    (found,) = results
+    assert len(found.setpoints) == 48
+    assert len(plan.setpoints["lamp_on"]) == 24
+    assert (plan.expected_profit, plan.recipe_profit) == found.profits(24)
+    assert found.profits(48) == pytest.approx((found.expected_profit, found.recipe_profit))
 
 
 def test_slow_quantities_count_however_old_and_fast_ones_do_not() -> None:
