@@ -119,12 +119,15 @@ class Demo:
 
     def wait_for_day(self, day: int, what: str) -> None:
         """Show the plant's days pass until so many have been handed over."""
-        while self.plant_days < day:
+        shown = -1
+        while (passed := self.plant_days) < day:
             for name in ("virtual-plc", "daemon"):
                 if self.running[name].poll() is not None:
                     self.finish(name, self.running[name])
                     raise DemoError(f"{name} ended by itself; see {self.out / name}.log")
-            self.say(f"{what}: plant day {self.plant_days} of {day}", end="")
+            if passed != shown:
+                self.say(f"{what}: plant day {passed} of {day}", end="")
+                shown = passed
             time.sleep(0.5)
         self.say(f"{what}: {day} plant days")
 
