@@ -70,7 +70,9 @@ def neighbours(greenhouse: VirtualGreenhouse, count: int) -> list[VirtualGreenho
     for number in range(count):
         seed = greenhouse.seed + 1000 * (1 + number)
         plant = usual.varied(np.random.default_rng(seed), OTHERS_SPREAD)
-        found.append(VirtualGreenhouse(site_of(f"{greenhouse.site.name}-{number}", plant), plant, greenhouse.start, seed))
+        found.append(
+            VirtualGreenhouse(site_of(f"{greenhouse.site.name}-{number}", plant), plant, greenhouse.start, seed)
+        )
     return found
 
 
