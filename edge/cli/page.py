@@ -10,7 +10,7 @@ import os
 import signal
 
 from igrow.edge.cli.common import add_configuration
-from igrow.edge.cli.run import set_up_logging
+from igrow.edge.cli.log_lines import set_up_logging
 from igrow.edge.page.pages import Pages
 from igrow.edge.page.server import PageServer
 
