@@ -82,6 +82,27 @@ RESULTS = {
         "9500 and on",
         long=True,
     ),
+    "season-tuning": Result(
+        "A season's rule and strategy, tuned",
+        ("benchmarks.seasons", "tune"),
+        "In the built-in bundle's simulator, 150 days from a mature crop, both with as many simulated seasons.",
+        "1, 2; weather 9001 to 9003",
+        long=True,
+    ),
+    "seasons": Result(
+        "Whole seasons in greenhouses that no simulator was fitted to",
+        ("benchmarks.seasons", "judge"),
+        "150 days, through the PLC's own control; what was ripe and picked, less costs; six dark hours for all.",
+        "greenhouses and weather 700; random strategies 5",
+        long=True,
+    ),
+    "limits": Result(
+        "Whether a plan leaves a limit of the crop",
+        ("benchmarks.limits", "--cases", "1000"),
+        "Random sites, crops, weather and recipes; each plan inspected by code apart from what keeps the limits.",
+        "0 and on",
+        long=True,
+    ),
     "diagnosis-real": Result(
         "Real logs",
         ("benchmarks.diagnosis", "real", "../shared/data"),

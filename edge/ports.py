@@ -153,7 +153,9 @@ class Plan:
     binding: Mapping[str, tuple[tuple[str, ...], ...]] = field(default_factory=dict)
     """By setpoint and step: the crop's limits that kept it from what the search asked for, (steps,)."""
     explanation: Explanation | None = None
-    """What the plan is expected to bring over its horizon, and what each change is for."""
+    """What the plan is expected to bring over all that was searched, and what each change is for."""
+    season: tuple[str, ...] = ()
+    """What the season says of the plan's day, in sentences; empty where the bundle carries none."""
 
 
 class PlanningService(Protocol):
@@ -212,10 +214,6 @@ class UpdateService(Protocol):
     @property
     def health(self) -> str:
         """Empty when all is well, else one line."""
-
-    @property
-    def worsening(self) -> str:
-        """Empty, or one line that says since when the bundle in force predicts worse than it did."""
 
     @property
     def busy(self) -> bool:

@@ -92,6 +92,9 @@ def table(plan: Plan, zone: ZoneInfo) -> Iterator[str]:
 def reasons(plan: Plan, zone: ZoneInfo) -> Iterator[str]:
     """Yield what the plan is expected to bring, what each change is for and which limits bind."""
     explained = plan.explanation
+    if plan.season:
+        yield ""
+        yield from plan.season
     if explained is not None:
         yield ""
         yield f"{'EUR m-2':12s}" + "".join(f"{WORDS.get(name, name):>12s}" for name in explained.plan)

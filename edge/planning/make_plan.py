@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +19,6 @@ from igrow.core.planner.onnx_generation import OnnxGeneration
 from igrow.core.planner.recent_use import (
     SCALED,
     Corrected,
-    co2_since_planting,
     factors,
     grown_days,
     growth_of_days,
@@ -27,6 +26,7 @@ from igrow.core.planner.recent_use import (
     used_in,
     warmer,
 )
+from igrow.core.planner.season import CropWorth, SeasonPlan
 from igrow.core.planner.weather_ensemble import WeatherEnsemble
 from igrow.core.quantities import SETPOINTS
 from igrow.core.simulator.growth import GrowthBalance
@@ -53,7 +53,7 @@ SLOW = ("leaf_area_index", "plant_load", "net_growth", "fruit_fresh_weight")
 
 def make_plan(site: Site, request: PlanRequest) -> Plan:
     """Search for the setpoints over the request's horizon; raises IgrowError where something is missing."""
-    bundle, simulator, generation = _open(request.bundle, site.greenhouse)
+    bundle, simulator, generation, season = _open(request.bundle, site.greenhouse)
     start = int(request.time)
     horizon = round(len(next(iter(request.recipe.values()))) * request.step_seconds)
     followed = min(horizon, max(VALID_HOURS * HOUR, round(site.planning.replan_every.total_seconds())))
@@ -72,6 +72,7 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
     )
     corrected = recently(simulator, simulator.growth, site, request.telemetry, start)
     expected = corrected if len(courses) == 1 else WeatherEnsemble(corrected, courses)
+    worth = None if season is None else season.worth(site, state.time, state.initial, warmth(request.telemetry, start))
     result = optimise(
         expected,
         site,
@@ -81,6 +82,7 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
         np.random.default_rng(request.seed),
         Budget(),
         generation=generation,
+        worth=worth,
     )
     steps = round(horizon / request.step_seconds)
     hour_of_step = [int(step * request.step_seconds) // HOUR for step in range(steps)]
@@ -112,7 +114,8 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
             )
         },
         binding=binding,
-        explanation=explain(expected, site, state, forecast, result),
+        explanation=explain(expected, state, forecast, result),
+        season=() if season is None or worth is None else tuple(told(season, worth, state.time)),
     )
 
 
@@ -125,6 +128,29 @@ def _note(result: PlanResult, binding: Mapping[str, Sequence[Sequence[str]]], co
         "" if corrected.growth is None or corrected.growth.told else corrected.growth.sentence,
     ]
     return "; ".join(filter(None, notes))
+
+
+def told(season: SeasonPlan, worth: CropWorth, time: np.datetime64) -> Iterator[str]:
+    """Yield what the season says of a day: its strategy, and what the crop is worth."""
+    fresh = worth.plant.fruit_dry_matter
+    oldest, youngest = worth.values.fruit[-1] * fresh, worth.values.fruit[0] * fresh
+    yield (
+        f"day {season.day_of(time):.0f} of {season.days} of the season, which is expected to bring "
+        f"{season.net_profit:.2f} EUR m-2"
+    )
+    numbers = ", ".join(f"{name.replace('_', ' ')} {value:.3g}" for name, value in season.numbers(time).items())
+    yield f"its strategy for this day: {numbers}"
+    yield (
+        f"growth is worth what it brings until the season's end: {oldest:.2f} EUR for a kg of fruit that is nearly "
+        f"ripe, {youngest:.2f} for one that has just set, {worth.values.leaf:.2f} for a kg of leaves (dry), "
+        f"{worth.values.buffer:.2f} for one of assimilates that nothing has used yet"
+    )
+
+
+def warmth(log: Telemetry, start: int) -> float:
+    """Return the mean air temperature of the day before `start`, degC; NaN where the log does not tell it."""
+    hours = hourly(log, start - DAY, 24, ("air_temperature",))
+    return float(np.nanmean(hours)) if np.isfinite(hours).sum() > 12 else float("nan")
 
 
 def _by_step(
@@ -187,6 +213,17 @@ def recently(simulator: Simulator, balance: GrowthBalance | None, site: Site, lo
     return Corrected(simulator, factor, balance, growth, warmer(*np.array(warmth, dtype=np.float64).reshape(-1, 2).T))
 
 
+def co2_since_planting(site: Site, log: Telemetry, start: int) -> float:
+    """Return how much CO2 the crop has probably had, kg m-2, which decides on the price of the next kilogram.
+
+    The log reaches back some days only; the days before it since planting count as those that it holds.
+    """
+    dosing = log.columns.get("co2_dosing", np.empty(0))
+    known = dosing[np.isfinite(dosing)]
+    days = (np.datetime64(start, "s") - np.datetime64(site.crop.planting_date)) / np.timedelta64(1, "D")
+    return float(known.mean() * 24.0 * max(days, 0.0)) if len(known) else 0.0
+
+
 def hourly_recipe(site: Site, request: PlanRequest, hours: int) -> NDArray[np.float64]:
     """Return the recipe (hours, 4) in the order of `SETPOINTS`; a setpoint that the site lacks stands at safe."""
     table = np.empty((hours, len(SETPOINTS)))
@@ -210,7 +247,8 @@ def _covered(course: tuple[float, ...], request: PlanRequest, hours: int) -> int
 
 
 @functools.lru_cache(maxsize=1)
-def _open(folder: Path, greenhouse: Greenhouse) -> tuple[Bundle, BundleSimulator, OnnxGeneration]:
+def _open(folder: Path, greenhouse: Greenhouse) -> tuple[Bundle, BundleSimulator, OnnxGeneration, SeasonPlan | None]:
     """Open the bundle in force once; a request with another bundle closes it."""
     bundle = read_bundle(folder)
-    return bundle, BundleSimulator(bundle, greenhouse), OnnxGeneration(bundle.graph("optimizer"))
+    graphs = BundleSimulator(bundle, greenhouse), OnnxGeneration(bundle.graph("optimizer"))
+    return bundle, *graphs, SeasonPlan.of(bundle)

@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from igrow.core.economics import Balance
-from igrow.core.planner.objective import Objective, Simulator
+from igrow.core.planner.objective import Simulator
 from igrow.core.planner.optimise import PlanningState, PlanResult
 from igrow.core.planner.template import Setpoints, Template
 from igrow.core.quantities import QUANTITIES, SETPOINTS
-from igrow.core.site import Site
 
 Values = NDArray[np.float64]
 
@@ -88,7 +87,6 @@ class Explanation:
 
 def explain(
     simulator: Simulator,
-    site: Site,
     state: PlanningState,
     forecast: Values,
     result: PlanResult,
@@ -99,7 +97,7 @@ def explain(
     whole.
     """
     recipe, template = result.recipe, result.template
-    objective = Objective(site, result.time, state.co2_before)
+    objective = result.objective
     applied = np.array([state.applied.get(name, np.nan) for name in SETPOINTS])
     stretches = list(_stretches(template, result.setpoints, recipe))
     back = np.repeat(result.setpoints[None], len(stretches) + 1, axis=0)

@@ -175,7 +175,11 @@ def test_what_is_known_before_narrows_what_is_known_after(model: FittedModel, sh
     log = prepare_log(short, SITE)
     alone, after = calibrate(log), calibrate(log, prior_model=model)
     assert np.mean(after.posterior.standard_deviation / alone.posterior.standard_deviation) < 0.9
-    assert after.crop is model.crop
+    assert after.crop is not None
+    assert model.crop is not None
+    assert (after.crop.growth, after.crop.harvest) == (model.crop.growth, model.crop.harvest)
+    assert (after.crop.conversion, after.crop.maintenance) == (model.crop.conversion, model.crop.maintenance)
+    assert any("counts no growth" in note for note in after.notes)
 
 
 @pytest.mark.usefixtures("quick")

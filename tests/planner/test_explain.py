@@ -19,7 +19,7 @@ QUICK = Budget(generations=25, patience=25)
 def planned(site, state, weather, recipe):
     simulator = ToySimulator(members=(0.8, 1.0, 1.2))
     result = optimise(simulator, site, state, weather, recipe, np.random.default_rng(2), QUICK)
-    return simulator, result, explain(simulator, site, state, weather, result)
+    return simulator, result, explain(simulator, state, weather, result)
 
 
 def test_the_balance_is_that_of_plan_and_recipe(planned) -> None:
@@ -48,7 +48,7 @@ def test_each_change_is_told_with_what_it_earns_and_costs(planned) -> None:
 def test_a_plan_that_is_the_recipe_has_no_changes(site, state, weather, planned) -> None:
     simulator, result, _ = planned
     same = replace(result, setpoints=result.recipe, valuation=result.recipe_valuation)
-    told = explain(simulator, site, state, weather, same)
+    told = explain(simulator, state, weather, same)
     assert told.changes == ()
     assert told.gain.mean == 0.0
 

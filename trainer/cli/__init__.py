@@ -15,6 +15,7 @@ COMMANDS = {
     "collect": ("igrow.trainer.cli.collect", "bring what gateways left in the exchange into the archive"),
     "recalibrate": ("igrow.trainer.cli.recalibrate", "diagnose every site of an exchange and publish what passed"),
     "export": ("igrow.trainer.cli.export", "write a bundle from a fitted simulator"),
+    "season": ("igrow.trainer.cli.season", "plan a whole season; write the bundle that carries what the crop is worth"),
     "policy": ("igrow.trainer.research.policies.train", "train a policy by soft actor-critic"),
     "publish": ("igrow.trainer.cli.publish", "sign a bundle and put it into the exchange"),
     "reproduce": ("igrow.trainer.research.paper.command", "reproduce the tables and figures of the iGrow paper"),

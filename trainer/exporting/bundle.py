@@ -22,8 +22,8 @@ from igrow.core.bundle import (
 )
 from igrow.core.effects import EFFECTS
 from igrow.core.planner.evolution import EvolutionSettings
+from igrow.core.planner.season import SEASON_FILE, SeasonPlan
 from igrow.core.simulator import actuation, holding
-from igrow.core.simulator.crop import CropStages
 from igrow.core.simulator.hybrid.nominal import as_described
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.core.site import Site
@@ -37,10 +37,10 @@ from igrow.trainer.exporting.signatures import signatures
 from igrow.trainer.fit.climate import bounds, site_prior
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
+from igrow.trainer.fit.growth import CROP_FILE, crop_of
 from igrow.trainer.fit.model import FittedModel
-from igrow.trainer.training.stage_file import stages_from_bytes, stages_to_bytes
+from igrow.trainer.training.stage_file import stages_to_bytes
 
-CROP_FILE = "crop.npz"
 DISCREPANCY_FILE = "discrepancy.npz"
 MEMBERS = 3
 """Draws from the posterior that a bundle carries beside the mean, for cautious plans."""
@@ -61,7 +61,7 @@ def export(model: FittedModel, folder: Path | str, *, created: datetime | None =
         BundleError: the bundle cannot be written.
     """
     created = created or datetime.now(UTC)
-    crop = model.crop or _crop_of(read_bundle(default_bundle_folder()))
+    crop = model.crop or crop_of(read_bundle(default_bundle_folder()))
     random = np.random.default_rng(seed)
     blocks = climate_blocks([effect.name for effect in model.effects])
     planning = plan_blocks(blocks, crop, model.training_range)
@@ -118,6 +118,8 @@ def export(model: FittedModel, folder: Path | str, *, created: datetime | None =
     )
     files = {f"{name}.onnx": graph.SerializeToString() for name, graph in graphs.items()}
     files[CROP_FILE] = stages_to_bytes({"growth": crop.growth, "harvest": crop.harvest})
+    if model.season is not None:
+        files[SEASON_FILE] = model.season.to_json().encode()
     if model.history is not None:
         files[DISCREPANCY_FILE] = model.history.to_bytes()
     return write_bundle(Path(folder), manifest, files, golden)
@@ -144,7 +146,8 @@ def read_model(bundle: Bundle | Path | str, site: Site) -> FittedModel:
         effects=manifest.effects,
         actuation={name: float(given.get(f"actuation:{name}", rule.value)) for name, rule in actuation.RULES.items()},
         holding={name: float(given.get(f"holding:{name}", one.value)) for name, one in holding.PARAMETERS.items()},
-        crop=_crop_of(bundle),
+        crop=crop_of(bundle),
+        season=SeasonPlan.of(bundle) if manifest.site == site.name else None,
         training_span=manifest.training_span,
         training_range=manifest.training_range,
         errors=manifest.errors,
@@ -179,21 +182,6 @@ def _history_of(bundle: Bundle) -> Discrepancy | None:
         return Discrepancy.from_bytes(path.read_bytes(), where=str(path))
     except OSError as error:
         raise BundleError(f"{path}: not readable: {error.strerror}") from None
-
-
-def _crop_of(bundle: Bundle) -> CropStages:
-    """Return the growth and yield stages that a bundle carries."""
-    path = bundle.folder / CROP_FILE
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise BundleError(f"{path}: not readable: {error.strerror}") from None
-    stages, _ = stages_from_bytes(content, where=str(path))
-    settings = bundle.manifest.simulator
-    growth = float(settings.get("conversion", 0.0)), float(settings.get("maintenance", 0.0))
-    covariance = settings.get("growth_covariance")
-    known = None if covariance is None else np.array(covariance, dtype=np.float64)
-    return CropStages(stages["growth"], stages["harvest"], *growth, known)
 
 
 def _parameter_values(model: FittedModel, reference: datetime) -> dict[str, float]:

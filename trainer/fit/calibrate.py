@@ -2,6 +2,7 @@
 
     log --> alignment --> record on the working grid --> parameters --> discrepancy
                                                     \\-> rules of the PLC, and how it holds heat and CO2
+                                                    \\-> growth, where the log counts any
 
 The parameters are fitted to all of the log; how well they predict is told by a second fit that leaves every fourth week
 out, on these weeks.
@@ -14,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from igrow.core.bundle import HeldOutError, Span
+from igrow.core.bundle import HeldOutError, Span, default_bundle_folder, read_bundle
 from igrow.core.errors import IgrowError
 from igrow.core.local_time import utc_datetime
 from igrow.core.quantities import QUANTITIES
@@ -26,6 +27,7 @@ from igrow.trainer.fit.actuation import fit_actuation, setpoint_columns
 from igrow.trainer.fit.climate import fit_climate
 from igrow.trainer.fit.evaluation import evaluate
 from igrow.trainer.fit.gaussian import Gaussian
+from igrow.trainer.fit.growth import crop_of, growth_notes, growth_of_log
 from igrow.trainer.fit.holding import fit_holding
 from igrow.trainer.fit.model import FittedModel, training_envelope
 
@@ -62,6 +64,11 @@ def calibrate(
     setpoints, inferred = setpoint_columns(log.telemetry, record)
     rules = fit_actuation([(record, setpoints, None)], posterior.values)
     say("rules of the climate computer fitted")
+    stages = before.crop or crop_of(read_bundle(default_bundle_folder()))
+    crop, growth = growth_of_log(log, record, posterior.values, stages)
+    counted = growth_notes(site, stages, growth)
+    for note in counted:
+        say(note)
     model = replace(
         before,
         site=site,
@@ -73,10 +80,12 @@ def calibrate(
         history=None,
         actuation=rules,
         holding=fit_holding(record, setpoints, posterior.values, before.holding),
+        crop=crop,
+        season=before.season if before.site.name == site.name else None,
         training_span=Span(utc_datetime(record.time[0]), utc_datetime(record.time[-1])),
         training_range=training_envelope({**record.measured, **record.inputs, **setpoints}),
         errors=held_out_errors(record, before.posterior, say),
-        notes=tuple(_notes(record, inferred)),
+        notes=(*_notes(record, inferred), *counted),
     )
     return _with_discrepancy(model, log, say)
 
@@ -126,8 +135,8 @@ def _with_discrepancy(model: FittedModel, log: Log, say: Report) -> FittedModel:
 
 def _notes(record: Record, inferred: tuple[str, ...]) -> list[str]:
     notes = []
-    if record.missing:
-        notes.append(f"the log lacks {', '.join(record.missing)}: what hangs on them keeps its usual value")
+    if record.unknown:
+        notes.append(f"the log lacks {', '.join(record.unknown)}: what hangs on them keeps its usual value")
     if inferred:
         notes.append(f"the log lacks {', '.join(inferred)}: inferred from what was held")
     return notes

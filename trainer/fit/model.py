@@ -11,9 +11,11 @@ import numpy as np
 
 from igrow.core.arrays import Floats
 from igrow.core.bundle import EffectRecord, HeldOutError, Span
+from igrow.core.planner.season import SeasonPlan
 from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator import actuation, holding
 from igrow.core.simulator.crop import CropStages
+from igrow.core.simulator.growth import prior_of
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.core.site import Site
 from igrow.trainer.fit.climate import site_prior
@@ -51,6 +53,8 @@ class FittedModel:
     """How the PLC holds heat and CO2, by name."""
     crop: CropStages | None = None
     """Growth and yield; None: those of the built-in bundle."""
+    season: SeasonPlan | None = None
+    """What the season leaves to the days; None where it was not planned."""
     training_span: Span | None = None
     training_range: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     errors: tuple[HeldOutError, ...] = ()
@@ -123,6 +127,9 @@ class FittedModel:
             for name, one in effect.parameters.items():
                 interval = f"{one.low:.4g} to {one.high:.4g}"
                 lines.append(f"{effect.name + ' ' + name:28}{one.value:12.4g}{interval:>26}  {one.unit}")
+        if self.crop is not None:
+            for name, value, low, high, unit in self.growth_intervals():
+                lines.append(f"{name:28}{value:12.4g}{f'{low:.4g} to {high:.4g}':>26}  {unit}")
         if self.errors:
             columns = ("horizon", "persistence", "before", "after")
             lines += ["", f"{'mean absolute error, unseen':28}" + "".join(f"{name:>12}" for name in columns)]
@@ -131,6 +138,17 @@ class FittedModel:
                 cells = (error.horizon, naive, f"{error.before:.3g}", f"{error.after:.3g}")
                 lines.append(f"{error.quantity:28}" + "".join(f"{cell:>12}" for cell in cells) + f"  {error.unit}")
         return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
+
+    def growth_intervals(self) -> list[tuple[str, float, float, float, str]]:
+        """Return name, value, 90 % interval and unit of what growth is computed with; empty for a built-in crop."""
+        if self.crop is None:
+            return []
+        deviations = np.sqrt(np.diag(prior_of(self.crop)))
+        values = (("conversion", self.crop.conversion, "kg kg-1"), ("maintenance", self.crop.maintenance, "kg m-2 h-1"))
+        return [
+            (f"growth {name}", value, max(value - 1.645 * one, 0.0), value + 1.645 * one, unit)
+            for (name, value, unit), one in zip(values, deviations.tolist(), strict=True)
+        ]
 
     def to_json(self) -> dict[str, Any]:
         """Return what is known of the model as plain values that `json` writes."""
@@ -153,6 +171,10 @@ class FittedModel:
             "holding": dict(self.holding),
             "training_range": {name: list(ends) for name, ends in self.training_range.items()},
             "errors": [asdict(one) for one in self.errors],
+            "growth": {
+                name.removeprefix("growth "): {"mean": value, "low": low, "high": high, "unit": unit}
+                for name, value, low, high, unit in self.growth_intervals()
+            },
             "notes": list(self.notes),
         }
 

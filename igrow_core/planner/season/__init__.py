@@ -9,10 +9,23 @@ strategy  a season in a grower's terms: day and night, warmth by the sun, CO2 an
 crop      the tomato of the mechanistic greenhouse, fed by what a simulator says that the canopy takes up
 course    the season: days of weather through the simulator, the crop through all days, the balance at its end
 worth     marginal values of the crop's state by finite differences, and the day's objective made of them
+search    the best numbers of a strategy, or of a rule, by the elitist genetic algorithm
+plan      what the season leaves to the days, as a bundle carries it
 """
 
 from igrow.core.planner.season.course import Season, SeasonOutcome, run_season
+from igrow.core.planner.season.plan import SEASON_FILE, SeasonPlan, valued
 from igrow.core.planner.season.strategy import Strategy
 from igrow.core.planner.season.worth import CropWorth, marginal_values
 
-__all__ = ["CropWorth", "Season", "SeasonOutcome", "Strategy", "marginal_values", "run_season"]
+__all__ = [
+    "SEASON_FILE",
+    "CropWorth",
+    "Season",
+    "SeasonOutcome",
+    "SeasonPlan",
+    "Strategy",
+    "marginal_values",
+    "run_season",
+    "valued",
+]

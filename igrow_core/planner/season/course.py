@@ -62,6 +62,8 @@ class SeasonOutcome:
     """At the end."""
     used: dict[str, Values]
     """heat (MJ m-2), electricity (kWh m-2), co2 and net_growth (kg m-2), (B,)."""
+    crops: tuple[Crop, ...]
+    """Where each typical day's stretch begins."""
 
 
 def run_season(season: Season, strategy: Strategy, genes: NDArray[np.float32], crop: Crop) -> SeasonOutcome:
@@ -73,11 +75,13 @@ def run_season(season: Season, strategy: Strategy, genes: NDArray[np.float32], c
     parts: list[Balance] = []
     used = {name: np.zeros(count) for name in ("heat", "electricity", "co2", "net_growth")}
     penalty = np.zeros(count)
+    crops = []
     for typical, weather in enumerate(season.weather):
         first = typical * season.every
         repeats = min(season.every, season.days - first)
         if repeats <= 0:
             break
+        crops.append(plants)
         start = season.start + first * DAY
         outcome = _typical_day(season, strategy, genes, first + repeats // 2, start, weather)
         supply = np.broadcast_to(supplied(p, believed(outcome), outcome.air_temperature[0]), (count, 24))
@@ -108,7 +112,7 @@ def run_season(season: Season, strategy: Strategy, genes: NDArray[np.float32], c
     total = parts[0]
     for part in parts[1:]:
         total = total + part
-    return SeasonOutcome(total, fresh(p, plants) - planted, penalty, plants, used)
+    return SeasonOutcome(total, fresh(p, plants) - planted, penalty, plants, used, tuple(crops))
 
 
 def believed(outcome: Outcome) -> Values:

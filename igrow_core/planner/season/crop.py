@@ -44,20 +44,35 @@ def supplied(p: GreenhouseParameters, net_growth: Values, air_temperature: Value
     return np.asarray(np.maximum((1.0 + GROWTH_COST) * (net_growth + maintenance), 0.0))
 
 
-def live(p: GreenhouseParameters, crop: Crop, supply: Values, air_temperature: Values) -> Crop:
-    """Return the crops (B,) after hours with a supply and an air temperature of (B, H); H a multiple of `HOURS`."""
-    count, hours = supply.shape
-    fed = supply.reshape(count, hours // HOURS, HOURS).sum(axis=2)
-    warm = air_temperature.reshape(count, hours // HOURS, HOURS).mean(axis=2)
-    for step in range(hours // HOURS):
-        crop = _step(p, crop, fed[:, step], warm[:, step], 3600.0 * HOURS)
+def live(
+    p: GreenhouseParameters,
+    crop: Crop,
+    supply: Values,
+    air_temperature: Values,
+    leaf_area: float = REFERENCE_LEAF_AREA,
+) -> Crop:
+    """Return the crops (B,) after hours with a supply and an air temperature of (B, H).
+
+    `leaf_area` is the leaf area index at which a simulator gave the supply.
+    """
+    hours = supply.shape[1]
+    for first in range(0, hours, HOURS):
+        step = slice(first, min(first + HOURS, hours))
+        seconds = 3600.0 * (step.stop - step.start)
+        fed, warm = supply[:, step].sum(axis=1), air_temperature[:, step].mean(axis=1)
+        crop = _step(p, crop, fed / intercepted(leaf_area), warm, seconds)
     return crop
 
 
-def _step(p: GreenhouseParameters, crop: Crop, fed: Values, temperature: Values, seconds: float) -> Crop:
-    area = tomato.leaf_area_index(p, crop)
-    light = (1.0 - np.exp(-INTERCEPTION * area)) / (1.0 - np.exp(-INTERCEPTION * REFERENCE_LEAF_AREA))
-    assimilated = fed * light * tomato.assimilation_share(np, crop)
+def intercepted(leaf_area: Values | float) -> Values:
+    """Return which part of the light a canopy of a leaf area index takes, 0 to 1."""
+    return np.asarray(1.0 - np.exp(-INTERCEPTION * np.asarray(leaf_area)))
+
+
+def _step(p: GreenhouseParameters, crop: Crop, full: Values, temperature: Values, seconds: float) -> Crop:
+    """Return the crops after a step in which a canopy that takes all light would take up `full`, kg m-2."""
+    light = intercepted(tomato.leaf_area_index(p, crop))
+    assimilated = full * light * tomato.assimilation_share(np, crop)
     rate = tomato.rates(np, p, crop, temperature)
     # In a step of hours growth may not take more than there is.
     need = (rate.fruit + rate.leaf + rate.stem + rate.growth_respiration) * seconds

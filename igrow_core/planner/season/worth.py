@@ -13,12 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from igrow.core.economics import local_days, product_price
-from igrow.core.greenhouse import tomato
 from igrow.core.greenhouse.parameters import GreenhouseParameters
 from igrow.core.greenhouse.tomato import STAGES, Crop
 from igrow.core.planner.objective import DISBELIEF, Outcome
 from igrow.core.planner.season.course import Season, run_season
-from igrow.core.planner.season.crop import fresh, like, live, supplied
+from igrow.core.planner.season.crop import REFERENCE_LEAF_AREA, fresh, like, live, supplied
 from igrow.core.planner.season.strategy import Strategy
 from igrow.core.site import Site
 
@@ -64,6 +63,8 @@ class CropWorth:
     crop: Crop
     """As it stands when the horizon begins."""
     values: MarginalValues
+    leaf_area: float = REFERENCE_LEAF_AREA
+    """Leaf area index with which the simulator runs."""
 
     def income(self, outcome: Outcome, time: NDArray[np.datetime64]) -> Values:
         """Return EUR m-2 over the horizon, (M, B)."""
@@ -72,7 +73,7 @@ class CropWorth:
         flat = (members * count, hours)
         air = outcome.air_temperature.reshape(flat)
         before = like(self.crop, members * count)
-        after = live(self.plant, before, supplied(self.plant, grown.reshape(flat), air), air)
+        after = live(self.plant, before, supplied(self.plant, grown.reshape(flat), air), air, self.leaf_area)
         price = product_price(self.site.prices, local_days(time, self.site.time_zone), self.site.crop.brix).mean()
         gained = (
             price * (fresh(self.plant, after) - fresh(self.plant, before))
@@ -81,12 +82,3 @@ class CropWorth:
             + self.values.fruit @ (after.fruit - before.fruit)
         )
         return np.asarray(gained.reshape(members, count))
-
-
-def standing(plant: GreenhouseParameters, present: dict[str, float]) -> Crop:
-    """Return the crop that present leaf area and fruit load (fruits m-2) suggest: a mature one of that size."""
-    crop = tomato.mature_crop(plant, 1.0, present.get("leaf_area_index", 2.8))
-    load = present.get("plant_load")
-    hanging = float(np.sum(crop.fruits))
-    share = 1.0 if load is None or not np.isfinite(load) or hanging <= 0.0 else max(load / hanging, 0.05)
-    return crop._replace(fruits=crop.fruits * share, fruit=crop.fruit * share)

@@ -1,0 +1,213 @@
+"""Greenhouses that no simulator was fitted to, led through whole seasons, all ways and prices in one batch.
+
+The plant's minutes cost as much for hundreds of greenhouses as for twenty, so that every way leads copies of the same
+houses at once. A way asks for the setpoints of a day at local midnight; limits of site and crop hold for all alike.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.planner import recipe_table
+from igrow.core.agronomy import Memory
+from igrow.core.economics import co2_cost, harvest_income, is_peak, local_days
+from igrow.core.greenhouse import GreenhouseParameters, generate_weather
+from igrow.core.greenhouse.disturbances import QUIET
+from igrow.core.greenhouse.hidden import HiddenEffect
+from igrow.core.greenhouse.parameters import stack
+from igrow.core.greenhouse.plant import Plant
+from igrow.core.greenhouse.sensors import EXACT
+from igrow.core.greenhouse.weather_table import WeatherTable
+from igrow.core.local_time import hour_of_day
+from igrow.core.planner.objective import Outcome
+from igrow.core.planner.plant_simulator import run
+from igrow.core.planner.season import Strategy
+from igrow.core.planner.season.course import RADIATION, asked
+from igrow.core.planner.season.search import Genes
+from igrow.core.planner.template import Template, for_site
+from igrow.core.site import Site
+from igrow.core.sun import unix_seconds
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.research.policies.environment import hourly_weather
+
+Values = NDArray[np.float64]
+
+START = np.datetime64("2020-01-01T23:00:00")
+"""Local midnight of the first day."""
+DAY = np.timedelta64(86_400, "s")
+HOUR = np.timedelta64(3600, "s")
+SEED = 700
+EFFECTS = ("wind_infiltration", "screen_gap", "lamp_heat", "co2_valve_leak", "sky_cooling", "photosynthesis_decline")
+PARTS = ("electricity", "heat", "co2", "upkeep")
+USED = ("heat", "electricity", "co2", "net_growth")
+
+
+@dataclass(frozen=True)
+class Morning:
+    """What a way knows at a local midnight of its N houses."""
+
+    day: int
+    begin: np.datetime64
+    weather: Values
+    """That is expected: the mean of the last three days, (N, 24, 6)."""
+    recipe: Values
+    """(24, 4)."""
+    template: Template
+    present: Mapping[str, Values]
+    """As measured, by quantity, (N,)."""
+    applied: Values
+    """(N, 4), NaN on the first day."""
+    memory: Memory | None
+    """Of all rows; `rows` are the way's."""
+    rows: slice
+    co2_before: Values
+    """kg m-2 since the beginning, (N,)."""
+
+
+class Way(Protocol):
+    """Leads houses."""
+
+    def ask(self, morning: Morning) -> Values:
+        """Return the setpoints of a day, (N, 24, 4)."""
+
+    def learn(self, morning: Morning, outcome: Outcome, weather: Values) -> None:
+        """Take notice of what the day did, arrays (1, N, 24), under which weather, (N, 24, 6)."""
+
+
+class Recipe:
+    """The grower's day."""
+
+    def ask(self, morning: Morning) -> Values:
+        """Return it for each house."""
+        return np.repeat(morning.recipe[None], len(morning.weather), axis=0)
+
+    def learn(self, morning: Morning, outcome: Outcome, weather: Values) -> None:
+        """Learn nothing."""
+
+
+@dataclass(frozen=True)
+class Led(Recipe):
+    """A strategy of the season, one for all houses, or one for each."""
+
+    strategy: Strategy
+    genes: Genes
+    """(1, G) or (N, G)."""
+
+    def ask(self, morning: Morning) -> Values:
+        """Return what it says under each house's weather."""
+        many = np.broadcast_to(self.genes, (len(morning.weather), self.genes.shape[1]))
+        days = [
+            asked(self.strategy, many[[row]], morning.day, morning.template, one, morning.recipe)
+            for row, one in enumerate(morning.weather)
+        ]
+        return np.concatenate(days)
+
+
+class Houses:
+    """Greenhouses by number, each with parameters, weather and two undeclared effects of its own; one for each row."""
+
+    def __init__(self, days: int, numbers: Sequence[int]) -> None:
+        made = {number: _house(days, number) for number in sorted(set(numbers))}
+        each = [made[number] for number in numbers]
+        self.hourly = np.stack([one.hourly for one in each])
+        """From three days before the start on, (rows, days, 24, 6)."""
+        self.plant = Plant(
+            stack([one.parameters for one in each]),
+            WeatherTable([one.weather for one in each]),
+            float(unix_seconds(START)),
+            count=len(each),
+            effects=[one.effects for one in each],
+            disturbances=QUIET,
+            sensors=EXACT,
+        )
+
+    def measured(self) -> dict[str, Values]:
+        """Return what the houses' sensors show, by quantity, (rows,)."""
+        total = self.plant.count or 1
+        return {name: np.broadcast_to(value, total) for name, value in self.plant.truth({}).items()}
+
+
+@dataclass(frozen=True)
+class _House:
+    parameters: GreenhouseParameters
+    weather: Telemetry
+    hourly: Values
+    effects: Sequence[HiddenEffect]
+
+
+def _house(days: int, number: int) -> _House:
+    rng = np.random.default_rng((SEED, number))
+    weather = generate_weather(START - 3 * DAY, START + (days + 1) * DAY, seed=int(rng.integers(2**31)))
+    hourly = hourly_weather(weather, START - 3 * DAY, 24 * (days + 3)).reshape(days + 3, 24, 6)
+    varied = GreenhouseParameters().varied(rng, relative=0.08)
+    return _House(varied, weather, hourly, [HiddenEffect(str(name)) for name in rng.choice(EFFECTS, 2, replace=False)])
+
+
+def lead(
+    site: Site, days: int, ways: Mapping[str, Way], houses: Mapping[str, Sequence[int]]
+) -> dict[str, dict[str, Values]]:
+    """Lead houses by each way, and return what each used and picked by day, by way and name, (its houses, days).
+
+    `heat` MJ m-2, `electricity` kWh m-2 (and `peak` of it), `co2`, `net_growth` and `kg` (fresh fruit picked) kg m-2.
+    """
+    numbers: list[int] = []
+    rows: dict[str, slice] = {}
+    for name in ways:
+        rows[name] = slice(len(numbers), len(numbers) + len(houses[name]))
+        numbers += houses[name]
+    led = Houses(days, numbers)
+    applied, memory, co2 = np.full((len(numbers), 4), np.nan), None, np.zeros(len(numbers))
+    books: dict[str, list[Values]] = {name: [] for name in (*USED, "peak", "kg")}
+    began = time.monotonic()
+    for day in range(days):
+        begin = START + day * DAY
+        expected = led.hourly[:, day : day + 3].mean(axis=1)
+        template = for_site(site, begin, 24, radiation=expected[:, :, RADIATION].mean(axis=0))
+        recipe, present = recipe_table(site, begin, 24), led.measured()
+        mornings = {
+            name: Morning(
+                day, begin, expected[part], recipe, template, {key: value[part] for key, value in present.items()},
+                applied[part], memory, part, co2[part],
+            )
+            for name, part in rows.items()
+        }  # fmt: skip
+        course = template.follow(np.concatenate([ways[name].ask(mornings[name]) for name in ways]), applied, memory)
+        applied, memory = course.setpoints[:, -1], course.memory
+        outcome = run(led.plant, course.setpoints)
+        for name, part in rows.items():
+            mine = Outcome(**{key: value[:, part] for key, value in vars(outcome).items()})
+            ways[name].learn(mornings[name], mine, led.hourly[part, day + 3])
+        peak = is_peak(site.prices, hour_of_day(begin + np.arange(24) * HOUR, site.time_zone))
+        for name in USED:
+            books[name].append(getattr(outcome, name)[0].sum(axis=-1))
+        books["peak"].append(outcome.electricity[0][:, peak].sum(axis=-1))
+        books["kg"].append(outcome.fruit_fresh_weight[0].sum(axis=-1))
+        co2 = co2 + books["co2"][-1]
+        left = (time.monotonic() - began) / (day + 1) * (days - day - 1)
+        print(f"\r{day + 1} of {days} days, {left / 60.0:.0f} min left ", end="", file=sys.stderr, flush=True)
+    print(file=sys.stderr)
+    return {name: {key: np.stack(one, axis=1)[part] for key, one in books.items()} for name, part in rows.items()}
+
+
+def money(site: Site, book: Mapping[str, Values]) -> dict[str, Values]:
+    """Return what a season brought, EUR m-2: income of fruit that was picked, costs by `PARTS`, and net, (houses,)."""
+    prices, days = site.prices, book["kg"].shape[1]
+    local = local_days(START + np.arange(days) * DAY + DAY // 2, site.time_zone)
+    tariff = prices.electricity
+    found = {
+        "income": harvest_income(prices, local, book["kg"], 0.0 * book["kg"], site.crop.brix).sum(axis=1),
+        "electricity": (tariff.off_peak * book["electricity"] + (tariff.peak - tariff.off_peak) * book["peak"]).sum(
+            axis=1
+        ),
+        "heat": prices.heat * book["heat"].sum(axis=1),
+        "co2": co2_cost(prices, 0.0, book["co2"].sum(axis=1)),
+        "upkeep": np.full(len(book["kg"]), prices.stem_day * site.crop.stem_density * days),
+    }
+    return found | {"net": found["income"] - sum(found[part] for part in PARTS)}

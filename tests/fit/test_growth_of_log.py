@@ -1,0 +1,96 @@
+"""A calibration learns how fast the crop grows from what the log counts, and says so where it counts nothing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from igrow.core.bundle import default_bundle_folder, read_bundle
+from igrow.core.simulator.crop import CropStages
+from igrow.core.simulator.growth import prior_of
+from igrow.core.telemetry import Telemetry
+from igrow.trainer import prepare_log
+from igrow.trainer.data import Log
+from igrow.trainer.data.source import DailyTable
+from igrow.trainer.fit import FittedModel
+from igrow.trainer.fit.growth import counts_of, crop_of, growth_days, growth_notes, growth_of_log
+from tests.virtual_log import SITE, virtual_log
+
+DAYS, STEP = 84, 3600.0
+PARAMETERS = FittedModel.described(SITE).posterior.values
+SLOW, HUNGRY = 0.8, 3.0
+"""Conversion and maintenance of the crop that grew, over those of the built-in one."""
+
+
+@pytest.fixture(scope="module")
+def telemetry() -> Telemetry:
+    return virtual_log(DAYS, seed=11, step=STEP)
+
+
+@pytest.fixture(scope="module")
+def before() -> CropStages:
+    return crop_of(read_bundle(default_bundle_folder()))
+
+
+def grown(telemetry: Telemetry, before: CropStages) -> np.ndarray:
+    """Return what a crop of `SLOW` and `HUNGRY` had grown by the end of each local day, kg m-2."""
+    log = prepare_log(telemetry, SITE)
+    _, days = growth_days(log.record(), PARAMETERS, SITE.time_zone)
+    growth = SLOW * before.conversion * days.assimilated - HUNGRY * before.maintenance * days.warmth
+    return np.cumsum(np.nan_to_num(growth))
+
+
+def with_counts(telemetry: Telemetry, running: np.ndarray, name: str, every: int) -> Log:
+    """Return the log with a running total that was counted at midnight of each `every`th day."""
+    values = np.full(len(telemetry), np.nan)
+    day = (telemetry.time - telemetry.time[0]) / np.timedelta64(1, "D")
+    for number in range(every, len(running), every):
+        values[np.argmin(np.abs(day - number))] = running[number - 1]
+    return prepare_log(telemetry.with_columns({name: values}), SITE)
+
+
+def test_weekly_counts_of_growth_tell_how_fast_the_crop_grows(telemetry: Telemetry, before: CropStages) -> None:
+    log = with_counts(telemetry, grown(telemetry, before), "net_growth", 7)
+    stages, fit = growth_of_log(log, log.record(), PARAMETERS, before)
+    assert fit.counts >= 10
+    assert "conversion" in fit.told
+    _, days = growth_days(log.record(), PARAMETERS, SITE.time_zone)
+    known = np.isfinite(days.assimilated)
+    expected = (stages.conversion * days.assimilated - stages.maintenance * days.warmth)[known].sum()
+    assert expected == pytest.approx(grown(telemetry, before)[-1], rel=0.05)
+    assert stages.covariance is not None
+    assert stages.covariance[0, 0] < prior_of(before)[0, 0]
+
+
+def test_a_log_that_counts_nothing_leaves_what_is_known_of_other_crops_and_says_so(
+    telemetry: Telemetry, before: CropStages
+) -> None:
+    log = prepare_log(telemetry, SITE)
+    stages, fit = growth_of_log(log, log.record(), PARAMETERS, before)
+    assert (stages.conversion, stages.maintenance) == (before.conversion, before.maintenance)
+    np.testing.assert_allclose(stages.covariance, prior_of(before))
+    assert "counts no growth" in growth_notes(SITE, before, fit)[0]
+
+
+def test_harvests_are_counted_by_weeks_and_the_first_is_not(telemetry: Telemetry) -> None:
+    """Of fruit that was picked first nobody knows since when it had been ripe."""
+    first = np.datetime64("2020-01-01")
+    days = first + np.array([50, 52, 54, 57, 60, 64])
+    table = DailyTable(days, {"class_a": np.array([9.0, 1.0, 1.0, 2.0, 1.0, 1.0]), "class_b": np.full(6, 0.5)})
+    plain = telemetry.only(["air_temperature"])
+    counts = counts_of(plain, table, first, 100, "UTC")
+    assert [(one.first, one.last, one.kind) for one in counts] == [(51, 58, "picked"), (58, 65, "picked")]
+    assert [one.amount for one in counts] == pytest.approx([5.5, 3.0])
+    assert counts_of(plain, None, first, 100, "UTC") == []
+
+
+def test_growth_beyond_what_any_crop_is_known_for_asks_about_the_site_file(
+    telemetry: Telemetry, before: CropStages
+) -> None:
+    """A cucumber that is described as a tomato holds three times the water."""
+    log = with_counts(telemetry, 5.0 * grown(telemetry, before), "net_growth", 7)
+    _, fit = growth_of_log(log, log.record(), PARAMETERS, before)
+    site = replace(SITE, crop=replace(SITE.crop, dry_matter_fraction=0.09))
+    assert "dry_matter_fraction (0.09)" in growth_notes(site, before, fit)[1]

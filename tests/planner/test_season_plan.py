@@ -1,0 +1,115 @@
+"""What a season leaves to its days: it survives being written, fits the crop that was counted, and ends in time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from igrow.core.bundle import BundleError
+from igrow.core.greenhouse import GreenhouseParameters, tomato
+from igrow.core.planner import Budget, PlanningState, optimise
+from igrow.core.planner.season import Season, SeasonPlan, Strategy, valued
+from igrow.core.planner.season.search import SETTINGS, genetic, worth_of
+from igrow.core.site import Site
+from tests.planner.toy_greenhouse import ToySimulator
+
+PLANT = GreenhouseParameters()
+START = np.datetime64("2020-01-31T23:00:00", "s")
+DAY = np.timedelta64(86_400, "s")
+DAYS = 40
+
+
+@pytest.fixture
+def season(site: Site, weather: np.ndarray, recipe: np.ndarray) -> Season:
+    """Forty days of which each ten are like one, in a toy greenhouse."""
+    return Season(site, ToySimulator(), PLANT, START, DAYS, np.stack([weather[:24]] * 4), recipe[:24])
+
+
+@pytest.fixture
+def plan(season: Season) -> SeasonPlan:
+    strategy = Strategy(DAYS, 2)
+    genes = np.full(strategy.genes, 0.5, dtype=np.float32)
+    return valued(season, strategy, genes, tomato.mature_crop(PLANT, 1.0))
+
+
+def test_a_season_survives_being_written(plan: SeasonPlan, site: Site) -> None:
+    again = SeasonPlan.from_json(plan.to_json(), "season.json")
+    assert (again.start, again.days, again.every, again.knots) == (START, DAYS, 10, 2)
+    time = START + 12 * DAY
+    for one in (plan, again):
+        assert one.worth(site, time, {}) is not None
+    np.testing.assert_allclose(again.values[1].fruit, plan.values[1].fruit)
+    assert again.numbers(time) == pytest.approx(plan.numbers(time), abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (lambda text: "{", "is no season"),
+        (lambda text: text.replace('"format": 1', '"format": 99'), "format 99"),
+        (lambda text: text.replace('"knots": 2', '"knots": 3'), "do not fit"),
+        (lambda text: text.replace('"every"', '"each"'), "is no season"),
+    ],
+)
+def test_what_is_no_season_is_refused_in_one_line(plan: SeasonPlan, change, reason: str) -> None:
+    with pytest.raises(BundleError, match=reason):
+        SeasonPlan.from_json(change(plan.to_json()), "season.json")
+
+
+def test_outside_of_the_season_nothing_is_said(plan: SeasonPlan, site: Site) -> None:
+    assert plan.worth(site, START - DAY, {}) is None
+    assert plan.worth(site, START + DAYS * DAY, {}) is None
+
+
+def test_the_crop_is_the_one_that_was_counted(plan: SeasonPlan, site: Site) -> None:
+    """Half the leaves and two thirds of the fruit are there; a load of nothing at all is a grower's typing error."""
+    expected = plan.worth(site, START, {})
+    assert expected is not None
+    load = float(expected.crop.fruits.sum())
+    counted = plan.worth(site, START, {"leaf_area_index": 1.5, "plant_load": load * 2 / 3}, warmth=16.0)
+    assert counted is not None
+    assert float(counted.crop.leaf) * counted.plant.specific_leaf_area == pytest.approx(1.5)
+    assert float(counted.crop.fruits.sum()) == pytest.approx(load * 2 / 3)
+    assert float(counted.crop.mean_temperature) == 16.0
+    assert counted.leaf_area == 1.5
+    odd = plan.worth(site, START, {"plant_load": 1e-6})
+    assert odd is not None
+    assert float(odd.crop.fruits.sum()) == pytest.approx(load / 3)
+
+
+def test_young_fruit_is_worth_the_less_the_nearer_the_end(plan: SeasonPlan) -> None:
+    young = [one.fruit[0] for one in plan.values]
+    assert young[0] > 0.0
+    assert young[-1] < 0.2 * max(young)
+    assert plan.values[-1].fruit[-1] > young[-1]
+
+
+def test_a_day_is_searched_by_the_season_s_values(
+    plan: SeasonPlan, site: Site, weather: np.ndarray, recipe: np.ndarray
+) -> None:
+    """Light that grows fruit which no day ripens any more is not bought; by an average price it is."""
+    state = PlanningState(START + (DAYS - 4) * DAY, {})
+    worth = plan.worth(site, state.time, {})
+    assert worth is not None
+    hopeless = replace(worth, values=replace(worth.values, buffer=0.0, leaf=0.0, fruit=0.0 * worth.values.fruit))
+    budget = Budget(generations=20)
+    lamps = []
+    for one in (None, hopeless):
+        found = optimise(
+            ToySimulator(), site, state, weather[:24], recipe[:24], np.random.default_rng(0), budget, worth=one
+        )
+        lamps.append(found.setpoints[:, 2].sum())
+        assert found.profits(24) == pytest.approx((found.expected_profit, found.recipe_profit))
+    assert lamps[1] < lamps[0]
+
+
+def test_the_search_of_a_season_finds_more_than_its_first_generation(season: Season) -> None:
+    strategy = Strategy(DAYS, 1)
+    value = worth_of(season, strategy, tomato.mature_crop(PLANT, 1.0))
+    genes, history = genetic(value, strategy.genes, 6, 1)
+    assert len(history) == 6
+    assert history[-1] > history[0]
+    assert value(genes[None])[0] == pytest.approx(history[-1], rel=1e-5)
+    assert SETTINGS.offspring == 48

@@ -1,0 +1,90 @@
+"""`igrow-trainer season`: a bundle carries its season, a search that was cut short goes on, and plans speak of it."""
+
+from __future__ import annotations
+
+import datetime
+from dataclasses import replace
+from pathlib import Path
+from zoneinfo import ZoneInfo
+
+import numpy as np
+import pytest
+
+from igrow.core.bundle import default_bundle_folder, read_bundle
+from igrow.core.errors import IgrowError
+from igrow.core.planner import Budget
+from igrow.core.planner.season import SeasonPlan
+from igrow.core.site import Crop, Site
+from igrow.edge.cli.plan import reasons
+from igrow.edge.planning.make_plan import make_plan
+from igrow.trainer import export, read_model, season
+from tests.planning.test_plan_from_bundle import START, request
+
+FIRST = datetime.date(2026, 5, 20)
+SITE = Site(
+    name="demo", latitude=52.0, longitude=4.3, crop=Crop(planting_date=FIRST, end_date=datetime.date(2026, 7, 8))
+)
+
+
+@pytest.fixture(scope="module")
+def planned() -> SeasonPlan:
+    return season.plan_season(SITE, read_bundle(default_bundle_folder()), generations=3)
+
+
+def test_a_bundle_carries_its_season_and_the_day_s_plan_speaks_of_it(
+    planned: SeasonPlan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = replace(read_model(default_bundle_folder(), SITE), season=planned)
+    bundle = export(model, tmp_path / "bundle")
+    again = read_model(bundle, SITE).season
+    assert again is not None
+    assert again.to_json() == planned.to_json()
+    assert read_model(bundle, replace(SITE, name="another")).season is None, "of another greenhouse it says nothing"
+    monkeypatch.setattr("igrow.edge.planning.make_plan.Budget", lambda: Budget(generations=4))
+    plan = make_plan(SITE, replace(request(), bundle=bundle.folder))
+    told = "\n".join(reasons(plan, ZoneInfo("UTC")))
+    assert "day 9 of 50 of the season" in told
+    assert "its strategy for this day: day temperature" in told
+    assert "EUR for a kg of fruit that is nearly ripe" in told
+    later = datetime.date.fromordinal(datetime.date(1970, 1, 1).toordinal() + START // 86_400 + 400)
+    past = replace(planned, start=np.datetime64(later))
+    other = export(replace(model, season=past), tmp_path / "past")
+    assert make_plan(SITE, replace(request(), bundle=other.folder)).season == ()
+
+
+def test_a_search_that_was_cut_short_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, planned: SeasonPlan
+) -> None:
+    bundle, partial = read_bundle(default_bundle_folder()), tmp_path / "partial"
+    searched = []
+    search = season.genetic
+
+    def interrupted(*arguments: object) -> object:
+        searched.append(arguments)
+        if len(searched) == 2:
+            raise KeyboardInterrupt
+        return search(*arguments)
+
+    monkeypatch.setattr(season, "genetic", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        season.plan_season(SITE, bundle, generations=3, partial=partial)
+    assert partial.exists()
+    found = season.plan_season(SITE, bundle, generations=3, partial=partial)
+    assert len(searched) == 3, "the rule was not searched again"
+    assert found.to_json() == planned.to_json()
+    assert not partial.exists()
+
+
+def test_a_season_without_an_end_is_refused() -> None:
+    endless = replace(SITE, crop=replace(SITE.crop, end_date=None))
+    with pytest.raises(IgrowError, match="end_date is not set"):
+        season.plan_season(endless, read_bundle(default_bundle_folder()), generations=3)
+    with pytest.raises(IgrowError, match="30 are needed"):
+        season.plan_season(SITE, read_bundle(default_bundle_folder()), begins=datetime.date(2026, 7, 1), generations=3)
+
+
+def test_a_typical_day_is_the_one_nearest_to_the_mean() -> None:
+    days = np.zeros((5, 24, 6))
+    days[:, :, 0] = np.array([0.0, 4.0, 5.0, 6.0, 11.0])[:, None]
+    days[:, :, 3] = np.array([0.0, 90.0, 100.0, 130.0, 200.0])[:, None]
+    np.testing.assert_array_equal(season.nearest(days), days[2])

@@ -1,0 +1,138 @@
+"""How fast a log's crop grows: what drove its growth, what was counted of it, and the fit of both.
+
+Counted is, in this order: net growth of the plant; fruit picked, as a running total of the log or as a table of
+harvests. Weekly counts do, and so does one a month.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from igrow.core.bundle import Bundle, BundleError
+from igrow.core.local_time import to_local
+from igrow.core.simulator.crop import CropStages
+from igrow.core.simulator.growth import Count, GrowthDays, GrowthFit, fit_growth, prior_of, warmth
+from igrow.core.simulator.hybrid import climate
+from igrow.core.simulator.hybrid.record import Record, observe
+from igrow.core.site import Site
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.data import Log
+from igrow.trainer.data.source import DailyTable
+from igrow.trainer.training.stage_file import stages_from_bytes
+
+Values = NDArray[np.float64]
+CROP_FILE = "crop.npz"
+COUNTING = 0.15
+"""Standard deviation of a count over its size: plants that are counted are a sample, and no picking is on time."""
+LEAST = 0.3
+"""A count below this share of the mean one is taken as uncertain as that."""
+WEEK = 7
+"""Days over which what is picked is added up at least: what was not picked today is picked tomorrow."""
+FAR = 2.0
+"""Standard deviations of what was known before, beyond which counts and site file are asked about."""
+COVERED = 0.8
+"""Share of a day that must have been measured for its growth to be told."""
+
+
+def crop_of(bundle: Bundle) -> CropStages:
+    """Return the growth and yield stages that a bundle carries; raises BundleError where they cannot be read."""
+    path = bundle.folder / CROP_FILE
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise BundleError(f"{path}: not readable: {error.strerror}") from None
+    stages, _ = stages_from_bytes(content, where=str(path))
+    settings = bundle.manifest.simulator
+    growth = float(settings.get("conversion", 0.0)), float(settings.get("maintenance", 0.0))
+    covariance = settings.get("growth_covariance")
+    known = None if covariance is None else np.array(covariance, dtype=np.float64)
+    return CropStages(stages["growth"], stages["harvest"], *growth, known)
+
+
+def growth_of_log(
+    log: Log, record: Record, parameters: Mapping[str, float], before: CropStages
+) -> tuple[CropStages, GrowthFit]:
+    """Return the stages with conversion and maintenance as the log's counts tell them, and how well they are known.
+
+    Args:
+        log: with the counts, and the site's crop.
+        record: of the log.
+        parameters: of the climate stage, whose canopy assimilates.
+        before: what is known before the log.
+    """
+    site = log.known_site
+    first, days = growth_days(record, parameters, site.time_zone)
+    counts = counts_of(log.telemetry, log.harvests, first, len(days.warmth), site.time_zone)
+    return fit_growth(days, counts, before, site.crop)
+
+
+def growth_notes(site: Site, before: CropStages, fit: GrowthFit) -> tuple[str, ...]:
+    """Return what a grower must know of a fit of growth, in sentences."""
+    notes = [fit.sentence]
+    spread = float(np.sqrt(prior_of(before)[0, 0]))
+    if fit.counts and abs(fit.conversion - before.conversion) > FAR * spread:
+        notes.append(
+            f"the counts say that this crop makes {fit.conversion / before.conversion:.1f} times the dry matter that "
+            f"others make of the same light: are dry_matter_fraction ({site.crop.dry_matter_fraction:g}), fruit_share "
+            f"({site.crop.fruit_share:g}) and days_to_harvest ({site.crop.days_to_harvest:g}) those of this crop?"
+        )
+    return tuple(notes)
+
+
+def growth_days(record: Record, parameters: Mapping[str, float], time_zone: str) -> tuple[np.datetime64, GrowthDays]:
+    """Return the first local day of a record, and what drove growth on each day from then on; NaN where none tells."""
+    states = observe(record, parameters, {})
+    drivers = climate.derive(np, states, record.inputs, parameters, record.lamp_efficacy)
+    day = to_local(record.time, time_zone).astype("datetime64[D]")
+    number = (day - day[0]).astype(np.int64)
+    hours = record.step / 3600.0
+    known = record.usable & np.isfinite(drivers["assimilation"]) & np.isfinite(states["air_temperature"])
+    measured = np.bincount(number, known)
+
+    def total(values: Values) -> Values:
+        summed = np.bincount(number, np.where(known, values, 0.0))
+        # What was not measured of a day is taken as the rest of it.
+        whole = 24.0 / np.maximum(measured, 1.0)
+        return np.where(measured * hours >= COVERED * 24.0, summed * whole, np.nan)
+
+    return day[0], GrowthDays(total(3600.0 * drivers["assimilation"]), total(warmth(states["air_temperature"])))
+
+
+def counts_of(
+    table: Telemetry, harvests: DailyTable | None, first: np.datetime64, days: int, time_zone: str
+) -> list[Count]:
+    """Return what a log counts of growth, by days from the local day `first` on; empty where it counts nothing."""
+    for name, kind in (("net_growth", "grown"), ("fruit_fresh_weight", "picked")):
+        known = np.isfinite(table.columns.get(name, np.empty(0)))
+        if known.sum() > 1:
+            # A value belongs to the end of the day before it, or to the beginning of its own, whichever is nearer.
+            local = to_local(table.time[known], time_zone)
+            at = np.round((local - first) / np.timedelta64(1, "D")).astype(np.int64)
+            last = np.append(np.flatnonzero(np.diff(at)), len(at) - 1)
+            return _between(at[last], table[name][known][last], kind, days)
+    if harvests is None or "class_a" not in harvests:
+        return []
+    picked = np.nan_to_num(harvests["class_a"])
+    if "class_b" in harvests:
+        picked = picked + np.nan_to_num(harvests["class_b"])
+    # What was picked on a day ripened since the one before; of the first nobody knows.
+    return _between((harvests.day - first).astype(np.int64) + 1, np.cumsum(picked), "picked", days)
+
+
+def _between(at: NDArray[np.int64], running: Values, kind: str, days: int) -> list[Count]:
+    """Return the counts between days at which a running total is known, as far as they lie within `days`."""
+    chosen = [0]
+    for row in range(1, len(at)):
+        if kind == "grown" or at[row] - at[chosen[-1]] >= WEEK:
+            chosen.append(row)
+    at, amounts = at[chosen], np.diff(running[chosen])
+    deviation = COUNTING * np.maximum(np.abs(amounts), LEAST * float(np.abs(amounts).mean()) if len(amounts) else 0.0)
+    rows = zip(at[:-1].tolist(), at[1:].tolist(), amounts.tolist(), deviation.tolist(), strict=True)
+    return [
+        Count(begin, end, amount, max(spread, 1e-5), kind)
+        for begin, end, amount, spread in rows
+        if 0 <= begin < end <= days
+    ]
