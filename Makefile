@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test notebooks lint format soak bench bench-diagnosis results bundle wheel api clean
+.PHONY: help demo test page-pictures notebooks lint format soak bench bench-diagnosis results bundle wheel api clean
 
 help: ## List the targets.
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-16s %s\n", $$1, $$2}'
@@ -22,6 +22,9 @@ demo: $(STAMP) ## Run the whole loop on a virtual greenhouse with an undeclared 
 
 test: $(STAMP) ## Run the tests (at most 10 minutes).
 	$(BIN)/pytest -n 2 --dist worksteal -m 'not soak and not notebooks' tests
+
+page-pictures: $(STAMP) ## Take the pictures of docs/page.md anew (needs Chromium).
+	IGROW_PICTURES=1 $(BIN)/pytest tests/page/test_page_in_a_browser.py
 
 lint: $(STAMP) ## Run ruff and strict mypy.
 	$(BIN)/ruff check .

@@ -31,6 +31,7 @@ from igrow.edge.guard.writer import HEARTBEAT
 from igrow.edge.guard_settings import GuardSettings, SensorSettings
 from igrow.edge.mqtt.settings import MqttSettings
 from igrow.edge.notifications.settings import NotificationSettings
+from igrow.edge.page.settings import PageSettings
 from igrow.edge.point_rules import highest_beat, point_rule
 from igrow.edge.registers.bus_load import estimate
 from igrow.edge.registers.loading import load_register_map
@@ -103,7 +104,7 @@ class PlanningSettings:
 
 @dataclass(frozen=True)
 class StatusSettings:
-    """The page, the health endpoint and the metrics."""
+    """What programs ask: state, health and metrics."""
 
     port: int = setting(low=0, high=65535, default=STATUS_PORT, help="TCP port on localhost; 0 takes a free one")
 
@@ -160,7 +161,8 @@ class DaemonFile:
     recipe: Recipe = setting(default_factory=Recipe, help="what rules when no plan does")
     planning: PlanningSettings = setting(default_factory=PlanningSettings, help="planning")
     updates: UpdateSettings = setting(default_factory=UpdateSettings, help="new bundles")
-    status: StatusSettings = setting(default_factory=StatusSettings, help="status page")
+    status: StatusSettings = setting(default_factory=StatusSettings, help="state for programs")
+    page: PageSettings = setting(default_factory=PageSettings, help="the grower's page")
     notifications: NotificationSettings = setting(default_factory=NotificationSettings, help="who is told of alarms")
     mqtt: MqttSettings = setting(default_factory=MqttSettings, help="state for a broker")
 

@@ -14,6 +14,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from igrow.core.errors import IgrowError
+from igrow.edge.alarm_levels import Level
 from igrow.edge.carrying_over import carry_over, log_to_remember, remember
 from igrow.edge.configuration import Configuration, load_configuration
 from igrow.edge.cycle import CycleResult
@@ -160,6 +161,7 @@ class Daemon:
             control.acknowledged.look()
         with self._contained("updates"):
             self.services.updates.tick(image.true_time)
+            self._journal.alarm("simulator", self.services.updates.worsening, Level.NOTICE)
             if control.lockstep and self.services.updates.busy:
                 await self._unless_stopped(self.services.updates.wait(LOCKSTEP_WAIT))
         with self._contained("exchange"):

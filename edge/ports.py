@@ -216,6 +216,10 @@ class UpdateService(Protocol):
         """Empty when all is well, else one line."""
 
     @property
+    def worsening(self) -> str:
+        """Empty, or one line that says since when the bundle in force predicts worse than it did."""
+
+    @property
     def busy(self) -> bool:
         """A check, a self-test or a shadow run is under way."""
 

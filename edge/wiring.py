@@ -43,6 +43,7 @@ from igrow.edge.sources import (
 )
 from igrow.edge.state_file import StateFile
 from igrow.edge.status import StatusServer
+from igrow.edge.status.client import STATUS_FILE
 from igrow.edge.store import StoreAside, StoreError, StoreLimits
 from igrow.edge.updates import BundleUpdates, SignedSource, UpdateRules
 
@@ -50,7 +51,6 @@ SIMULATED_PATIENCE = 60.0
 """Seconds that a simulated plant waits for its disk, as it runs so fast that a share of its time would be none."""
 STATE_FILE_SECONDS = 1.0
 """How long the stop waits for the small files of the state folder."""
-STATUS_FILE = "status.json"
 TWIN_TOLERANCE = {
     "air_temperature": 1.5,
     "air_humidity": 8.0,
@@ -152,7 +152,7 @@ def open_services(configuration: Configuration) -> Services:
     if file.planning.enabled:
         planning = PlanningProcess(site, graphs, seconds=file.planning.timeout.total_seconds())
     late_after = max(60.0, 3.0 * file.cycle.interval.total_seconds())
-    status = StatusServer(file.status.port, state / STATUS_FILE, zone=configuration.zone, late_after=late_after)
+    status = StatusServer(file.status.port, state / STATUS_FILE, late_after=late_after)
     state_files = HandOff("state files", patience=patience, share=share)
     return Services(store, state_files, graphs, planning, updates, exchange, status)
 

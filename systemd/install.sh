@@ -13,6 +13,12 @@ PYTHON=${PYTHON:-python3}
     exit 2
 }
 
+# Debian keeps the modules for virtual environments in a package of their own.
+"$PYTHON" -c 'import ensurepip' 2>/dev/null || {
+    echo "0. python3-venv"
+    apt-get install -y -qq --no-install-recommends python3-venv
+}
+
 echo "1. program into $TARGET/venv"
 mkdir -p "$TARGET/docs"
 [ -x "$TARGET/venv/bin/python" ] || "$PYTHON" -m venv "$TARGET/venv"
@@ -25,7 +31,7 @@ ln -sf "$TARGET/venv/bin/igrow-edge" /usr/local/bin/igrow-edge
 echo "2. user, folders, service"
 install -m 644 "$SOURCE/systemd/igrow-edge.sysusers.conf" /usr/lib/sysusers.d/igrow-edge.conf
 install -m 644 "$SOURCE/systemd/igrow-edge.tmpfiles.conf" /usr/lib/tmpfiles.d/igrow-edge.conf
-for unit in igrow-edge igrow-notify igrow-mqtt; do
+for unit in igrow-edge igrow-page igrow-notify igrow-mqtt; do
     install -m 644 "$SOURCE/systemd/$unit.service" "/etc/systemd/system/$unit.service"
 done
 systemd-sysusers igrow-edge.conf
@@ -44,5 +50,5 @@ chmod -R g+rX /etc/igrow
 
 [ ! -d /run/systemd/system ] || systemctl daemon-reload || true
 echo "done. Next: edit /etc/igrow, then"
-echo "  sudo -u igrow igrow-edge check-config"
-echo "  systemctl enable --now igrow-edge"
+echo "  sudo -u igrow igrow-edge commission"
+echo "  systemctl enable --now igrow-edge igrow-page"

@@ -25,7 +25,8 @@ inside 'apt-get update -qq; apt-get install -qq -y --no-install-recommends pytho
 inside 'sh /usr/src/igrow/systemd/install.sh'
 inside 'igrow-edge check-config /etc/igrow/daemon.yaml'
 inside 'du -sh /opt/igrow/venv | cut -f1; id igrow; ls -ld /etc/igrow /srv/igrow-exchange'
-inside 'systemd-analyze security --offline=true --no-pager /etc/systemd/system/igrow-edge.service | tail -1'
+inside 'for unit in igrow-edge igrow-page; do
+    systemd-analyze security --offline=true --no-pager /etc/systemd/system/$unit.service | tail -1; done'
 inside '
     mkdir -p /tmp/try && chown igrow /tmp/try && cd /tmp/try
     sed "s|^state:.*|state: /tmp/try/state|; s|^exchange:.*|exchange: /srv/igrow-exchange|" /etc/igrow/daemon.yaml \
@@ -35,11 +36,19 @@ inside '
     plc=$!
     sleep 8
     status=0
-    setpriv --reuid=igrow --regid=igrow --init-groups timeout --preserve-status -s TERM 20 \
+    setpriv --reuid=igrow --regid=igrow --init-groups timeout --preserve-status -s TERM 40 \
         igrow-edge run daemon.yaml >run.log 2>&1 &
     sleep 14
+    daemon=$!
     igrow-edge status daemon.yaml || status=$?
-    wait $! || true
+    setpriv --reuid=igrow --regid=igrow --init-groups timeout --preserve-status -s TERM 10 \
+        igrow-edge page daemon.yaml >page.log 2>&1 &
+    sleep 6
+    /opt/igrow/venv/bin/python -c "
+from urllib.request import urlopen
+assert b\"recipe decides\" in urlopen(\"http://localhost:8421/\").read()
+print(\"the page answers\")" || { cat page.log; status=1; }
+    wait $daemon || true
     kill $plc
     cat run.log
     exit $status

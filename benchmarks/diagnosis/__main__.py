@@ -6,8 +6,8 @@ each with a model calibrated on its own first weeks; `transferred` diagnoses the
 `matched` does the like with greenhouses of the simulator's own structure; `same` with greenhouses that have drifted a
 little since their calibration, and asks what has changed in them; `real` diagnoses the public logs. `nuisance` learns
 anew what greenhouses show though nothing is missing, and `rules` fits the bounds that are fitted, both from seeds that
-no case has; `thresholds` prints all rules. Everything is made afresh: an hour or so on two cores, most of it for
-simulated weeks.
+no case has, and `drift` how greenhouses change with time; `thresholds` prints all rules. Everything is made afresh: an
+hour or so on two cores, most of it for simulated weeks.
 """
 
 from __future__ import annotations
@@ -19,14 +19,26 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from benchmarks.diagnosis import matched, nuisance, real, rules, same
+from benchmarks.diagnosis import drift, matched, nuisance, real, rules, same
 from benchmarks.diagnosis.cases import SEASONS, Case, draw
 from benchmarks.diagnosis.greenhouses import of_seasons, others
 from benchmarks.diagnosis.logs import Reference, built_in, reference, simulate_cases
 from benchmarks.diagnosis.scoring import Outcome, judge, show, table
 from igrow.core.telemetry import Telemetry
 
-WHAT = ("scoring", "tuning", "others", "transferred", "matched", "nuisance", "rules", "thresholds", "same", "real")
+WHAT = (
+    "scoring",
+    "tuning",
+    "others",
+    "transferred",
+    "matched",
+    "nuisance",
+    "rules",
+    "thresholds",
+    "same",
+    "real",
+    "drift",
+)
 OTHER_GREENHOUSES = 8
 SEASONS_USED = ("winter", "spring")
 
@@ -54,6 +66,8 @@ def main() -> int:
         return matched.main(options.processes)
     if options.what == "nuisance":
         return nuisance.main(options.processes)
+    if options.what == "drift":
+        return drift.main(options.processes)
     if options.what == "rules":
         return rules.main(options.processes)
     if options.what == "thresholds":

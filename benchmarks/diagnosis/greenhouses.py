@@ -59,7 +59,7 @@ def others(count: int, first: int = OTHERS_SEED) -> dict[str, VirtualGreenhouse]
             plant = replace(plant, lamp_capacity=0.0)
         day = np.datetime64("2020-03-01T00:00:00") + np.timedelta64(int(rng.integers(0, 300)), "D")
         name = f"greenhouse-{number}"
-        greenhouses[name] = VirtualGreenhouse(_site(name, plant), plant, day, first + 500 + number)
+        greenhouses[name] = VirtualGreenhouse(site_of(name, plant), plant, day, first + 500 + number)
     return greenhouses
 
 
@@ -70,11 +70,13 @@ def neighbours(greenhouse: VirtualGreenhouse, count: int) -> list[VirtualGreenho
     for number in range(count):
         seed = greenhouse.seed + 1000 * (1 + number)
         plant = usual.varied(np.random.default_rng(seed), OTHERS_SPREAD)
-        found.append(VirtualGreenhouse(_site(f"{greenhouse.site.name}-{number}", plant), plant, greenhouse.start, seed))
+        found.append(
+            VirtualGreenhouse(site_of(f"{greenhouse.site.name}-{number}", plant), plant, greenhouse.start, seed)
+        )
     return found
 
 
-def _site(name: str, plant: GreenhouseParameters) -> Site:
+def site_of(name: str, plant: GreenhouseParameters) -> Site:
     """Return what a grower would write down of a greenhouse."""
     lamps = Lamps() if plant.lamp_capacity > 0.0 else None
     described = Greenhouse(mean_height=float(np.mean(plant.air_height)), lamps=lamps)

@@ -45,11 +45,17 @@ def reference(greenhouse: VirtualGreenhouse) -> Reference:
     start = greenhouse.start - np.timedelta64(REFERENCE_DAYS, "D")
     weather = greenhouse.weather(start, greenhouse.start, greenhouse.seed)
     (log,) = simulate_many(greenhouse.plant, weather, recipe, start, greenhouse.start, count=1, seed=greenhouse.seed)
-    seen = prepare_log(log.measured, greenhouse.site)
+    return referenced(greenhouse, log.measured, log.crop)
+
+
+def referenced(greenhouse: VirtualGreenhouse, log: Telemetry, crop: Crop) -> Reference:
+    """Calibrate on the log of a greenhouse, and measure sizes; `crop` is that at its end."""
+    seen = prepare_log(log, greenhouse.site)
     model = calibrate(seen)
-    # Learned here whether or not it is asked by default.
-    model = replace(model, history=history_of(seen, model))
-    return Reference(greenhouse, model, enr_units(seen.record(model.alignment or 0.0), model), log.crop)
+    if model.history is None:
+        # Learned here whether or not it is asked by default.
+        model = replace(model, history=history_of(seen, model))
+    return Reference(greenhouse, model, enr_units(seen.record(model.alignment or 0.0), model), crop)
 
 
 def built_in(site: Site) -> FittedModel:

@@ -70,7 +70,7 @@ def compartments(data: Path) -> Iterator[Compartment]:
 
 
 def say(title: str, diagnosis: Diagnosis) -> None:
-    causes = ", ".join(f"{one.effect} ({'/'.join(one.rivals)})" for one in diagnosis.findings) or "-"
+    causes = ", ".join(f"{one.effect} ({'/'.join(one.confounded)})" for one in diagnosis.findings) or "-"
     print(f"{title:72} {diagnosis.verdict:12} {causes}", flush=True)
     for quantity, horizons in diagnosis.errors.items():
         if "24_h" in horizons:

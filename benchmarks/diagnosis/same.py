@@ -119,7 +119,7 @@ def table(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int, str]]:
         share(f"false claims, {what}", of(group), lambda one: one.verdict != "nothing", "<= .02")
     for size, bound in ((3.0, "-"), (1.0, ">= .80"), (0.3, ">= .35")):
         share(f"right cause first, ENR {size:g}", of("single", size=size), is_first, bound)
-    named = [one for one in of("single", "onset") if one.rivals]
+    named = [one for one in of("single", "onset") if one.confounded]
     share("right cause first, where a name was given", named, is_first, ">= .95")
     share("a pattern in place of a cause", of("single", "onset"), lambda one: one.verdict == "unexplained", "-")
     share("both of a pair", of("pair"), lambda one: set(one.case.causes) <= set(one.found), ">= .45")
@@ -129,7 +129,7 @@ def table(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int, str]]:
     share("90 % intervals that cover", covered, lambda one: bool(one.covered), ".85 to .95")
     begun = [one for one in of("onset") if one.onset_error is not None]
     share("beginning within 2 days, where found", begun, lambda one: (one.onset_error or 0.0) <= 2.0, ">= .90")
-    share("outside the catalogue: wrong name", of("outside"), lambda one: bool(one.rivals), "<= .05")
+    share("outside the catalogue: wrong name", of("outside"), lambda one: bool(one.confounded), "<= .05")
     share("outside the catalogue: silence", of("outside"), lambda one: one.verdict == "nothing", "<= .30")
     caused = of("single", "onset", "pair")
     possible = sum(max(one.recalibrated - one.perfect, 0.0) for one in caused)

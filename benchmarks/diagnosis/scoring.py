@@ -39,7 +39,7 @@ class Outcome:
     case: Case
     verdict: str
     found: tuple[str, ...]
-    rivals: tuple[tuple[str, ...], ...]
+    confounded: tuple[tuple[str, ...], ...]
     relative_size: float | None
     """Estimate over truth of the first finding, where it is right."""
     covered: bool | None
@@ -67,7 +67,7 @@ def judge(case: Case, telemetry: Telemetry, reference: Reference, rules: Decisio
     diagnosis = diagnose(log, reference.model, without=case.without, rules=rules)
     evidence = diagnosis.evidence
     seconds = time.perf_counter() - begun
-    causes = [one for one in diagnosis.findings if one.kind != "discrepancy"]
+    causes = [one for one in diagnosis.findings if one.effect in EFFECTS]
     found = tuple(one.effect for one in diagnosis.findings)
     truth = {one.name: one for one in hidden(case, reference.unit, reference.greenhouse.start)}
     relative, covered, onset_error = None, None, None
@@ -89,7 +89,7 @@ def judge(case: Case, telemetry: Telemetry, reference: Reference, rules: Decisio
         case,
         diagnosis.verdict,
         found,
-        tuple(one.rivals for one in causes),
+        tuple(one.confounded for one in causes),
         relative,
         covered,
         onset_error,
@@ -165,7 +165,7 @@ def _gain_between(outcomes: Sequence[Outcome], low: float, high: float) -> list[
 
 
 def _claims(outcomes: Sequence[Outcome]) -> list[Outcome]:
-    return [one for one in _group(outcomes, "single", "sensor", "onset") if one.rivals]
+    return [one for one in _group(outcomes, "single", "sensor", "onset") if one.confounded]
 
 
 def _kind(name: str) -> str:
@@ -225,13 +225,13 @@ def table(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int, str]]:
             ">= .97",
         ),
         (
-            "true cause in the set of rivals, of claims",
-            *_share(claims, lambda o: o.case.causes[0] in o.rivals[0]),
+            "true cause in the set of confounded, of claims",
+            *_share(claims, lambda o: o.case.causes[0] in o.confounded[0]),
             ">= .97",
         ),
         (
-            "mean size of the set of rivals",
-            float(np.mean([len(one.rivals[0]) for one in claims])) if claims else float("nan"),
+            "mean size of the set of confounded",
+            float(np.mean([len(one.confounded[0]) for one in claims])) if claims else float("nan"),
             len(claims),
             "<= 1.5",
         ),

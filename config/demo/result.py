@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from datetime import UTC, date, datetime
 from pathlib import Path
 from typing import Any
 
 import matplotlib
-from ideal import ideal_errors  # stands beside this file
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
@@ -28,7 +28,15 @@ DAY = 288
 """Rows of five minutes."""
 
 
-def summarise(out: Path, effect: str, days_before: int) -> str:
+@dataclass(frozen=True)
+class Days:
+    """When what happened, in days since the daemon took over."""
+
+    broken: int
+    diagnosed: int
+
+
+def summarise(out: Path, effect: str, days: Days) -> str:
     """Write result.json and demo.png into `out`, and return the table for the terminal."""
     site = load_site(out / "site.yaml")
     exchange = Archive(out / "trainer/archive").read("demo", date(2000, 1, 1), datetime.now(UTC).date())
@@ -49,12 +57,15 @@ def summarise(out: Path, effect: str, days_before: int) -> str:
         "verdict": diagnosis["verdict"],
         "findings": diagnosis["findings"],
         "held_out_errors": diagnosis["errors"],
-        "ideal_errors_24_h": ideal_errors(out, effect),
+        "oracle_errors_24_h": json.loads((out / "diagnosis/truth.json").read_text())["errors_24_h"],
+        "broken_on": str(log.time[0].astype("datetime64[D]") + days.broken),
+        "found_since": found_since(diagnosis),
         "verdict_without_effect": nothing["verdict"],
         "adopted_on_day": since,
         "live_error_24_h": {
             name: {
-                "first_bundle_before": mean(live["first"][name][:days_before]),
+                "first_bundle_while_well": mean(live["first"][name][: days.broken]),
+                "first_bundle_since_it_broke": mean(live["first"][name][days.broken : days.diagnosed]),
                 "first_bundle_after": mean(live["first"][name][since:]) if since else None,
                 "bundle_in_force_after": mean(live["corrected"][name][since:]) if since else None,
                 "unit": QUANTITIES[name].unit,
@@ -64,8 +75,14 @@ def summarise(out: Path, effect: str, days_before: int) -> str:
         "money": money,
     }
     (out / "result.json").write_text(json.dumps(result, indent=2))
-    draw(out / "demo.png", live, since, days_before, diagnosis, money)
+    draw(out / "demo.png", live, since, days, log, diagnosis)
     return table(result)
+
+
+def found_since(diagnosis: Any) -> str | None:
+    """Return the day on which the first cause was found to have begun, None where it was always there."""
+    onsets = [one["onset"] for one in diagnosis["findings"] if one.get("onset")]
+    return str(onsets[0]["time"])[:10] if onsets else None
 
 
 def live_error(bundle: Any, log: Telemetry) -> dict[str, NDArray[np.float64]]:
@@ -145,18 +162,19 @@ def mean(values: NDArray[np.float64]) -> float:
 
 def table(result: dict[str, Any]) -> str:
     """Return the result as text."""
-    ideal = result["ideal_errors_24_h"]
+    oracle = result["oracle_errors_24_h"]
     lines = ["error on unseen days, 24 h ahead    as deployed   recalibrated    with the    the truth"]
     lines.append(f"{'':62}cause found     known")
     for name, horizons in result["held_out_errors"].items():
         row = horizons.get("24_h")
         if row:
             stages = "".join(f"{row[stage]:14.3f}" for stage in ("deployed", "recalibrated", "corrected"))
-            lines.append(f"  {name:31}{stages}{ideal.get(name, float('nan')):13.3f}   {row['unit']}")
-    lines += ["", "live error of the daemon, 24 h      first bundle   first bundle   bundle in force"]
-    lines.append(f"{'':34}before         after it       after adoption")
+            lines.append(f"  {name:31}{stages}{oracle.get(name, float('nan')):13.3f}   {row['unit']}")
+    lines += ["", "live error of the daemon, 24 h    first bundle:                                 corrected bundle"]
+    lines.append(f"{'':30}all is well  since it broke  after adoption    after adoption")
     for name, row in result["live_error_24_h"].items():
-        cells = [row["first_bundle_before"], row["first_bundle_after"], row["bundle_in_force_after"]]
+        first = [row[f"first_bundle_{when}"] for when in ("while_well", "since_it_broke", "after")]
+        cells = [*first, row["bundle_in_force_after"]]
         lines.append(
             f"  {name:24}"
             + "".join("              -" if x is None else f"{x:15.3f}" for x in cells)
@@ -167,30 +185,40 @@ def table(result: dict[str, Any]) -> str:
         cells = [row[key] for key in ("plan_expected", "plan_obtained", "recipe_expected", "recipe_obtained")]
         lines.append(f"  {name:28}{cells[0]:14.3f}{cells[1]:10.3f}{cells[2]:18.3f}{cells[3]:10.3f}")
     named = ", ".join(one["effect"] for one in result["findings"]) or "nothing"
-    lines += ["", f"undeclared effect: {result['effect']}; found: {result['verdict']} ({named})"]
-    lines.append(f"the greenhouse with nothing missing: {result['verdict_without_effect']}")
+    lines += ["", f"undeclared effect: {result['effect']}, since {result['broken_on']}"]
+    lines.append(f"found: {result['verdict']} ({named}), since {result['found_since'] or 'before the log begins'}")
+    lines.append(f"had nothing broken: {result['verdict_without_effect']}")
     return "\n".join(lines)
 
 
-def draw(path: Path, live: Any, since: int | None, days_before: int, diagnosis: Any, money: Any) -> None:
-    """Draw the figure: the live error falls when the corrected bundle is adopted."""
+def draw(path: Path, live: Any, since: int | None, days: Days, log: Telemetry, diagnosis: Any) -> None:
+    """Draw the figure: the live error climbs when something breaks, and falls with the corrected bundle."""
     figure, axes = plt.subplots(3, 1, figsize=(9.0, 7.2), sharex=True, layout="constrained")
+    found = ", ".join(one["effect"].replace("_", " ") for one in diagnosis["findings"]) or "nothing"
+    moments = [(days.broken, "it breaks", "#b3261e"), (days.diagnosed, "diagnosed", "#6b7280")]
+    if since is not None:
+        moments.append((since, "adopted", "#1f8a4c"))
     for axis, name, title in zip(axes, PREDICTED, ("air temperature", "relative humidity", "CO2"), strict=True):
         first, corrected = live["first"][name], live["corrected"][name]
         day = np.arange(len(first)) + 0.5
         axis.plot(day, first, color="#b0b6bd", lw=1.6, label="first bundle")
         if since is not None:
             axis.plot(day[since:], corrected[since:], color="#1f8a4c", lw=2.2, label="corrected bundle, in force")
-            axis.axvline(since, color="#1f8a4c", lw=0.9, ls="--")
-        axis.axvline(days_before, color="#6b7280", lw=0.9, ls=":")
+        for moment, _, colour in moments:
+            axis.axvline(moment, color=colour, lw=0.9, ls="--")
         axis.set_ylabel(f"{title}\n{QUANTITIES[name].unit}")
         axis.set_ylim(0, 1.25 * float(np.nanmax(first)))
         axis.grid(alpha=0.25)
         axis.spines[["top", "right"]].set_visible(False)
-    found = ", ".join(one["effect"].replace("_", " ") for one in diagnosis["findings"]) or "nothing"
+    for moment, text, colour in moments:
+        axes[0].text(moment - 0.15, axes[0].get_ylim()[1], text, va="top", ha="right", color=colour, rotation=90)
+    begun = found_since(diagnosis)
+    if begun is not None:
+        place = float((np.datetime64(begun, "D") - log.time[0]) / np.timedelta64(1, "D"))
+        label = f"found to have begun {begun}"
+        axes[0].plot([place], [0.0], marker="^", ms=9, color="#b3261e", clip_on=False, label=label)
     axes[0].set_title(f"Error of the 24 h prediction, day by day\nfound by the trainer: {found}", loc="left")
-    axes[0].legend(loc="upper right", frameon=False)
-    axes[0].text(days_before - 0.3, axes[0].get_ylim()[1], "diagnosed", va="top", ha="right", color="#6b7280")
-    axes[-1].set_xlabel("day of plant time")
+    axes[0].legend(loc="upper left", frameon=False)
+    axes[-1].set_xlabel("day since the daemon took over")
     figure.savefig(path, dpi=120)
     plt.close(figure)

@@ -1,9 +1,10 @@
-"""The whole loop on a virtual greenhouse that does something the simulator does not know.
+"""The whole loop on a virtual greenhouse in which something breaks that the simulator does not know.
 
-A virtual PLC runs a greenhouse with an undeclared effect; the daemon controls it over Modbus for four weeks of plant
-time; the log reaches the trainer, which names the effect and publishes the corrected simulator; the daemon checks it,
-runs it in the shadow, adopts it, and goes on for two weeks. Beside it: the same greenhouse under the grower's recipe,
-and one without the effect, in which nothing may be found. Every step is a command that a user would type.
+The first bundle is calibrated on four weeks of the greenhouse's own log. A daemon then controls it over Modbus, and all
+is well, until on a given day something breaks: the prediction error climbs. Two weeks later the trainer reads the log,
+names what is missing and since when, and publishes the corrected simulator; the daemon checks it, runs it in the shadow
+and adopts it, and the error falls. Beside it: the same greenhouse under the grower's recipe, and had nothing broken,
+when nothing may be found. Every step is a command that a user would type.
 """
 
 from __future__ import annotations
@@ -32,12 +33,16 @@ ROOT = HERE.parents[1]
 BIN = Path(sys.executable).parent
 sys.path.insert(0, str(HERE))
 
-from ideal import LOG  # noqa: E402  # stands beside this file
-from result import summarise  # noqa: E402  # and so does this
+from result import Days, summarise  # noqa: E402  # stands beside this file
 
-WEEKS_BEFORE, DAYS_AFTER, SHADOW_DAYS = 4, 14, 2
+WEEKS_BEFORE = 4
+"""Of log, on which the first bundle is calibrated."""
+WELL_DAYS, BROKEN_DAYS, SHADOW_DAYS, DAYS_AFTER = 10, 14, 2, 8
 EFFECT = "wind_infiltration=0.12"
-NOTHING, NAMED = 0, 10
+LOG = "trainer/archive/telemetry/site=demo"
+"""Where the trainer collects what the daemon leaves in the exchange."""
+VERDICTS = NOTHING, _NAMED, _AMBIGUOUS, _UNEXPLAINED, DATA_FAULT = 0, 10, 11, 12, 13
+"""Exit codes of a diagnosis."""
 
 
 class DemoError(Exception):
@@ -93,6 +98,16 @@ class Demo:
             process.wait()
 
     @property
+    def plant(self) -> list[str]:
+        """Arguments of the one greenhouse, whoever simulates it."""
+        weather = ["--weather", str(self.weather)] if self.weather else []
+        return ["--site", "site.yaml", "--seed", str(self.seed), "--spread", "0.08", *weather]
+
+    def day(self, number: int) -> str:
+        """Return the date of a day, counted from the daemon's first."""
+        return str(np.datetime64(self.start, "D") + np.timedelta64(number, "D"))
+
+    @property
     def plant_days(self) -> int:
         """Whole days of plant time that the daemon has handed over."""
         try:
@@ -104,12 +119,15 @@ class Demo:
 
     def wait_for_day(self, day: int, what: str) -> None:
         """Show the plant's days pass until so many have been handed over."""
-        while self.plant_days < day:
+        shown = -1
+        while (passed := self.plant_days) < day:
             for name in ("virtual-plc", "daemon"):
                 if self.running[name].poll() is not None:
                     self.finish(name, self.running[name])
                     raise DemoError(f"{name} ended by itself; see {self.out / name}.log")
-            self.say(f"{what}: plant day {self.plant_days} of {day}", end="")
+            if passed != shown:
+                self.say(f"{what}: plant day {passed} of {day}", end="")
+                shown = passed
             time.sleep(0.5)
         self.say(f"{what}: {day} plant days")
 
@@ -119,7 +137,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path("out/demo"), help="folder for everything; emptied first")
     parser.add_argument("--effect", default=EFFECT, help=f"NAME=SIZE of what no model knows (default {EFFECT})")
-    parser.add_argument("--start", default="2020-02-01", help="first day of plant time, UTC")
+    parser.add_argument("--start", default="2020-02-01", help="the daemon's first day of plant time, UTC")
     parser.add_argument("--seed", type=int, default=1, help="of weather, plant, disturbances and noise")
     parser.add_argument("--weather", type=Path, help="telemetry file or data set with measured weather")
     options = parser.parse_args()
@@ -142,42 +160,45 @@ def main() -> int:
 
 def run(demo: Demo) -> None:
     """The story, step by step."""
-    out, days_before = demo.out, 7 * WEEKS_BEFORE
-    days = days_before + SHADOW_DAYS + DAYS_AFTER
+    days = WELL_DAYS + BROKEN_DAYS + SHADOW_DAYS + DAYS_AFTER
+    broken = f"{demo.effect}@{demo.day(WELL_DAYS)}"
     prepare(demo)
-    plant = ["--site", "site.yaml", "--seed", str(demo.seed), "--spread", "0.08", "--start", demo.start]
-    plant += ["--weather", str(demo.weather)] if demo.weather else []
-    generate = ["igrow-trainer", "generate", *plant]
-    demo.say(f"a virtual greenhouse with {demo.effect}, of which no model knows; the daemon takes over")
+    generate = ["igrow-trainer", "generate", *demo.plant]
+    # What the greenhouse beside it does needs no daemon; it is simulated meanwhile, without getting in its way.
+    nothing = demo.spawn(
+        "nothing",
+        [*generate, "--start", demo.start, "--days", str(WELL_DAYS + BROKEN_DAYS), "--out", "nothing"],
+    )
+    recipe = demo.spawn(
+        "recipe", [*generate, "--start", demo.start, "--days", str(days), "--effect", broken, "--out", "recipe"]
+    )
+    for process in (nothing, recipe):
+        os.setpriority(os.PRIO_PROCESS, process.pid, 15)
+
+    demo.say(f"the daemon takes over; on day {WELL_DAYS} something breaks that no model knows: {demo.effect}")
     demo.spawn(
         "virtual-plc",
-        ["igrow-edge", "simulate-plc", *plant, "--map", "register-map.yaml", "--pace", "lockstep",
-         "--days", str(days + 3), "--effect", demo.effect],
+        ["igrow-edge", "simulate-plc", *demo.plant, "--start", demo.start, "--map", "register-map.yaml",
+         "--pace", "lockstep", "--days", str(days + 3), "--effect", broken],
     )  # fmt: skip
     wait_for_port(demo)
     daemon = demo.spawn("daemon", ["igrow-edge", "run", "daemon.yaml"])
-    # What the two greenhouses beside it do needs no daemon; they are simulated meanwhile, without getting in its way.
-    beside = {
-        "recipe": demo.spawn("recipe", [*generate, "--days", str(days), "--effect", demo.effect, "--out", "recipe"]),
-        "nothing": demo.spawn("nothing", [*generate, "--days", str(days_before), "--out", "nothing"]),
-    }
-    for process in beside.values():
-        os.setpriority(os.PRIO_PROCESS, process.pid, 15)
     collect = ["igrow-trainer", "collect", "demo", "--exchange", "exchange", "--state", "trainer"]
-    demo.wait_for_day(days_before, "controlled over Modbus with the first bundle")
+    demo.wait_for_day(WELL_DAYS, "all is well")
+    demo.wait_for_day(WELL_DAYS + BROKEN_DAYS, "and then it is not")
 
     # In lock step the plant's time stands still while the daemon does: the trainer's minutes cost no plant time.
     daemon.send_signal(signal.SIGSTOP)
     demo.run("collect", collect)
     verdict = demo.run(
         "diagnose",
-        ["igrow-trainer", "diagnose", LOG, "--bundle", "first-bundle", "--site", "site.yaml",
-         "--out", "diagnosis"],
-        (NOTHING, NAMED, 11, 12, 13),
+        ["igrow-trainer", "diagnose", LOG, "--bundle", "first-bundle", "--site", "site.yaml", "--out", "diagnosis",
+         "--truth", broken],
+        VERDICTS,
     )  # fmt: skip
-    demo.say(one_line((out / "diagnose.log").read_text()))
-    if verdict in (NOTHING, 13):
-        raise DemoError(f"the undeclared effect was not found; see {out / 'diagnosis'}")
+    demo.say(one_line((demo.out / "diagnose.log").read_text()))
+    if verdict in (NOTHING, DATA_FAULT):
+        raise DemoError(f"the undeclared effect was not found; see {demo.out / 'diagnosis'}")
     demo.run("publish", ["igrow-trainer", "publish", "diagnosis/bundle", "--keys", "keys", "--exchange", "exchange"])
     daemon.send_signal(signal.SIGCONT)
     demo.wait_for_day(days, "shadow run, adoption, control with the corrected bundle")
@@ -186,24 +207,24 @@ def run(demo: Demo) -> None:
         demo.finish(name, demo.running[name])
 
     demo.run("collect", collect)
-    for name, process in beside.items():
-        demo.finish(name, process)
-    demo.say("a second greenhouse, with nothing missing")
-    nothing = demo.run(
+    demo.finish("nothing", nothing)
+    demo.finish("recipe", recipe)
+    demo.say("the same greenhouse, had nothing broken")
+    silence = demo.run(
         "nothing-diagnose",
         ["igrow-trainer", "diagnose", "nothing", "--bundle", "first-bundle", "--site", "site.yaml",
          "--out", "nothing-diagnosis"],
-        (NOTHING, NAMED, 11, 12, 13),
+        VERDICTS,
     )  # fmt: skip
-    demo.say(one_line((out / "nothing-diagnose.log").read_text()))
+    demo.say(one_line((demo.out / "nothing-diagnose.log").read_text()))
     print()
-    print(summarise(out, demo.effect, days_before))
-    if nothing != NOTHING:
+    print(summarise(demo.out, demo.effect, Days(WELL_DAYS, WELL_DAYS + BROKEN_DAYS)))
+    if silence != NOTHING:
         raise DemoError("something was found in the greenhouse in which nothing is missing")
 
 
 def prepare(demo: Demo) -> None:
-    """Lay out the folders, make the keys, and export the first bundle for the site."""
+    """Lay out the folders, make the keys, and calibrate the first bundle on the greenhouse's own weeks."""
     out = demo.out
     shutil.copy(HERE / "site.yaml", out)
     shutil.copy(HERE / "daemon.yaml", out)
@@ -211,11 +232,12 @@ def prepare(demo: Demo) -> None:
     (out / "register-map.yaml").write_text(template.replace("port: 5020", f"port: {free_port()}"))
     demo.run("keys", ["igrow-trainer", "keys", "create", "keys"])
     shutil.copy(out / "keys/1.root.json", out / "root.json")
-    # The demo's greenhouse is the one that the built-in bundle was calibrated on.
     demo.run(
-        "export",
-        ["igrow-trainer", "export", "--site", "site.yaml", "--same-greenhouse", "--out", "first-bundle"],
-    )
+        "before",
+        ["igrow-trainer", "generate", *demo.plant, "--start", demo.day(-7 * WEEKS_BEFORE), "--days",
+         str(7 * WEEKS_BEFORE), "--out", "before"],
+    )  # fmt: skip
+    demo.run("calibrate", ["igrow-trainer", "calibrate", "before", "--site", "site.yaml", "--out", "first-bundle"])
 
 
 def free_port() -> int:

@@ -12,6 +12,8 @@ COMMANDS = {
     "probe": ("igrow.edge.cli.probe", "show what a Modbus device answers, raw and decoded in every way"),
     "simulate-plc": ("igrow.edge.cli.simulate_plc", "serve a simulated greenhouse over Modbus"),
     "status": ("igrow.edge.cli.status", "show what the daemon does, and why"),
+    "page": ("igrow.edge.cli.page", "serve the grower's page"),
+    "password": ("igrow.edge.cli.password", "set the password of the page, so that one can act from there"),
     "plan": ("igrow.edge.cli.plan", "compute one plan now, from the bundle in force and the log, and print it"),
     "override": ("igrow.edge.cli.override", "set a setpoint by hand for some time, or give it back"),
     "alarms": ("igrow.edge.cli.alarms", "list the alarms, or say that you know of them"),

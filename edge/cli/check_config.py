@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import ipaddress
 from collections.abc import Iterator
 
 from igrow.core.bundle import Bundle, read_bundle
 from igrow.edge.cli.common import add_configuration, configuration_of
 from igrow.edge.configuration import STATUS_PORT, ClockSource, Configuration
+from igrow.edge.page.settings import PAGE_PORT, PageSettings
 from igrow.edge.registers.bus_load import estimate
 from igrow.edge.registers.model import SYSTEM_POINTS
 
@@ -35,6 +37,19 @@ def _planning(configuration: Configuration) -> str:
         return "waits for a bundle from the trainer; until then the recipe rules (bundle: null)"
     bundle: Bundle = read_bundle(folder)
     return f"on; first bundle: {bundle.label}, made for {bundle.manifest.site} ({folder})"
+
+
+def _page(page: PageSettings) -> Iterator[str]:
+    """Yield where the grower's page is, and what that asks for."""
+    alone = ipaddress.ip_address(page.address).is_loopback
+    yield f"page        port {page.port} of {'this machine alone' if alone else page.address} (igrow-edge page)"
+    if page.port != PAGE_PORT:
+        yield (
+            f"  note      page.port is {page.port}: the systemd unit allows {PAGE_PORT} only; "
+            "see docs/installation.md for the drop-in"
+        )
+    if not alone:
+        yield "  note      passwords pass this network as they are typed; docs/page.md says how to encrypt them"
 
 
 def describe(configuration: Configuration) -> Iterator[str]:
@@ -77,6 +92,7 @@ def describe(configuration: Configuration) -> Iterator[str]:
             f"  note      status.port is {file.status.port}: the systemd unit allows {STATUS_PORT} only; "
             "see docs/installation.md for the drop-in"
         )
+    yield from _page(file.page)
     exchange = configuration.exchange
     yield f"state       {configuration.state_folder}; exchange: {exchange if exchange else 'none'}"
     yield f"planning    {_planning(configuration)}"

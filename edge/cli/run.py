@@ -4,59 +4,22 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-import contextlib
 import faulthandler
 import logging
 import os
-import sys
 
 from igrow.core.errors import IgrowError
 from igrow.edge.cli.common import add_configuration
+from igrow.edge.cli.log_lines import set_up_logging
 from igrow.edge.daemon import run_daemon
-from igrow.edge.hand_off import HandOff, LateError
 
 EXAMPLE = "igrow-edge run /etc/igrow/daemon.yaml"
-
-JOURNAL_SECONDS = 1.0
-_JOURNAL_PRIORITY = {logging.DEBUG: 7, logging.INFO: 6, logging.WARNING: 4, logging.ERROR: 3, logging.CRITICAL: 2}
-
-
-class _JournalFormatter(logging.Formatter):
-    """Begins each line with its priority, as journald reads it (sd-daemon(3)); journald adds the time itself."""
-
-    def format(self, record: logging.LogRecord) -> str:
-        priority = _JOURNAL_PRIORITY.get(record.levelno, 6)
-        return "\n".join(f"<{priority}>{line}" for line in super().format(record).splitlines())
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
     add_configuration(parser)
     parser.add_argument("--verbose", action="store_true", help="log what goes on in more detail")
-
-
-class JournalHandler(logging.Handler):
-    """Writes lines aside: a journal or a terminal that reads no more must not hold whoever has something to say."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._aside = HandOff("journal")
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Hand a line over; one that does not fit behind those that wait is lost."""
-        line = self.format(record) + "\n"
-        with contextlib.suppress(LateError):
-            self._aside.post(lambda: self._write(line))
-
-    def close(self) -> None:
-        """Let what waits be written, within a second."""
-        self._aside.close(JOURNAL_SECONDS)
-        super().close()
-
-    @staticmethod
-    def _write(line: str) -> None:
-        sys.stderr.write(line)
-        sys.stderr.flush()
 
 
 def run(options: argparse.Namespace) -> int:
@@ -74,17 +37,3 @@ def run(options: argparse.Namespace) -> int:
         code = 1
     journal.close()
     os._exit(code)
-
-
-def set_up_logging(*, verbose: bool) -> JournalHandler:
-    """Log to standard error: for journald when it listens, else with the time for a person."""
-    handler = JournalHandler()
-    if os.environ.get("JOURNAL_STREAM"):
-        handler.setFormatter(_JournalFormatter("%(message)s"))
-    else:
-        handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s", "%H:%M:%S"))
-    logging.basicConfig(level=logging.DEBUG if verbose else logging.INFO, handlers=[handler], force=True)
-    logging.captureWarnings(True)
-    # The library repeats at ERROR what our bus reports better.
-    logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
-    return handler

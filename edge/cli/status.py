@@ -12,8 +12,7 @@ from typing import Any
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import QUANTITIES
 from igrow.edge.cli.common import add_configuration, configuration_of
-from igrow.edge.status.client import fetch, last_state
-from igrow.edge.wiring import STATUS_FILE
+from igrow.edge.status.client import STATUS_FILE, fetch, last_state
 
 EXAMPLE = "igrow-edge status /etc/igrow/daemon.yaml"
 
@@ -21,7 +20,7 @@ EXAMPLE = "igrow-edge status /etc/igrow/daemon.yaml"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
     add_configuration(parser)
-    parser.add_argument("--port", type=int, help="the status page's port (default: the configuration's)")
+    parser.add_argument("--port", type=int, help="the status port (default: the configuration's)")
     parser.add_argument("--json", action="store_true", help="print everything, for programs")
 
 

@@ -19,6 +19,7 @@ from igrow.core.planner.onnx_generation import OnnxGeneration
 from igrow.core.planner.recent_use import (
     SCALED,
     Corrected,
+    co2_since_planting,
     factors,
     grown_days,
     growth_of_days,
@@ -211,17 +212,6 @@ def recently(simulator: Simulator, balance: GrowthBalance | None, site: Site, lo
     )
     growth = None if balance is None else growth_of_days(balance, site.crop, driven, grown)
     return Corrected(simulator, factor, balance, growth, warmer(*np.array(warmth, dtype=np.float64).reshape(-1, 2).T))
-
-
-def co2_since_planting(site: Site, log: Telemetry, start: int) -> float:
-    """Return how much CO2 the crop has probably had, kg m-2, which decides on the price of the next kilogram.
-
-    The log reaches back some days only; the days before it since planting count as those that it holds.
-    """
-    dosing = log.columns.get("co2_dosing", np.empty(0))
-    known = dosing[np.isfinite(dosing)]
-    days = (np.datetime64(start, "s") - np.datetime64(site.crop.planting_date)) / np.timedelta64(1, "D")
-    return float(known.mean() * 24.0 * max(days, 0.0)) if len(known) else 0.0
 
 
 def hourly_recipe(site: Site, request: PlanRequest, hours: int) -> NDArray[np.float64]:

@@ -11,6 +11,8 @@ from typing import Any
 from igrow.core.errors import IgrowError
 from igrow.edge.state_file import read_state
 
+STATUS_FILE = "status.json"
+"""In the state folder."""
 TIMEOUT = 5.0
 _MOST_BYTES = 16 * 2**20
 
@@ -24,6 +26,12 @@ def fetch(port: int) -> dict[str, Any]:
         raise IgrowError(f"the daemon on port {port} says: {error.read().decode().strip()}") from None
     except (OSError, ValueError):
         raise IgrowError(f"no daemon answers on port {port} of this machine; is igrow-edge running?") from None
+
+
+def last_port(path: Path) -> int:
+    """Return the port that a daemon has left in its file; 0, which nobody answers on, without one."""
+    port = read_state(path).get("port")
+    return port if isinstance(port, int) else 0
 
 
 def last_state(path: Path) -> dict[str, Any] | None:

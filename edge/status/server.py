@@ -1,4 +1,4 @@
-"""A small HTTP server for four read-only pages; implements `igrow.edge.ports.StatusService`."""
+"""A small HTTP server for what programs ask, read-only; implements `igrow.edge.ports.StatusService`."""
 
 from __future__ import annotations
 
@@ -10,15 +10,12 @@ import logging
 import math
 import time
 from collections.abc import Callable
-from datetime import UTC, tzinfo
 from enum import Enum
 from pathlib import Path
 
 from igrow.edge.hand_off import HandOff, LateError
 from igrow.edge.ports import Snapshot
-from igrow.edge.status.history import History
 from igrow.edge.status.metrics import render_metrics
-from igrow.edge.status.page import render_page
 
 _log = logging.getLogger("igrow.edge.status")
 CONNECTIONS = 16
@@ -31,6 +28,9 @@ STATE_FILE_SECONDS = 10.0
 OWN_NAMES = ("localhost", "127.0.0.1", "[::1]")
 """What a visitor of this very machine calls it. A page of another site that had its own name point here (DNS rebinding)
 would say that name."""
+WHERE = """For programs: /health, /metrics and /state.json.
+For people: the grower's page, http://localhost:8421 (igrow-edge page; docs/page.md).
+"""
 CLOSE_SECONDS = 1.0
 """How long the stop waits for the last state to be left."""
 
@@ -43,7 +43,6 @@ class StatusServer:
         port: int,
         state_file: Path | None = None,
         *,
-        zone: tzinfo = UTC,
         late_after: float = 60.0,
         wall: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -52,7 +51,6 @@ class StatusServer:
         Args:
             port: TCP port on localhost; 0 takes a free one.
             state_file: where the state is left too, for when nobody can ask the port; None leaves it nowhere.
-            zone: time zone of the times on the page.
             late_after: seconds (on `wall`) without a completed cycle after which health is lost.
             wall: monotonic clock in seconds.
         """
@@ -60,14 +58,12 @@ class StatusServer:
         """The port that is listened to; 0 becomes the one that the system chose."""
         self._unreachable = ""
         self._unwritten = ""
-        self._zone = zone
         self._state_file = state_file
         self._written_at = -math.inf
         self._late_after = late_after
         self._wall = wall
         self._published_at = -math.inf
         self._snapshot: Snapshot | None = None
-        self._history = History()
         self._server: asyncio.Server | None = None
         self._visits: set[asyncio.Task[None]] = set()
         self._aside = HandOff("status file")
@@ -91,7 +87,6 @@ class StatusServer:
         """Take the newest snapshot. Never blocks; rendering happens when somebody asks."""
         self._snapshot = snapshot
         self._published_at = self._wall()
-        self._history.add(snapshot)
         if self._state_file is not None and self._published_at - self._written_at >= STATE_FILE_SECONDS:
             self._written_at = self._published_at
             self._leave_state()
@@ -171,13 +166,13 @@ class StatusServer:
             return ("200 OK" if healthy else "503 Service Unavailable"), "application/json", body
         if path not in {"/", "/metrics", "/state.json"}:
             return "404 Not Found", "text/plain", "there are /, /health, /metrics and /state.json\n"
+        if path == "/":
+            return "200 OK", "text/plain", WHERE
         if snapshot is None:
             return "503 Service Unavailable", "text/plain", "no cycle has been completed yet\n"
         if path == "/metrics":
             return "200 OK", "text/plain; version=0.0.4", render_metrics(snapshot)
-        if path == "/state.json":
-            return "200 OK", "application/json", json.dumps(plain(snapshot)) + "\n"
-        return "200 OK", "text/html", render_page(snapshot, self._history, self._zone, late=late)
+        return "200 OK", "application/json", json.dumps(plain(snapshot)) + "\n"
 
     def _health(self, healthy: bool, late: bool) -> dict[str, object]:
         snapshot = self._snapshot

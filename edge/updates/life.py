@@ -202,6 +202,8 @@ class BundleLife:
             return  # a site without a sensor that the simulator needs has no live error
         if errors:
             with self._bundles.lock:
+                if state.judged != active.identity:
+                    state.judged, state.judged_since = active.identity, time
                 state.live_errors = [*state.live_errors, (time, errors)][-KEPT_ERRORS:]
 
     def _compare(self, candidate: Bundle, reference: Bundle | None, since: float, time: float) -> Comparison:

@@ -18,6 +18,7 @@ from igrow.edge.updates.shadow import Predictor
 from igrow.edge.updates.shelf import Shelf
 from igrow.edge.updates.signed_source import SignedSource, UpdateError
 from igrow.edge.updates.telling import Teller
+from igrow.edge.updates.worsening import Worsening, find_worsening, worsening_sentence
 
 LATE_AFTER = 1800.0
 """Seconds after which the thread counts as held by a share: longer than the longest comparison."""
@@ -56,6 +57,8 @@ class BundleUpdates:
         self._bundles = Bundles(folder / "state.json", shelf, graphs, self._teller)
         self._life = BundleLife(site, self._bundles, source, graphs, predictor, store.folder, self._teller, self._rules)
         self._aside = HandOff("updates", late_after=LATE_AFTER)
+        self._looked_at: tuple[str, float] | None = None
+        self._found: tuple[Worsening, ...] = ()
         self._begun = False
         self._begin_again = 0.0
         self._task: Future[None] | None = self._aside.post(self._begin)
@@ -119,10 +122,29 @@ class BundleUpdates:
                 else state.watch_since + HOUR * self._rules.watch_hours,
                 "live_errors": dict(state.live_errors[-1][1]) if state.live_errors else {},
                 "live_error_history": [[time, errors] for time, errors in state.live_errors],
+                "worse_since": worsening[0].since if (worsening := self._worsening()) else None,
                 "rejected": dict(state.rejected),
                 "last_verdict": state.last_verdict,
                 "refusal": self._life.last_refusal,
             }
+
+    @property
+    def worsening(self) -> str:
+        """One line where the bundle in force predicts worse than it did, else empty."""
+        with self._bundles.lock:
+            found = self._worsening()
+        return "" if not found else worsening_sentence(found)
+
+    def _worsening(self) -> tuple[Worsening, ...]:
+        state = self._bundles.state
+        if state.judged is None or state.judged != state.active or not state.live_errors:
+            return ()
+        newest = state.judged, state.live_errors[-1][0]
+        if self._looked_at != newest:  # each cycle asks, a new error comes every few hours
+            since = state.judged_since
+            self._found = find_worsening([entry for entry in state.live_errors if entry[0] >= since])
+            self._looked_at = newest
+        return self._found
 
     def close(self) -> None:
         """Stop; the process for graphs has been ended, and a thread that hangs is left behind."""

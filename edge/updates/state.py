@@ -30,12 +30,17 @@ class UpdateState:
     last_verdict: str = ""
     live_errors: list[tuple[float, dict[str, float]]] = field(default_factory=list)
     """Time and live errors of the bundle then in force, oldest first."""
+    judged: str | None = None
+    """The bundle that the newest live errors are of."""
+    judged_since: float = 0.0
+    """When its first live errors were computed."""
 
     def keep_up(self, time: float) -> None:
         """Let nothing lie ahead of `time`: a clock that was ahead has been set right, and what it dated begins now."""
         self.candidate_since = min(self.candidate_since, time)
         if self.watch_since is not None:
             self.watch_since = min(self.watch_since, time)
+        self.judged_since = min(self.judged_since, time)
         if self.live_errors and self.live_errors[-1][0] > time:
             self.live_errors = [entry for entry in self.live_errors if entry[0] <= time]
 

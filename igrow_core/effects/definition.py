@@ -97,7 +97,7 @@ class Effect:
     signature: str
     """How its trace differs from that of others."""
     separating_test: str
-    """The cheapest safe test that would tell it from its rivals."""
+    """The cheapest safe test that would tell it from those it is confounded with."""
     sentence: str
     """For the grower; `{value}` and `{unit}` stand for the amplitude."""
     source: str

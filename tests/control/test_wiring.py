@@ -1,30 +1,12 @@
 """The parts get what the configuration says."""
 
-import asyncio
 import json
 import socket
-import urllib.request
 
 from igrow.edge.configuration import load_configuration
 from igrow.edge.status import StatusServer
 from igrow.edge.wiring import open_services
 from tests.control.daemon_bench import Plant, free_port, running, until, write_files
-
-
-async def test_the_page_shows_the_time_of_the_site(tmp_path):
-    port = free_port()
-    path = write_files(tmp_path, port)
-    site = tmp_path / "site.yaml"
-    site.write_text(site.read_text() + "time_zone: Pacific/Auckland\n")
-    plant = Plant(tmp_path, port, start="2026-03-01T00:00:00")
-    await plant.up()
-    async with running(path) as daemon:
-        await until(lambda: daemon.cycles >= 2)
-        url = f"http://127.0.0.1:{daemon.services.status.port}/"
-        page = await asyncio.to_thread(lambda: urllib.request.urlopen(url, timeout=10).read().decode())
-    await plant.down()
-    # 13 h ahead of UTC, in summer
-    assert "Sunday 01 March 2026, 1" in page
 
 
 async def test_a_status_port_that_is_taken_is_told_where_the_state_is_left(tmp_path):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -160,3 +162,11 @@ def test_a_model_that_runs_out_of_all_bounds_says_so(line: Linearisation) -> Non
     absurd = {"lamp_heat": {"share": 1e300}}
     with pytest.raises(DivergenceError, match="lamp_heat runs out of all bounds"):
         sensitivity.linearise(line.record, line.runs, line.parameters, absurd)
+
+
+def test_a_pipe_sensor_can_be_off_in_a_house_without_a_grow_pipe(record: Record) -> None:
+    offset = EFFECTS["pipe_temperature_offset"]
+    one = replace(record, missing=(*record.missing, "grow_pipe_temperature"))
+    none = replace(one, missing=(*one.missing, "rail_pipe_temperature"))
+    assert sensitivity.is_measured(one, offset)
+    assert not sensitivity.is_measured(none, offset)

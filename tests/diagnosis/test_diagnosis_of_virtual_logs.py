@@ -71,14 +71,14 @@ def test_the_same_log_and_seed_give_the_same_answer(leak: Diagnosis, leaky_log: 
 
 def test_the_document_has_the_fields_that_are_promised(leak: Diagnosis) -> None:
     document = json.loads(json.dumps(leak.to_json(), allow_nan=False))
-    assert set(document) == {"verdict", "span", "findings", "errors", "screened"}
+    assert set(document) == {"verdict", "span", "findings", "errors", "worsened", "missing", "screened"}
     assert set(document["span"]) == {"start", "end", "fit_days", "held_out_days"}
     finding = document["findings"][0]
     assert set(finding) == {
-        "effect", "kind", "balances", "parameters", "onset", "p_value", "rivals", "drivers", "separating_test",
+        "effect", "kind", "balances", "parameters", "onset", "p_value", "confounded", "drivers", "separating_test",
     }  # fmt: skip
     assert set(finding["parameters"]["air_changes"]) == {"value", "low", "high", "unit"}
-    assert finding["effect"] in finding["rivals"]
+    assert finding["effect"] in finding["confounded"]
     for horizons in document["errors"].values():
         assert set(horizons) <= {"1_step", "24_h", "7_d"}
         assert set(horizons["24_h"]) == {"deployed", "recalibrated", "corrected", "unit"}
@@ -154,14 +154,6 @@ def test_a_log_without_humidity_and_co2_is_diagnosed_on_what_it_has(quiet_log: L
     assert "co2_offset" in result.untestable
 
 
-def test_lamps_whose_power_the_log_lacks_are_traced_to_their_switch(quiet_log: Log) -> None:
-    result = diagnose(quiet_log.without("lamp_power"), model_in_force())
-    assert result.verdict == "unexplained"
-    assert "lamp_on" in result.findings[-1].drivers
-    day = result.errors["air_temperature"]["24_h"]
-    assert day["corrected"] < 0.7 * day["recalibrated"]
-
-
 def test_co2_is_left_out_where_its_dose_is_not_known(quiet_log: Log) -> None:
     undosed = replace(SITE, greenhouse=replace(SITE.greenhouse, co2_dosing_capacity=0.0))
     for site, quantities in (
@@ -209,3 +201,12 @@ def test_a_log_without_outdoor_temperature_is_refused(quiet_log: Log) -> None:
 def test_an_unknown_effect_to_leave_out_is_refused_with_the_known_ones(quiet_log: Log) -> None:
     with pytest.raises(IgrowError, match="no effect is called 'wind'"):
         diagnose(quiet_log, model_in_force(), without=["wind"])
+
+
+def test_a_correction_that_makes_a_quantity_worse_says_so(leak: Diagnosis) -> None:
+    assert leak.worsened == ()
+    day = {"deployed": 0.4, "recalibrated": 0.301, "corrected": 0.336}
+    worse = replace(leak, errors={**leak.errors, "air_temperature": {"24_h": day}})
+    assert len(worse.worsened) == 1
+    assert "air temperature gets worse by it: 0.3 to 0.34 K" in worse.summary()
+    assert worse.to_json()["worsened"] == list(worse.worsened)

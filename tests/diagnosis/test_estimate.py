@@ -56,10 +56,10 @@ def test_plain_intervals_hold_the_truth_as_often_as_they_say() -> None:
 def test_a_cause_that_looks_the_same_is_confounded_with_it_and_one_that_does_not_is_not() -> None:
     leaks = tuple(Candidate(name, ()) for name in ("co2_valve_leak", "soil_respiration", "lamp_heat"))
     design = make_design(Truth({"co2_valve_leak": 0.3}, {}), candidates=leaks)
-    assert estimated(design).rivals == ("co2_valve_leak",)
+    assert estimated(design).confounded == ("co2_valve_leak",)
     (column,) = design.columns("effect:co2_valve_leak")
     twins = with_column(design, "effect:soil_respiration", design.values[column])
-    assert set(estimated(twins).rivals) == {"co2_valve_leak", "soil_respiration"}
+    assert set(estimated(twins).confounded) == {"co2_valve_leak", "soil_respiration"}
 
 
 def test_the_interval_of_a_beginning_holds_it() -> None:

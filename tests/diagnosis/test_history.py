@@ -10,6 +10,7 @@ from igrow.core.effects import EFFECTS
 from igrow.trainer.diagnosis import history, linear, search
 from igrow.trainer.diagnosis.change import changed, net_gain, proven_gain
 from igrow.trainer.diagnosis.design import Design, History
+from igrow.trainer.diagnosis.drift import Drift
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
@@ -17,13 +18,15 @@ from tests.diagnosis.synthetic_design import BALANCES, PLAIN, Truth, make_design
 
 RNG_SEED = 3
 PATTERN = "heat:cold weather"
+BARE = Drift({}, 42.0)
+"""Nothing was learned."""
 
 
 def with_history(design: Design, deviation: float = 0.3, **own: float) -> Design:
     """The design with a history that expects nothing, give or take a deviation of every amplitude."""
     names = history.keys(design)
     prior = Gaussian(names, np.zeros(len(names)), deviation**2 * np.eye(len(names)))
-    known = History(prior, np.zeros_like(design.values[0]), (PLAIN,) * BALANCES, own)
+    known = History(prior, np.zeros_like(design.values[0]), (PLAIN,) * BALANCES, own, drift=BARE)
     _, solved = history.solve_jointly(replace(design, history=known))
     return solved
 
@@ -56,12 +59,17 @@ def test_what_drifts_is_added_to_what_is_not_known() -> None:
     rng = np.random.default_rng(0)
     root = rng.normal(size=(len(names),) * 2)
     known = Discrepancy(
-        dict.fromkeys(design.prior.names, 1.0), Gaussian(names, np.zeros(len(names)), root @ root.T), {}, 3600.0, {}
+        dict.fromkeys(design.prior.names, 1.0),
+        Gaussian(names, np.zeros(len(names)), root @ root.T),
+        {},
+        3600.0,
+        {},
+        design.line.record.time[0],
     )
-    now = history.drifted(known, design).covariance
-    drift = history.drift_of(design)
+    drift = history.drift_within(design)
+    now = history.drifted(known, design, Drift({}, 365.0)).covariance
     np.testing.assert_allclose(now[:-1, :-1], root @ root.T + np.diag(drift[:-1] ** 2))
-    # The pattern is new in this log: it is as doubtful as before any log.
+    # The pattern is new in this log: its prior is that of before any log.
     assert np.isclose(now[-1, -1], DEFAULT.omission_pattern**2 + DEFAULT.pattern_drift**2)
     walls, crop = 2.0 * DEFAULT.wall_drift, 2.0 * DEFAULT.crop_drift
     typical = EFFECTS["lamp_heat"].amplitude.typical
@@ -123,5 +131,5 @@ def test_a_change_that_comes_and_goes_from_day_to_day_is_not_proven() -> None:
     null = linear.fit(fickle.grams, fickle.null_model())
     scored = search.score_candidates(fickle, null, [None], np.random.default_rng(0))
     (found,) = [one for one in scored if one.effect == "lamp_heat"]
-    assert net_gain(fickle, found) > DEFAULT.least_change_gain > proven_gain(fickle, found)
+    assert net_gain(fickle, found) > BARE.least_gain > proven_gain(fickle, found)
     assert changed(fickle, 0.0, np.random.default_rng(RNG_SEED)).cause is None

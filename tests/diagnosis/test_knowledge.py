@@ -49,10 +49,10 @@ def test_of_a_transferred_model_less_is_known_and_its_correlations_stay() -> Non
     model = model_in_force()
     covariance = model.posterior.covariance.copy()
     covariance[0, 1] = covariance[1, 0] = 0.9 * np.sqrt(covariance[0, 0] * covariance[1, 1])
-    elsewhere = replace(
+    transferred = replace(
         model, posterior=replace(model.posterior, covariance=covariance), calibrated_on="there", discrepancy={"x": 1.0}
     )
-    known = knowledge_of(elsewhere, SITE, DEFAULT)
+    known = knowledge_of(transferred, SITE, DEFAULT)
     change = drift(model.posterior.values, DEFAULT.transferred_drift, DEFAULT)
     exact = np.sqrt(knowledge_of(model, SITE, DEFAULT).prior.standard_deviation ** 2 + change**2)
     np.testing.assert_allclose(known.prior.standard_deviation, exact)

@@ -20,12 +20,12 @@ from igrow.trainer.diagnosis.search import Hypothesis
 BEGAN = np.datetime64("2020-03-14T06:00:00", "s")
 
 
-def leak(rivals: tuple[str, ...] = ("wind_infiltration",)) -> Estimated:
+def leak(confounded: tuple[str, ...] = ("wind_infiltration",)) -> Estimated:
     cause = Hypothesis(Candidate("wind_infiltration", ()), Term(0), 40.0, 0.118, 5.0, 0.001)
     shapes = {"exponent": Interval(1.1, 0.9, 1.3, "1")}
     size = Interval(0.118, 0.08, 0.15, "h-1 (m s-1)-1")
     term = ActiveTerm("wind_infiltration", 0.118, {"exponent": 1.1})
-    return Estimated(cause, term, size, 40.0, None, rivals, shapes=shapes)
+    return Estimated(cause, term, size, 40.0, None, confounded, shapes=shapes)
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,7 @@ def test_a_discrepancy_is_told_by_its_hours_weather_and_channels() -> None:
     cold = Hypothesis(Pattern("heat", "cold weather", ("outdoor_temperature",)), Term(1), 50.0, 0.5, 10.0, 0.001)
     door = Hypothesis(Pattern("air_exchange", "07 to 16 h", ("hour", "weekday")), Term(2), 50.0, -2.0, 4.0, 0.003)
     found = wording.discrepancy([cold, door], DEFAULT)
-    assert (found.effect, found.kind, found.rivals) == ("discrepancy", "discrepancy", ("discrepancy",))
+    assert (found.effect, found.kind, found.confounded) == ("discrepancy", "discrepancy", ("discrepancy",))
     assert found.sentence == (
         "Something that the model does not know changes heat (more, cold weather); air exchange (less, 07 to 16 h)."
     )

@@ -17,17 +17,21 @@ from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
 from tests.virtual_log import SITE
 
+MIDDLE = np.datetime64("2020-01-15T12:00:00", "s")
+
 
 def known() -> Discrepancy:
     covariance = np.array([[4.0, 1.0], [1.0, 9.0]])
     amplitudes = Gaussian(("parameter:leakage_wind", "heat:cold weather"), np.array([0.5, -2.0]), covariance)
-    return Discrepancy({"leakage_wind": 0.06}, amplitudes, {0: (2.0, 4.5), 2: (1.0, 3.0)}, 900.0, {"lamp_heat": 7.5})
+    return Discrepancy(
+        {"leakage_wind": 0.06}, amplitudes, {0: (2.0, 4.5), 2: (1.0, 3.0)}, 900.0, {"lamp_heat": 7.5}, MIDDLE
+    )
 
 
 def test_what_is_written_is_read_back() -> None:
     read = Discrepancy.from_bytes(known().to_bytes(), where="discrepancy.npz")
-    assert (read.parameters, read.filters, read.step, read.own_gains) == (
-        known().parameters, known().filters, known().step, known().own_gains,
+    assert (read.parameters, read.filters, read.step, read.own_gains, read.middle) == (
+        known().parameters, known().filters, known().step, known().own_gains, MIDDLE,
     )  # fmt: skip
     assert read.amplitudes.names == known().amplitudes.names
     np.testing.assert_array_equal(read.amplitudes.mean, known().amplitudes.mean)
@@ -42,7 +46,7 @@ def test_a_damaged_file_is_named_in_one_line() -> None:
 
 def test_keys_and_covariance_must_be_of_one_size() -> None:
     wrong = Gaussian(("a",), np.zeros(2), np.eye(2))
-    content = Discrepancy({}, wrong, {}, 900.0, {}).to_bytes()
+    content = Discrepancy({}, wrong, {}, 900.0, {}, MIDDLE).to_bytes()
     with pytest.raises(IgrowError, match="1 keys, but"):
         Discrepancy.from_bytes(content, where="x")
 

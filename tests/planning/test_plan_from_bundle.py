@@ -15,11 +15,12 @@ import pytest
 
 from igrow.core.bundle import default_bundle_folder
 from igrow.core.planner import Budget, Outcome, PlanResult, optimise
+from igrow.core.planner.recent_use import co2_since_planting
 from igrow.core.quantities import SETPOINTS
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 from igrow.edge.cli.plan import reasons
-from igrow.edge.planning.make_plan import co2_since_planting, hourly_recipe, make_plan, present, recently
+from igrow.edge.planning.make_plan import hourly_recipe, make_plan, present, recently
 from igrow.edge.ports import PlanRequest
 
 START = 1_780_012_800

@@ -154,7 +154,7 @@ def test_a_site_scales_what_it_describes_and_stays_within_bounds() -> None:
 def test_a_log_without_leaf_area_gets_the_crops_usual_course_and_says_so() -> None:
     log = virtual_log(2)
     record = site_record(log, SITE, 300.0)
-    assert "leaf_area_index" in record.unknown
+    assert "leaf_area_index" in record.missing
     curve = leaf_area_curve(
         Site(name="young", latitude=0, longitude=0, crop=Crop(planting_date=np.datetime64("2020-02-01").item())),
         log.time,

@@ -1,21 +1,15 @@
-"""A greenhouse in spring, for tests and for looking at its page (`python -m tests.status.status_helpers FILE`)."""
+"""A snapshot of a greenhouse in spring."""
 
 from __future__ import annotations
 
 import dataclasses
-import sys
-from pathlib import Path
-from zoneinfo import ZoneInfo
 
 import numpy as np
 
 from igrow.edge.image import Quality, Value
 from igrow.edge.ports import AlarmRecord, Plan, SetpointStatus, Snapshot, WriteRecord
-from igrow.edge.status.history import History
-from igrow.edge.status.page import render_page
 
 NOW = 1_773_500_400.0
-ZONE = ZoneInfo("Europe/Amsterdam")
 
 
 def good(value: float) -> Value:
@@ -93,23 +87,3 @@ def snapshot(**changes: object) -> Snapshot:
         writes_left={"heating_setpoint": 31},
     )
     return dataclasses.replace(made, **changes)
-
-
-def history() -> History:
-    kept = History()
-    for step in range(288):
-        time = NOW - 86400 + 300 * step
-        day = 2 * np.pi * (step - 72) / 288
-        values = {
-            "air_temperature": good(19.0 + 2.0 * np.sin(day) + 0.2 * np.sin(step)),
-            "air_humidity": good(80.0 - 6.0 * np.sin(day)),
-            "air_co2": good(700.0 + 100.0 * np.sin(day)),
-            "global_radiation": good(max(0.0, 500.0 * np.sin(day))),
-        }
-        setpoint = SetpointStatus(18.0, 18.0, 18.0 + 1.5 * (step > 140), "plan", "")
-        kept.add(snapshot(time=time, values=values, setpoints={"heating_setpoint": setpoint}))
-    return kept
-
-
-if __name__ == "__main__":
-    Path(sys.argv[1]).write_text(render_page(snapshot(), history(), ZONE, late=False))

@@ -1,17 +1,15 @@
-"""The page, the health endpoint and the metrics over a real socket."""
+"""State, health and metrics for programs, over a real socket."""
 
 from __future__ import annotations
 
 import asyncio
 import json
-from xml.etree import ElementTree
 
 import pytest
 
 from igrow.edge.ports import AlarmRecord
 from igrow.edge.status import StatusServer
-from igrow.edge.status.page import render_page
-from tests.status.status_helpers import NOW, ZONE, history, snapshot
+from tests.status.status_helpers import NOW, snapshot
 
 
 @pytest.fixture
@@ -38,7 +36,7 @@ async def get(server: StatusServer, path: str) -> tuple[int, str]:
 
 
 async def test_before_the_first_cycle_nothing_is_claimed(server: StatusServer) -> None:
-    assert (await get(server, "/"))[0] == 503
+    assert (await get(server, "/state.json"))[0] == 503
     status, body = await get(server, "/health")
     assert status == 503
     assert json.loads(body)["ok"] is False
@@ -60,50 +58,11 @@ async def test_health_follows_link_and_cycles() -> None:
     await server.close()
 
 
-async def test_the_page_says_who_controls_and_why(server: StatusServer) -> None:
+async def test_the_first_address_says_where_people_look(server: StatusServer) -> None:
     server.publish(snapshot())
     status, body = await get(server, "/")
     assert status == 200
-    for text in ("Hillside 3", "The plan controls", "every sensor it needs is good", "+0.038 €", "above the limit"):
-        assert text in body
-
-
-def test_the_page_is_well_formed_and_loads_nothing_from_elsewhere() -> None:
-    page = render_page(snapshot(), history(), ZONE, late=False)
-    body = page[page.index("<main>") : page.index("</main>") + 7]
-    ElementTree.fromstring(body)
-    for word in ("src=", "href=", "http://", "https://", "<script"):
-        assert word not in page
-
-
-def test_text_from_outside_cannot_become_markup() -> None:
-    evil = "<script>alert(1)</script>"
-    page = render_page(
-        snapshot(
-            site=evil,
-            why=evil,
-            alarms=(AlarmRecord(NOW, 1.0, evil, True, evil),),
-            problems=(evil,),
-            bundle={"name": evil, "effects": [evil], "candidate": evil, "last_verdict": evil, "refusal": evil},
-        ),
-        history(),
-        ZONE,
-        late=False,
-    )
-    assert "<script" not in page
-
-
-def test_a_page_with_nothing_to_show_is_still_a_page() -> None:
-    page = render_page(
-        snapshot(time=None, clock_ok=False, plan=None, values={}, setpoints={}, clamps=(), bundle={}, source="recipe"),
-        type(history())(),
-        ZONE,
-        late=True,
-    )
-    assert "no cycle lately" in page
-    assert "Your recipe controls" in page
-    assert "No bundle is installed" in page
-    assert "date cannot be trusted" in page
+    assert "http://localhost:8421" in body
 
 
 async def test_metrics_are_prometheus_text_with_one_type_for_each_name(server: StatusServer) -> None:
@@ -194,21 +153,6 @@ async def test_a_state_file_that_cannot_be_written_is_a_problem_and_no_reason_to
     server = StatusServer(0, tmp_path / "absent" / "status.json")
     server.publish(snapshot())
     assert "status.json" in server.health
-
-
-def test_the_history_is_a_day_of_points_five_minutes_apart() -> None:
-    kept = type(history())()
-    for second in range(0, 3 * 86400, 60):
-        kept.add(snapshot(time=NOW + second))
-    series = kept.series("air_temperature")
-    assert len(series) == 288
-    assert series[1][0] - series[0][0] == 300.0
-
-
-def test_a_clock_set_back_begins_a_new_history() -> None:
-    kept = history()
-    kept.add(snapshot(time=NOW - 1e6))
-    assert len(kept.series("air_temperature")) == 1
 
 
 @pytest.mark.parametrize(

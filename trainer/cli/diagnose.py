@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import json
 import shutil
 import sys
 from pathlib import Path
 
 from igrow.core.bundle import default_bundle_folder, read_bundle
+from igrow.core.greenhouse import HiddenEffect
+from igrow.core.greenhouse.described import parse_effect
 from igrow.trainer.cli.log_arguments import add_log_arguments, log_of
 from igrow.trainer.diagnosis import diagnose
+from igrow.trainer.diagnosis.evidence import errors_with
+from igrow.trainer.diagnosis.knowledge import ActiveTerm
 from igrow.trainer.exporting import export, read_model
 from igrow.trainer.fit import FittedModel
 from igrow.trainer.report import write_diagnosis
@@ -23,6 +28,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--bundle", type=Path, help="the bundle in force (default: the built-in one)")
     parser.add_argument("--out", type=Path, required=True, help="folder for diagnosis.json, report.html and the bundle")
     parser.add_argument("--without", action="append", default=[], metavar="EFFECT", help="an effect not to consider")
+    parser.add_argument(
+        "--truth",
+        action="append",
+        default=[],
+        metavar="NAME[=SIZE][@START]",
+        help="of a virtual greenhouse: what is hidden in it; the errors with that known go to truth.json",
+    )
     parser.add_argument("--seed", type=int, default=0, help="of random flips and bootstraps")
 
 
@@ -32,6 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
     Raises:
         IgrowError: a file cannot be read or the log cannot be diagnosed.
     """
+    truth = [parse_effect(text) for text in arguments.truth]
     log = log_of(arguments)
     bundle = read_bundle(arguments.bundle or default_bundle_folder())
     model = read_model(bundle, log.known_site)
@@ -39,9 +52,19 @@ def run(arguments: argparse.Namespace) -> int:
     write_diagnosis(arguments.out, result)
     if result.findings:
         replace_bundle(arguments.out / "bundle", result.corrected)
+    if truth and result.evidence is not None:
+        errors = errors_with(result.evidence, [known_term(one) for one in truth])
+        (arguments.out / "truth.json").write_text(json.dumps({"errors_24_h": errors}), encoding="utf-8")
     print(result.summary())
     print(f"written to {arguments.out}", file=sys.stderr)
     return result.exit_code
+
+
+def known_term(hidden: HiddenEffect) -> ActiveTerm:
+    """Return what is hidden in a virtual greenhouse as a term of the model, in the catalogue's form."""
+    effect = hidden.definition
+    size = effect.amplitude.typical if hidden.size is None else hidden.size
+    return ActiveTerm(hidden.name, size, {one.name: one.typical for one in effect.shapes}, hidden.start)
 
 
 def replace_bundle(folder: Path, model: FittedModel) -> None:

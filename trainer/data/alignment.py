@@ -37,7 +37,7 @@ def best_shift(telemetry: Telemetry, site: Site, parameters: Mapping[str, float]
     if len(record) < 100:
         return 0.0
     base = dict(record.inputs)
-    moving = [name for name in ACTUATORS if name not in record.unknown]
+    moving = [name for name in ACTUATORS if name not in record.missing]
     starts = np.flatnonzero(record.usable[:-1])
     scatter = []
     for shift in SHIFTS:

@@ -34,7 +34,7 @@ def grid_record(telemetry: Telemetry, site: Site, shift: float = 0.0) -> Record:
     fine = telemetry.step
     step = working_step(fine)
     record = site_record(telemetry, site, step)
-    if "co2_dosing" in record.unknown:
+    if "co2_dosing" in record.missing:
         telemetry = telemetry.with_columns({"air_co2": np.full(len(telemetry), np.nan)})
         record = replace(record, measured={**record.measured, "air_co2": np.full(len(record), np.nan)})
     if fine >= step:

@@ -1,4 +1,4 @@
-"""What may be missing: every effect of the catalogue at every shape worth trying, and patterns of outside drivers.
+"""What may be missing: every effect of the catalogue at every shape to be tried, and patterns of outside drivers.
 
 A cause without a name may hang on exogenous drivers only: clock, calendar, weather and schedules. Feedback control
 reveals disturbances, so that a learner who sees states or what the PLC controls by them (heat, vents, CO2) finds
@@ -176,19 +176,19 @@ def patterns(record: Record, longitude: float) -> list[tuple[str, tuple[str, ...
         text = f"cold weather, {first:02d} to {last:02d} h"
         table.append((text, ("outdoor_temperature", "hour"), cold * window(first, last)))
     for name, scale in (("wind_speed", 5.0), ("global_radiation", 300.0), ("rain", 1.0)):
-        if name not in record.unknown:
+        if name not in record.missing:
             weather: Floats = np.asarray(record.inputs[name], dtype=np.float64) / scale
             table.append((name.replace("_", " "), (name,), weather))
-    if "outdoor_humidity" not in record.unknown:
+    if "outdoor_humidity" not in record.missing:
         table.append(
             ("dry weather", ("outdoor_humidity",), (80.0 - np.asarray(record.inputs["outdoor_humidity"])) / 20.0)
         )
-    if "rain" not in record.unknown:
+    if "rain" not in record.missing:
         fallen = np.cumsum(np.asarray(record.inputs["rain"])) * record.step / 72_000.0
         table.append(("until rain has fallen", ("rain",), np.exp(-fallen)))
     # Lamps and irrigation follow the clock and the light, not the climate that they are to be blamed for.
     for name, usual in (("lamp_power", 80.0), ("irrigation", 1.0)):
-        driver, scale = (SWITCHES[name], 1.0) if name in record.unknown else (name, usual)
+        driver, scale = (SWITCHES[name], 1.0) if name in record.missing else (name, usual)
         if np.any(record.inputs.get(driver, 0.0)):
             running: Floats = np.asarray(record.inputs[driver], dtype=np.float64) / scale
             text = driver.replace("_", " ")
@@ -238,7 +238,7 @@ def _is_blind(line: Linearisation, effect: Effect) -> bool:
     An actuator that is not logged counts as equipment that is not there: its effects show nothing. The leaf area is
     estimated where it is not measured, which does for all effects but the one that is about it.
     """
-    lacking = set(effect.drivers) & set(line.record.unknown)
+    lacking = set(effect.drivers) & set(line.record.missing)
     return bool(lacking & set(WEATHER)) or (effect.drivers[0] == "leaf_area_index" and bool(lacking))
 
 

@@ -209,7 +209,7 @@ def corrected_model(
         discrepancy: of the calibration, which goes on.
         span: of the log.
     """
-    found = tuple(effect_record(one) for one in findings if one.kind != "discrepancy")
+    found = tuple(effect_record(one) for one in findings if one.effect in EFFECTS)
     replaced = {one.name for one in found}
     return model.corrected(
         result.stages["corrected"].posterior,

@@ -26,6 +26,7 @@ from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.data.splits import DaySplit
 from igrow.trainer.diagnosis import candidates, linear, noise, sensitivity
 from igrow.trainer.diagnosis.candidates import Candidate, Pattern
+from igrow.trainer.diagnosis.drift import Drift
 from igrow.trainer.diagnosis.knowledge import drift
 from igrow.trainer.diagnosis.linear import DailyGrams, LinearModel
 from igrow.trainer.diagnosis.noise import NoiseFilter, Whitening
@@ -56,6 +57,8 @@ class History:
     """Of effects and patterns in windows of the calibration log."""
     without: frozenset[str] = frozenset()
     """Effects that are no candidates, though they may have been there before."""
+    drift: Drift | None = None
+    """Of greenhouses; None in the calibration log itself."""
 
 
 @dataclass(frozen=True)

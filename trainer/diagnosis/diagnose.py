@@ -8,34 +8,28 @@ log, model --> knowledge --> design --> compare --> estimate --> refit --+--> co
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from igrow.core.arrays import Floats
 from igrow.core.effects import EFFECTS
 from igrow.core.errors import IgrowError
-from igrow.core.site import Site
 from igrow.trainer.data.log import Log
 from igrow.trainer.data.splits import split_days
 from igrow.trainer.diagnosis import freerun, history, sensitivity, wording
-from igrow.trainer.diagnosis.change import changed
-from igrow.trainer.diagnosis.compare import Round, compare
-from igrow.trainer.diagnosis.correction import Corrected, LogDays, correct, corrected_model
-from igrow.trainer.diagnosis.design import Design, prepare
-from igrow.trainer.diagnosis.estimate import Estimated, estimate, with_refitted, within_bounds
+from igrow.trainer.diagnosis.actuators import Completed, complete
+from igrow.trainer.diagnosis.compare import Round
+from igrow.trainer.diagnosis.correction import Corrected, LogDays, Stage, correct, corrected_model
+from igrow.trainer.diagnosis.design import prepare
+from igrow.trainer.diagnosis.estimate import Estimated
 from igrow.trainer.diagnosis.evidence import Evidence
-from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, activate, knowledge_of
-from igrow.trainer.diagnosis.nuisance import NuisanceSubspace, learn_discrepancy, read_nuisance
-from igrow.trainer.diagnosis.refit import are_identifiable, refit
+from igrow.trainer.diagnosis.knowledge import knowledge_of
+from igrow.trainer.diagnosis.nuisance import NuisanceSubspace, learn_discrepancy
+from igrow.trainer.diagnosis.open_vents import under_open_vents
 from igrow.trainer.diagnosis.result import Diagnosis, Finding, Verdict
-from igrow.trainer.diagnosis.rules import DEFAULT, HOUR, DecisionRules
-from igrow.trainer.diagnosis.structure import disagreement
-from igrow.trainer.fit.climate import site_prior
+from igrow.trainer.diagnosis.rounds import search_of
+from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules
 from igrow.trainer.fit.discrepancy import Discrepancy
-from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.model import FittedModel
-from igrow.trainer.fit.solver import DivergenceError
 
 NOT_CALIBRATED = (
     "What the model misses of this greenhouse when all is well is not known, so only large causes can be told from a "
@@ -73,14 +67,23 @@ def diagnose(
         return _data_fault(log, model)
     log.require("a diagnosis", rules.least_days)
     knowledge = knowledge_of(model, site, rules)
-    days = log_days(log, model)
-    search = _search(days, site, model, knowledge, frozenset(without), rules, nuisance)
-    first, last, found = search.run(np.random.default_rng(seed))
+    logged, rng = log_days(log, model), np.random.default_rng(seed)
+    completed = complete(log, logged, model, knowledge, rules, rng)
+    days, opened = completed.days, under_open_vents(logged.record, rules)
+    off = opened is not None and opened.is_offset(rules)
+    hidden = frozenset(without) | (frozenset({"co2_drift"}) if off else frozenset())
+    search = search_of(days, site, model, knowledge, hidden, rules, nuisance)
+    first, last, found = search.run(rng)
     result = correct(days, knowledge, found, last.patterns, site.longitude, rules)
-    verdict, findings = _verdict(result.kept, last, rules)
-    errors = _errors(days, result)
+    verdict, findings = _verdict(completed, result.kept, last, rules)
+    stages = _stages(result, completed, logged)
+    errors = _errors(stages)
     start, end = log.telemetry.time[0], log.telemetry.time[-1]
-    runs = {name: day for name, stage in result.stages.items() if (day := days.run(stage)) is not None}
+    runs = {name: day for name, (stage, seen) in stages.items() if (day := seen.run(stage)) is not None}
+    notes = (
+        *((NOT_CALIBRATED,) if knowledge.transferred else ()),
+        *((opened.sentence,) if opened is not None and off else ()),
+    )
     return Diagnosis(
         site.name,
         verdict,
@@ -94,9 +97,9 @@ def diagnose(
         model,
         corrected_model(model, result, findings, errors, knowledge.discrepancy, (start, end)),
         first.design.untestable,
-        days.record.unknown,
-        (NOT_CALIBRATED,) if knowledge.transferred else (),
-        Evidence(days, knowledge, first, result.estimates, result.stages, runs),
+        logged.record.missing,
+        notes,
+        Evidence(days, knowledge, first, result.estimates, {name: stage for name, (stage, _) in stages.items()}, runs),
     )
 
 
@@ -113,7 +116,7 @@ def discrepancy_of(log: Log, model: FittedModel, rules: DecisionRules = DEFAULT)
 
 
 def history_of(log: Log, model: FittedModel, rules: DecisionRules = DEFAULT) -> Discrepancy:
-    """Return the same with its doubt and the colour of its noise, for `FittedModel.history`; raises as above does."""
+    """Return the same with covariance and the noise's colour, for `FittedModel.history`; raises as above does."""
     record = log_days(log, model).record
     return history.learn(record, log.known_site, model.posterior, rules)
 
@@ -126,158 +129,37 @@ def log_days(log: Log, model: FittedModel) -> LogDays:
     return LogDays(record, split, sensitivity.day_runs(record, split.day))
 
 
-@dataclass(frozen=True)
-class _Search:
-    """The rounds of a search: one cause after the other, each in a model that has those before it.
-
-    A large effect moves the model far from where the search linearised it; further causes and what remains can
-    be told only after it has been put in.
-    """
-
-    days: LogDays
-    site: Site
-    knowledge: Knowledge
-    without: frozenset[str]
-    rules: DecisionRules
-    nuisance: NuisanceSubspace
-
-    def run(self, rng: np.random.Generator) -> tuple[Round, Round, list[Estimated]]:
-        """Return the first and the last round, and the causes that were found."""
-        design = self.resolved()
-        first: Round | None = None
-        found: list[Estimated] = []
-        while True:
-            explained = sum(one.gain for one in found)
-            judged = self.judge(design, explained, rng, causes=len(found) < self.rules.most_causes)
-            first = first or judged
-            new = estimate(judged, rng)
-            terms = [] if new is None else self.refitted(judged, [*found, new])
-            if not terms:
-                return first, judged, found
-            try:
-                design = self.design([*self.knowledge.terms, *(one.term for one in terms)], design.interval)
-            except DivergenceError:
-                # No cause: the log itself stayed within all bounds.
-                return first, judged, found
-            found = terms
-
-    def judge(self, design: Design, explained: float, rng: np.random.Generator, *, causes: bool) -> Round:
-        """Return what one round finds."""
-        return compare(design, explained, rng, causes=causes)
-
-    def design(self, terms: Sequence[ActiveTerm], interval: float) -> Design:
-        """Return the design of a model with terms; what usually differs stands in where its structure does not."""
-        hours = interval >= HOUR
-        record, split, known = self.days.record, self.days.split, self.knowledge
-        return prepare(
-            record, split, known.short_prior, activate(record, terms), self.site.longitude, self.rules,
-            discrepancy=known.discrepancy,
-            directions=self.nuisance.directions(transferred=known.transferred) if hours else (),
-            usual_size=self.nuisance.usual_size(split.days, self.rules) if hours else {},
-            without=self.without,
-            interval=interval,
-        )  # fmt: skip
-
-    def resolved(self) -> Design:
-        """Return the first design: by time steps where the model's structure is the greenhouse's, else by hours."""
-        hours = self.design(self.knowledge.terms, HOUR)
-        if self.days.record.step >= HOUR:
-            return hours
-        steps = self.design(self.knowledge.terms, self.days.record.step)
-        return steps if disagreement(hours, steps) <= self.rules.largest_disagreement else hours
-
-    def refitted(self, judged: Round, causes: list[Estimated]) -> list[Estimated]:
-        """Return all causes refitted together, or none where one turns round or a further one adds nothing of its own.
-
-        A further one that only mops up what is left runs to its bound; one that is confounded with another (two ways
-        for CO2 to leak in) leaves neither with a size.
-        """
-        try:
-            with np.errstate(over="ignore", invalid="ignore"):
-                found = refit(judged.design, judged.named, [one.term for one in causes], self.knowledge.terms)
-        except (np.linalg.LinAlgError, DivergenceError):
-            # A poor start can run away; the causes then stay as the search found them.
-            return [within_bounds(one) for one in causes]
-        better = [with_refitted(one, two, self.rules) for one, two in zip(causes, found, strict=True)]
-        stands = all(one.term.amplitude != 0.0 for one in better) and all(map(_is_inside, better[1:]))
-        return better if stands and (len(found) == 1 or are_identifiable(found)) else []
-
-
-@dataclass(frozen=True)
-class _Change(_Search):
-    """The same in a greenhouse whose history is known: what has changed in it since."""
-
-    history: Discrepancy
-    plain: Design
-    """The log without any cause, before any noise."""
-    misfit: Floats
-    """What the model is expected to miss in this log."""
-
-    def judge(self, design: Design, explained: float, rng: np.random.Generator, *, causes: bool) -> Round:
-        """Return what one round finds."""
-        return changed(design, explained, rng, causes=causes)
-
-    def design(self, terms: Sequence[ActiveTerm], interval: float) -> Design:
-        """Return the design of a model with terms, about the calibrated parameters."""
-        plain = _laid_out(self.days, self.site, self.history, terms, self.rules) if terms else self.plain
-        return history.expected(self.history, plain, self.misfit, self.without)
-
-    def resolved(self) -> Design:
-        """Return the first design: by the steps that the history was learned from."""
-        return self.design(self.knowledge.terms, self.days.record.step)
-
-
-def _search(
-    days: LogDays,
-    site: Site,
-    model: FittedModel,
-    knowledge: Knowledge,
-    without: frozenset[str],
-    rules: DecisionRules,
-    nuisance: NuisanceSubspace | None,
-) -> _Search:
-    """Return the search that fits what is known: of changes where the greenhouse's history applies to the log."""
-    common = (days, site, knowledge, without, rules, nuisance or read_nuisance())
-    known = model.history
-    if not rules.history or known is None or model.calibrated_on != site.name:
-        return _Search(*common)
-    plain = _laid_out(days, site, known, (), rules)
-    if not history.applies(known, plain):
-        return _Search(*common)
-    return _Change(*common, known, plain, history.expected_misfit(known, plain))
-
-
-def _laid_out(
-    days: LogDays, site: Site, known: Discrepancy, terms: Sequence[ActiveTerm], rules: DecisionRules
-) -> Design:
-    """Return the design of a log about the parameters of the calibration, before any noise."""
-    names = tuple(known.parameters)
-    spread = site_prior(site).marginal(names).covariance
-    about = Gaussian(names, np.array(list(known.parameters.values())), spread)
-    return history.lay_out(days.record, days.split, about, activate(days.record, terms), site.longitude, rules)
-
-
-def _is_inside(one: Estimated) -> bool:
-    """Tell whether a cause lies inside its bounds."""
-    bound, amplitude = EFFECTS[one.effect].amplitude, one.term.amplitude
-    return amplitude < bound.high and (bound.low == 0.0 or amplitude > bound.low)
-
-
-def _verdict(kept: Sequence[Estimated], last: Round, rules: DecisionRules) -> tuple[Verdict, tuple[Finding, ...]]:
-    findings = tuple(wording.finding(one) for one in sorted(kept, key=lambda one: -one.effect_to_noise))
+def _verdict(
+    completed: Completed, kept: Sequence[Estimated], last: Round, rules: DecisionRules
+) -> tuple[Verdict, tuple[Finding, ...]]:
+    findings = (
+        *(wording.actuator(one) for one in completed.found),
+        *(wording.finding(one) for one in sorted(kept, key=lambda one: -one.effect_to_noise)),
+    )
     if last.patterns:
         return "unexplained", (*findings, wording.discrepancy(last.patterns, rules))
     if not findings:
         return "nothing", ()
-    return ("ambiguous" if any(len(one.rivals) > 1 for one in findings) else "named"), findings
+    return ("ambiguous" if any(len(one.confounded) > 1 for one in findings) else "named"), findings
 
 
-def _errors(days: LogDays, result: Corrected) -> Mapping[str, Mapping[str, Mapping[str, float]]]:
+def _stages(result: Corrected, completed: Completed, logged: LogDays) -> dict[str, tuple[Stage, LogDays]]:
+    """Return every stage with the log that it sees: an actuator that the log lacks counts from the correction on."""
+    stages = {name: (stage, completed.days) for name, stage in result.stages.items()}
+    if completed.recalibrated is not None:
+        stages |= {
+            "deployed": (result.stages["deployed"], logged),
+            "recalibrated": (completed.recalibrated, logged),
+        }
+    return stages
+
+
+def _errors(stages: Mapping[str, tuple[Stage, LogDays]]) -> Mapping[str, Mapping[str, Mapping[str, float]]]:
     """Return the mean absolute errors on held-out days: quantity -> horizon -> stage."""
     table: dict[str, dict[str, dict[str, float]]] = {}
     for horizon in freerun.HORIZONS:
-        for name, stage in result.stages.items():
-            for quantity, error in freerun.mean_absolute_errors(days.run(stage, horizon)).items():
+        for name, (stage, seen) in stages.items():
+            for quantity, error in freerun.mean_absolute_errors(seen.run(stage, horizon)).items():
                 table.setdefault(quantity, {}).setdefault(horizon, {})[name] = error
     return table
 

@@ -30,7 +30,7 @@ class Estimated:
     gain: float
     """Log-likelihood that it adds to the model it was found in."""
     onset: OnsetInterval | None
-    rivals: tuple[str, ...]
+    confounded: tuple[str, ...]
     """Effects that would do as well in its place, itself first."""
     bootstrap_p: float = 0.0
     """Probability that it does not make unseen days likelier."""
@@ -64,7 +64,7 @@ def estimate(found: Round, rng: np.random.Generator) -> Estimated | None:
         Interval(amplitude, amplitude - reach, amplitude + reach, EFFECTS[hypothesis.effect].amplitude.unit),
         hypothesis.gain,
         onset,
-        _rivals(design, null, hypothesis, gain, rng),
+        _confounded(design, null, hypothesis, gain, rng),
         found.cause.bootstrap_p,
         _shift(design, null, found.named),
     )
@@ -107,7 +107,7 @@ def _reach(rules: DecisionRules) -> float:
     return normal_quantile(rules) * rules.deviation_inflation
 
 
-def _rivals(
+def _confounded(
     design: Design, null: Fit, hypothesis: Hypothesis, gain: float, rng: np.random.Generator
 ) -> tuple[str, ...]:
     """Return the effects that would do as well in the place of a cause, itself first.
@@ -119,7 +119,7 @@ def _rivals(
         gain: of the cause, scored as the others are.
         rng: for the flips.
     """
-    margin = max(design.rules.rival_gain, design.rules.rival_share * gain)
+    margin = max(design.rules.confounded_gain, design.rules.confounded_share * gain)
     onsets = search.onset_days(design) if hypothesis.term.onset is not None else [None]
     scored = search.score_candidates(design, null, onsets, rng)
     hidden = frozenset[str]() if design.history is None else design.history.without

@@ -143,6 +143,11 @@ def effect_to_noise(plain: FreeRuns, corrected: FreeRuns) -> float:
 
 def skill(before: FreeRuns, after: FreeRuns) -> float:
     """Return the fall of the squared error over its mean before, mean over quantities and days."""
+    return float(skill_by_day(before, after).mean())
+
+
+def skill_by_day(before: FreeRuns, after: FreeRuns) -> Floats:
+    """Return the fall of the squared error on each day over the mean of all days before, mean over quantities, (d,)."""
     days = np.unique(before.day)
     by_day = np.zeros(len(days))
     quantities = [name for name in before.errors if np.isfinite(before.errors[name]).any()]
@@ -152,7 +157,7 @@ def skill(before: FreeRuns, after: FreeRuns) -> float:
         for index, day in enumerate(days):
             part = fall[:, before.day == day]
             by_day[index] += np.nanmean(part) / len(quantities) if np.isfinite(part).any() else 0.0
-    return float(by_day.mean())
+    return by_day
 
 
 def mean_absolute_errors(runs: FreeRuns | None) -> dict[str, float]:

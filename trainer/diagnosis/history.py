@@ -22,7 +22,8 @@ from igrow.trainer.data.splits import DaySplit, split_days
 from igrow.trainer.diagnosis import candidates, linear, noise, search, sensitivity
 from igrow.trainer.diagnosis.candidates import WEEKDAYS
 from igrow.trainer.diagnosis.design import JOINT, Design, History, blocks_of
-from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, home_drift
+from igrow.trainer.diagnosis.drift import Drift, read_drift
+from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, drift, home_drift
 from igrow.trainer.diagnosis.linear import DailyGrams, LinearModel
 from igrow.trainer.diagnosis.noise import Whitening
 from igrow.trainer.diagnosis.recalibration import averaging
@@ -65,6 +66,7 @@ def learn(record: Record, site: Site, posterior: Gaussian, rules: DecisionRules)
         filters={balance: one.raw for balance, one in zip(balances, design.whitening.filters, strict=True)},
         step=record.step,
         own_gains=own_gains(design),
+        middle=record.time[0] + (record.time[-1] - record.time[0]) / 2,
     )
 
 
@@ -132,7 +134,9 @@ def applies(known: Discrepancy, plain: Design) -> bool:
     return plain.interval == known.step and set(balances) <= set(known.filters)
 
 
-def expected(known: Discrepancy, plain: Design, misfit: Floats, without: Collection[str] = ()) -> Design:
+def expected(
+    known: Discrepancy, plain: Design, misfit: Floats, without: Collection[str] = (), learned: Drift | None = None
+) -> Design:
     """Return the design of a later log: what is expected of it taken off, under the history's colour.
 
     Args:
@@ -140,13 +144,17 @@ def expected(known: Discrepancy, plain: Design, misfit: Floats, without: Collect
         plain: the log, laid out about the calibrated parameters.
         misfit: from `expected_misfit`, of the log without the causes that have been found in it.
         without: effects that are no candidates.
+        learned: how greenhouses change with time (None: what came with the trainer).
     """
+    learned = learned or read_drift()
     balances = averaging(plain.line, plain.interval, plain.rules).balances
     filters = tuple(noise.filter_of(known.filters[balance]) for balance in balances)
-    now = drifted(known, plain)
+    now = drifted(known, plain, learned)
     values = plain.values.copy()
     values[0] += misfit
-    design = replace(plain, values=values, history=History(now, misfit, filters, known.own_gains, frozenset(without)))
+    design = replace(
+        plain, values=values, history=History(now, misfit, filters, known.own_gains, frozenset(without), learned)
+    )
     _, design = solve_jointly(design)
     # Parameters as the rest of the history leaves them, for fits that hold it.
     count = len(plain.prior.names)
@@ -155,10 +163,10 @@ def expected(known: Discrepancy, plain: Design, misfit: Floats, without: Collect
     return replace(design, prior=held)
 
 
-def drifted(known: Discrepancy, plain: Design) -> Gaussian:
-    """Return how far everything may now lie from what is expected: the doubt of the history, and a drift.
+def drifted(known: Discrepancy, plain: Design, learned: Drift) -> Gaussian:
+    """Return how far everything may now lie from what is expected: the covariance of the history, and a drift.
 
-    What is new in this log has the doubt that it had before any log.
+    What is new in this log has the covariance that it had before any log.
     """
     wanted = keys(plain)
     place = {key: row for row, key in enumerate(known.amplitudes.names)}
@@ -169,11 +177,39 @@ def drifted(known: Discrepancy, plain: Design) -> Gaussian:
     assert all(row in seen for row in range(count))
     covariance = np.diag(prior**2)
     covariance[np.ix_(seen, seen)] = known.amplitudes.covariance[np.ix_(rows, rows)]
-    return Gaussian(wanted, np.zeros(len(wanted)), covariance).widened(drift_of(plain))
+    return Gaussian(wanted, np.zeros(len(wanted)), covariance).widened(change_of(known, plain, learned))
 
 
-def drift_of(design: Design) -> Floats:
-    """Return the standard deviation of the change of everything between two logs, (k,)."""
+def change_of(known: Discrepancy, plain: Design, learned: Drift) -> Floats:
+    """Return the standard deviation of the change of everything from the calibration to a log, (k,)."""
+    time = plain.line.record.time
+    days = days_between(known, time[0] + (time[-1] - time[0]) / 2)
+    unit, expected = units(plain), drift_within(plain) / units(plain)
+    rates = [learned.rate(key, rate, days) for key, rate in zip(rate_keys(plain), expected.tolist(), strict=True)]
+    change: Floats = unit * np.array(rates)
+    return change
+
+
+def days_between(known: Discrepancy, time: np.datetime64) -> float:
+    """Return the days from the middle of the calibration log to a time."""
+    return float((time - known.middle).astype("timedelta64[s]").astype(np.float64) / 86_400.0)
+
+
+def rate_keys(design: Design) -> tuple[str, ...]:
+    """Return the keys of everything that may be missing, as a drift has them: an effect has one at all shapes."""
+    parameters = (PARAMETER_PREFIX + name for name in design.block("parameter").labels)
+    return (*parameters, *(one.effect for one in design.candidates), *design.block("pattern").labels)
+
+
+def units(design: Design) -> Floats:
+    """Return the size of a change of rate one, (k,)."""
+    return np.concatenate([
+        drift(design.prior.values, 1.0, design.rules), _typical(design), np.ones(len(design.patterns))
+    ])  # fmt: skip
+
+
+def drift_within(design: Design) -> Floats:
+    """Return the standard deviation of the change of everything within some weeks, by physics, (k,)."""
     rules = design.rules
     return np.concatenate([
         home_drift(design.prior.values, rules),
@@ -190,7 +226,7 @@ def own_gains(design: Design) -> dict[str, float]:
     """
     null, days = design.null_model(), design.split.days
     assert design.history is not None
-    change, largest = drift_of(design), dict[str, float]()
+    change, largest = drift_within(design), dict[str, float]()
     for parts in PARTS:
         part = np.arange(days) * parts // days
         for number in range(parts):

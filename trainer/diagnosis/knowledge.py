@@ -61,7 +61,7 @@ class Knowledge:
     transferred: bool
     """What the model misses of this greenhouse when all is well is not known."""
     history: bool = False
-    """It is known with its doubt: causes are changes since the calibration."""
+    """It is known with its covariance: causes are changes since the calibration."""
 
 
 def knowledge_of(model: FittedModel, site: Site, rules: DecisionRules) -> Knowledge:

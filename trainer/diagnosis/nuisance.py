@@ -56,7 +56,7 @@ class NuisanceSubspace:
     """The command that learned it, its date and seeds."""
 
     def directions(self, *, transferred: bool) -> tuple[Direction, ...]:
-        """Return the directions for a model that was calibrated here or elsewhere."""
+        """Return the directions for a model that was calibrated here or transferred."""
         return self.transferred if transferred else self.home
 
     def usual_size(self, days: int, rules: DecisionRules) -> Mapping[str, float]:

@@ -21,6 +21,8 @@ Verdict = Literal["nothing", "named", "ambiguous", "unexplained", "data_fault"]
 EXIT_CODES: Mapping[str, int] = {"nothing": 0, "named": 10, "ambiguous": 11, "unexplained": 12, "data_fault": 13}
 """Exit code of each verdict; 2 is a mistake of use."""
 STAGES = ("deployed", "recalibrated", "corrected")
+WORSE = 0.02
+"""Share by which an error must grow to be told as worse."""
 DISCREPANCY = "discrepancy"
 """Effect and kind of a finding that no effect of the catalogue explains: what the model lacks, by outside drivers."""
 
@@ -49,13 +51,13 @@ class Finding:
     """One cause."""
 
     effect: str
-    """Name in the catalogue, or ``discrepancy``."""
-    kind: Literal["process", "sensor", "discrepancy"]
+    """Name in the catalogue, of the actuator that the log lacks, or ``discrepancy``."""
+    kind: Literal["process", "sensor", "actuator", "discrepancy"]
     balances: tuple[str, ...]
     parameters: Mapping[str, Interval]
     onset: OnsetInterval | None
     p_value: float
-    rivals: tuple[str, ...]
+    confounded: tuple[str, ...]
     """Effects that fit as well, itself first: confounded in this log."""
     drivers: tuple[str, ...]
     separating_test: str
@@ -93,7 +95,7 @@ class Diagnosis:
     """The same, recalibrated and with the causes found in it: ready to export. Unchanged after a data fault."""
     untestable: tuple[str, ...] = ()
     """Effects that this log cannot tell."""
-    unknown: tuple[str, ...] = ()
+    missing: tuple[str, ...] = ()
     """Inputs that the log lacks."""
     notes: tuple[str, ...] = ()
     evidence: Evidence | None = None
@@ -104,6 +106,16 @@ class Diagnosis:
         """Of the command."""
         return EXIT_CODES[self.verdict]
 
+    @property
+    def worsened(self) -> tuple[str, ...]:
+        """A sentence for every quantity that the corrected model predicts worse than recalibration alone does."""
+        return tuple(
+            f"{quantity.replace('_', ' ')} gets worse by it: {plain(day['recalibrated'])} to {plain(day['corrected'])} "
+            f"{QUANTITIES[quantity].unit.replace('degC', 'K')}, 24 h ahead on unseen days"
+            for quantity, horizons in self.errors.items()
+            if (day := horizons.get("24_h", {})) and day["corrected"] > (1.0 + WORSE) * day["recalibrated"]
+        )
+
     def __repr__(self) -> str:
         causes = ", ".join(one.effect for one in self.findings)
         return f"Diagnosis({self.site!r}, {self.verdict}{': ' if causes else ''}{causes})"
@@ -112,10 +124,13 @@ class Diagnosis:
         """Return the verdict in a few lines for people."""
         lines = [f"{self.site}: {self.verdict}"]
         lines += [f"  {one.sentence}" for one in self.findings]
-        lines += [f"  as well it could be {', '.join(one.rivals[1:])}" for one in self.findings if one.rivals[1:]]
-        if self.unknown:
-            lines.append(f"  the log lacks {', '.join(self.unknown)}: usual values stand in")
+        lines += [
+            f"  as well it could be {', '.join(one.confounded[1:])}" for one in self.findings if one.confounded[1:]
+        ]
+        if self.missing:
+            lines.append(f"  the log lacks {', '.join(self.missing)}: usual values stand in")
         lines += [f"  {note}" for note in self.notes]
+        lines += [f"  {sentence}" for sentence in self.worsened]
         for quantity, horizons in self.errors.items():
             day = horizons.get("24_h")
             if day:
@@ -174,6 +189,8 @@ class Diagnosis:
                 }
                 for quantity, horizons in self.errors.items()
             },
+            "worsened": list(self.worsened),
+            "missing": list(self.missing),
             "screened": [
                 {"quantity": one.quantity, "start": _time(one.start), "end": _time(one.end), "reason": one.reason}
                 for one in self.screened
@@ -201,7 +218,7 @@ def _finding(finding: Finding) -> dict[str, Any]:
         if onset is None
         else {"time": _time(onset.time), "low": _time(onset.low), "high": _time(onset.high)},
         "p_value": _number(finding.p_value),
-        "rivals": list(finding.rivals),
+        "confounded": list(finding.confounded),
         "drivers": list(finding.drivers),
         "separating_test": finding.separating_test,
     }

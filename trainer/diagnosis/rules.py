@@ -50,18 +50,15 @@ class DecisionRules:
     discrepancy_pattern_ridge: float = _chosen(0.15, "prior deviation of a pattern in it, in its units")
 
     # What has changed since the calibration, where what the model misses of this greenhouse was learned then.
-    # Off: in a season that it was not set on, three of twelve logs with nothing missing got a name, all three for the
-    # CO2 of a growing crop.
     history: bool = _chosen(False, "ask what has changed since, and not what greenhouses with nothing missing show")
     omission_effect: float = _tuned(0.3, "prior deviation of an effect in the discrepancy, in typical amplitudes")
     omission_pattern: float = _tuned(0.05, "the same of a pattern, in its units")
-    wall_drift: float = _tuned(0.015, "relative change of a parameter between the calibration and a log")
+    wall_drift: float = _tuned(0.015, "relative change of a parameter within some weeks, by physics")
     crop_drift: float = _tuned(0.05, "the same of a parameter of the crop")
     effect_drift: float = _tuned(0.02, "change of an effect in the discrepancy, in typical amplitudes")
     pattern_drift: float = _tuned(0.005, "the same of a pattern, in its units")
     change_onset_price: float = _tuned(12.0, "gain that a beginning of a change must add")
     change_last_days: int = _tuned(5, "days at the end of a log in which no beginning of a change is looked for")
-    least_change_gain: float = _tuned(12.0, "gain of a change over what it gained in windows of the calibration log")
     least_pattern_change: float = _tuned(60.0, "the same of a pattern: greenhouses drift with the weather")
     least_proven_pattern: float = _tuned(20.0, "of it, what the scatter of day scores must bear out")
     pattern_over_change: float = _tuned(1.5, "times a change's gain at which a pattern replaces it")
@@ -108,8 +105,8 @@ class DecisionRules:
     confidence: float = _chosen(0.90, "of every interval")
     deviation_inflation: float = _chosen(1.3, "of a standard error, for structure that no covariance knows")
     form_deviation: float = _chosen(0.3, "relative standard error for a truth that is not of the catalogue's form")
-    rival_gain: float = _chosen(6.0, "gain within which another cause fits as well")
-    rival_share: float = _chosen(0.25, "the same as a share of the cause's own gain")
+    confounded_gain: float = _chosen(6.0, "gain within which another cause fits as well")
+    confounded_share: float = _chosen(0.25, "the same as a share of the cause's own gain")
     nonlinear_spread: float = _chosen(0.12, "prior deviation of a nonlinear parameter, as a share of its range")
     refit_rounds: int = _chosen(3, "alternations between a refit and its noise")
     refit_evaluations: int = _chosen(10, "points that each refit may try")
@@ -123,12 +120,18 @@ class DecisionRules:
 
     # What stands on unseen days.
     most_causes: int = _chosen(3, "causes of one log")
-    least_effect_to_noise: float = _chosen(0.15, "ENR below which a cause is not worth a name")
+    least_effect_to_noise: float = _chosen(0.15, "ENR below which a cause is too small to be named")
     least_skill: float = _chosen(0.01, "share of the squared error of unseen days that a cause must remove")
     clear_skill: float = _chosen(0.03, "share that needs no other proof")
     further_skill: float = _chosen(0.03, "share that a second or third cause must remove")
     further_bootstrap_p: float = _chosen(0.2, "largest bootstrap p-value of a second or third cause")
     further_gain_share: float = _chosen(0.2, "gain of a second or third cause over that of those before it")
+    largest_actuator_p: float = _chosen(0.05, "bootstrap probability that it removes none")
+
+    # What a CO2 sensor must read under open vents.
+    wide_open: float = _chosen(100.0, "sum of both vents in % from which on the air is as good as the outdoor air")
+    open_rows: int = _chosen(24, "time steps with such vents from which on they tell what the sensor reads")
+    open_vents_offset: float = _chosen(80.0, "ppm off the outdoor air that no crop makes under them")
     largest_pattern: float = _chosen(5.0, "bound of a pattern's amplitude in the corrected model, in its units")
 
     # What is learned of greenhouses in which nothing is missing.

@@ -168,7 +168,7 @@ class Hypothesis:
 
 
 def onset_days(design: Design) -> list[int | None]:
-    """Return the days of beginning worth trying; None is always."""
+    """Return the days of beginning to be tried; None is always."""
     rules = design.rules
     first = rules.first_onset_days
     last = design.split.days - (first if design.history is None else rules.change_last_days)

@@ -12,8 +12,8 @@ from igrow.trainer.diagnosis.design import Design
 def disagreement(hours: Design, steps: Design) -> float:
     """Return how far parameters fitted to hours and to time steps lie apart, over what chance makes.
 
-    Where the model's structure is the greenhouse's, both agree within their doubt; where masses are missing that answer
-    within the hour, the fast errors pull the parameters elsewhere. The specification test of Hausman (1978,
+    Where the model's structure is the greenhouse's, both agree within their standard errors; where masses are missing
+    that answer within the hour, the fast errors pull the parameters away. The specification test of Hausman (1978,
     Econometrica 46, 1251-1271): the difference of both estimates against the difference of their covariances; mean
     squared over the directions in which the time steps tell more, infinite where nothing tells.
 

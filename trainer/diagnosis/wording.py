@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from igrow.core.effects import EFFECTS
+from igrow.trainer.diagnosis.actuators import Replaced
 from igrow.trainer.diagnosis.candidates import UNIT_FLUX, Pattern
 from igrow.trainer.diagnosis.estimate import Estimated, normal_quantile
 from igrow.trainer.diagnosis.result import DISCREPANCY, Finding, Interval, plain
@@ -26,6 +27,15 @@ BALANCES_OF = {
     "air_exchange": ("heat", "vapour", "co2"),
     "light_loss": ("light", "heat"),
 }
+MOVED_BY: dict[str, tuple[str, ...]] = {
+    "rail_pipe_temperature": ("heat",),
+    "grow_pipe_temperature": ("heat",),
+    "lamp_power": ("heat", "light", "co2", "vapour"),
+}
+MOVED_BY_SCREENS = ("heat", "light", "vapour")
+"""Balances that an actuator moves; vents move all that the air carries."""
+UNLIKE_RULE = 0.15
+"""Difference of a share from one at which it is told."""
 MOST_TESTS = 3
 """Separating tests that are told at most."""
 
@@ -40,12 +50,32 @@ def finding(one: Estimated) -> Finding:
         {effect.amplitude.name: one.amplitude, **one.shapes},
         one.onset,
         one.hypothesis.p_value,
-        one.rivals,
+        one.confounded,
         tuple(effect.drivers),
-        separating_test(one.rivals),
+        separating_test(one.confounded),
         sentence(one),
         one.effect_to_noise,
         one.regimes,
+    )
+
+
+def actuator(one: Replaced) -> Finding:
+    """Return the finding of an actuator that the log lacks."""
+    name = one.actuator.replace("_", " ")
+    share = f"{100.0 * one.share.value:.0f} % of" if abs(one.share.value - 1.0) > UNLIKE_RULE else ""
+    return Finding(
+        one.actuator,
+        "actuator",
+        MOVED_BY_SCREENS if one.actuator.endswith("screen") else MOVED_BY.get(one.actuator, ("heat", "vapour", "co2")),
+        {"share": one.share},
+        None,
+        one.p_value,
+        (one.actuator,),
+        (one.actuator,),
+        f"log the {name}",
+        f"The log lacks the {name}; {share + ' ' if share else ''}the course that the climate computer's rules give it "
+        f"removes {100.0 * one.skill:.0f} % of the squared error on unseen days.",
+        one.effect_to_noise,
     )
 
 
@@ -59,11 +89,11 @@ def sentence(one: Estimated) -> str:
     return f"{text[0].upper()}{text[1:]}."
 
 
-def separating_test(rivals: Sequence[str]) -> str:
+def separating_test(confounded: Sequence[str]) -> str:
     """Return the cheapest tests that would separate confounded causes."""
-    if len(rivals) == 1:
-        return EFFECTS[rivals[0]].separating_test
-    return "; or ".join(dict.fromkeys(EFFECTS[name].separating_test for name in rivals[:MOST_TESTS]))
+    if len(confounded) == 1:
+        return EFFECTS[confounded[0]].separating_test
+    return "; or ".join(dict.fromkeys(EFFECTS[name].separating_test for name in confounded[:MOST_TESTS]))
 
 
 def discrepancy(patterns: Sequence[Hypothesis], rules: DecisionRules) -> Finding:

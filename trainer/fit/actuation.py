@@ -77,7 +77,7 @@ def fit_actuation(
     if len(table["par"]) == 0:
         raise IgrowError("no row of the log has the climate and all actuators at once: nothing tells the PLC's rules")
     rules = actuation.default_rules()
-    known = {name for record, _, _ in parts for name in actuation.OUTPUTS if name not in record.unknown}
+    known = {name for record, _, _ in parts for name in actuation.OUTPUTS if name not in record.missing}
     if "lamp_power" in known:
         burning = table["lamp_power"][table["setpoint:lamp_on"] > 0.9]
         rules["lamp_capacity"] = float(np.median(burning)) if len(burning) else 0.0

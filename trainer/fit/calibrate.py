@@ -135,8 +135,8 @@ def _with_discrepancy(model: FittedModel, log: Log, say: Report) -> FittedModel:
 
 def _notes(record: Record, inferred: tuple[str, ...]) -> list[str]:
     notes = []
-    if record.unknown:
-        notes.append(f"the log lacks {', '.join(record.unknown)}: what hangs on them keeps its usual value")
+    if record.missing:
+        notes.append(f"the log lacks {', '.join(record.missing)}: what hangs on them keeps its usual value")
     if inferred:
         notes.append(f"the log lacks {', '.join(inferred)}: inferred from what was held")
     return notes

@@ -167,7 +167,7 @@ def _runs_of(record: Record, rows: Mask | None, every_hours: float) -> _Runs | N
     part = record.slice(first, int(starts[-1]) + steps + 1)
     every = max(1, round(_SAMPLE / record.step))
     # Without the dose, CO2 would teach a greenhouse that is too tight.
-    told = [name for name in PREDICTED if name != "air_co2" or "co2_dosing" not in record.unknown]
+    told = [name for name in PREDICTED if name != "air_co2" or "co2_dosing" not in record.missing]
     runs = _Runs(part, starts - first, steps, np.arange(every - 1, steps, every), ())
     return replace(runs, quantities=tuple(name for name in told if np.isfinite(runs.measured(name)).any()))
 

@@ -36,6 +36,8 @@ class Discrepancy:
     """Seconds between the errors that it was learned from."""
     own_gains: Mapping[str, float]
     """Largest gain in a window of the calibration log, learned on the rest, by effect or by a pattern's key."""
+    middle: np.datetime64
+    """Of the calibration log, UTC."""
 
     def to_bytes(self) -> bytes:
         """Return the content of a file that holds it: plain arrays and JSON, never a pickle."""
@@ -45,6 +47,7 @@ class Discrepancy:
             "filters": {str(balance): raw for balance, raw in self.filters.items()},
             "step": self.step,
             "own_gains": dict(self.own_gains),
+            "middle": str(self.middle.astype("datetime64[s]")),
         }
         buffer = io.BytesIO()
         np.savez_compressed(
@@ -75,6 +78,7 @@ class Discrepancy:
                 {int(balance): tuple(raw) for balance, raw in plain["filters"].items()},
                 float(plain["step"]),
                 {str(key): float(gain) for key, gain in plain["own_gains"].items()},
+                np.datetime64(plain["middle"], "s"),
             )
         except Exception as error:
             # A damaged archive raises from zipfile, zlib or numpy; for the user it is one fault.

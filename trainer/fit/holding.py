@@ -32,7 +32,7 @@ def fit_holding(
     heat = physical["rail_pipe_heat_transfer"] * rail + physical["grow_pipe_heat_transfer"] * grow
     above = air - setpoints["heating_setpoint"]
     fine = record.usable & np.isfinite(above) & np.isfinite(heat)
-    if "rail_pipe_temperature" not in record.unknown and fine.sum() > _ENOUGH:
+    if "rail_pipe_temperature" not in record.missing and fine.sum() > _ENOUGH:
         largest = float(np.quantile(heat[fine], 0.998))
         heating = fine & (heat > 0.15 * largest) & (heat < 0.9 * largest)
         idle = fine & (above > 1.5)
@@ -45,7 +45,7 @@ def fit_holding(
         values["heating_capacity"] = max(largest, values["heating_minimum"] + 5.0)
     ppm, dose = record.measured["air_co2"], record.inputs["co2_dosing"]
     fine = record.usable & np.isfinite(ppm)
-    if "co2_dosing" not in record.unknown and fine.sum() > _ENOUGH and (dose[fine] > 0.0).any():
+    if "co2_dosing" not in record.missing and fine.sum() > _ENOUGH and (dose[fine] > 0.0).any():
         largest = float(np.quantile(dose[fine & (dose > 0.0)], 0.99))
         dosing = fine & (dose > 0.05 * largest) & (dose < 0.8 * largest)
         if dosing.sum() > _ENOUGH:

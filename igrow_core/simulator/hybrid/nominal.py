@@ -81,7 +81,7 @@ def leaf_area_curve(site: Site, time: NDArray[np.datetime64]) -> Floats:
 def site_record(telemetry: Telemetry, site: Site, step: float) -> Record:
     """Return the record of a site's log on a grid of `step` seconds.
 
-    Without a measured leaf area the crop's usual course stands in, and ``leaf_area_index`` is among the unknown.
+    Without a measured leaf area the crop's usual course stands in, and ``leaf_area_index`` is among the missing.
 
     Raises:
         TelemetryError: the log has no outdoor_temperature or no air_temperature.
@@ -98,13 +98,17 @@ def site_record(telemetry: Telemetry, site: Site, step: float) -> Record:
         lamp_efficacy=site.greenhouse.lamps.efficacy if site.greenhouse.lamps is not None else 0.0,
         leaf_area_index=_CANOPIES.get(site.crop.species.lower(), _CANOPIES["tomato"])[0],
     )
-    unknown = (*record.unknown, "leaf_area_index") if estimated else record.unknown
+    missing = (*record.missing, "leaf_area_index") if estimated else record.missing
     house = site.greenhouse
-    # A house that cannot dose needs no column to say that it did not; the same of lamps and screens.
+    # A house that cannot dose needs no column to say that it did not; the same of all equipment.
     equipped = {
+        "rail_pipe_temperature": house.rail_pipe_heat_transfer > 0.0,
+        "grow_pipe_temperature": house.grow_pipe_heat_transfer > 0.0,
+        "vent_lee": house.vent_area_ratio > 0.0,
+        "vent_wind": house.vent_area_ratio > 0.0,
         "co2_dosing": house.co2_dosing_capacity > 0.0,
         "lamp_power": house.lamps is not None,
         "energy_screen": house.energy_screen is not None,
         "blackout_screen": house.blackout_screen is not None,
     }
-    return replace(record, unknown=tuple(name for name in unknown if equipped.get(name, True)))
+    return replace(record, missing=tuple(name for name in missing if equipped.get(name, True)))

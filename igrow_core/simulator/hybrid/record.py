@@ -46,7 +46,7 @@ _ABSENT: Mapping[str, float] = {
     "wind_direction": 0.0,
     "rain": 0.0,
 }
-"""What stands in for a column that the log lacks; the record names it in `unknown`."""
+"""What stands in for a column that the log lacks; the record names it in `missing`."""
 SWITCHES: Mapping[str, str] = {"lamp_power": "lamp_on", "irrigation": "irrigation_on"}
 """What a log may tell of equipment whose own column it lacks: the balances cannot use it, a diagnosis can."""
 _SKY_BELOW_AIR = 12.0
@@ -66,7 +66,7 @@ class Record:
     """`measurement.PREDICTED` by name, (n,), NaN where missing."""
     usable: NDArray[np.bool_]
     """The inputs of this row were measured, or bridged over a short gap, (n,)."""
-    unknown: tuple[str, ...]
+    missing: tuple[str, ...]
     """Inputs that the log lacks."""
     lamp_efficacy: float
     """umol J-1."""
@@ -133,7 +133,7 @@ def make_record(
     usable = np.ones(count, dtype=bool)
     longest = max(1, round(LONGEST_FILL / step))
     inputs: dict[str, Floats] = {}
-    unknown: list[str] = []
+    missing: list[str] = []
     outdoor, bridged = _bridge(table["outdoor_temperature"], longest, smooth=True)
     inputs["outdoor_temperature"] = outdoor
     usable &= bridged
@@ -142,22 +142,22 @@ def make_record(
         usable &= bridged
     else:
         inputs["sky_temperature"] = outdoor - _SKY_BELOW_AIR
-        unknown.append("sky_temperature")
+        missing.append("sky_temperature")
     for name, stand_in in _ABSENT.items():
         if _present(table, name):
             inputs[name], bridged = _bridge(table[name], longest, smooth=name in _MEANS)
             usable &= bridged
         else:
             inputs[name] = np.full(count, stand_in)
-            unknown.append(name)
+            missing.append(name)
     for name, switch in SWITCHES.items():
-        if name in unknown and _present(table, switch):
+        if name in missing and _present(table, switch):
             inputs[switch] = _bridge(table[switch], longest, smooth=False)[0]
     if _present(table, "leaf_area_index"):
         inputs["leaf_area_index"] = _bridge(table["leaf_area_index"], count, smooth=True)[0]
     else:
         inputs["leaf_area_index"] = np.full(count, leaf_area_index)
-        unknown.append("leaf_area_index")
+        missing.append("leaf_area_index")
     for name in _MEANS:
         values = inputs[name]
         inputs[name] = np.append(0.5 * (values[1:] + values[:-1]), values[-1:])
@@ -165,10 +165,10 @@ def make_record(
     middle = sun.unix_seconds(table.time) + 0.5 * step
     elevation, azimuth, hour = sun.position(np, middle, latitude, longitude)
     inputs |= {"sun_elevation": elevation, "sun_azimuth": azimuth, "hour": hour, "elapsed_days": np.zeros(count)}
-    missing = np.full(count, np.nan)
-    measured = {name: np.array(table.columns.get(name, missing)) for name in measurement.PREDICTED}
+    nothing = np.full(count, np.nan)
+    measured = {name: np.array(table.columns.get(name, nothing)) for name in measurement.PREDICTED}
     measured["air_temperature"] = np.array(table["air_temperature"])
-    return Record(table.time, float(step), inputs, measured, usable, tuple(unknown), lamp_efficacy).since(None)
+    return Record(table.time, float(step), inputs, measured, usable, tuple(missing), lamp_efficacy).since(None)
 
 
 def observe(record: Record, parameters: Values, effects: ActiveEffects) -> dict[str, Floats]:

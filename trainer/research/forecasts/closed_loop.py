@@ -118,8 +118,8 @@ def _targets(record: Record, states: Mapping[str, Floats], parameters: Mapping[s
     """Return what a run should give, by name, (n,): the climate, what the actuators did, heat and air exchange."""
     drivers = climate.derive(np, states, record.inputs, parameters, record.lamp_efficacy)
     targets: dict[str, Floats] = dict(record.measured)
-    targets |= {name: record.inputs[name] for name in actuation.OUTPUTS if name not in record.unknown}
+    targets |= {name: record.inputs[name] for name in actuation.OUTPUTS if name not in record.missing}
     targets |= {"heat": pipe_heat(drivers, parameters), "ventilation": drivers["ventilation"]}
-    if "co2_dosing" in record.unknown:
+    if "co2_dosing" in record.missing:
         targets.pop("air_co2")
     return targets

@@ -245,7 +245,7 @@ def _choose_residual_model(
             total += sum(
                 by_horizon["24_h"].mae / ERROR_SCALES[quantity]
                 for quantity, by_horizon in errors.items()
-                if not (quantity == "air_co2" and "co2_dosing" in record.unknown)
+                if not (quantity == "air_co2" and "co2_dosing" in record.missing)
             )
         return total
 

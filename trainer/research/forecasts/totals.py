@@ -59,7 +59,7 @@ def daily_totals(
     ahead = starts + np.arange(steps)[:, None]
     result = {}
     for name, (source, factor) in TOTALS.items():
-        if source in record.unknown:
+        if source in record.missing:
             continue
         expected = np.where(there, earlier[source].mean(axis=0).reshape(past.shape), 0.0).sum(axis=0)
         used = measured[source][past[None] + np.arange(steps)[:, None, None]].mean(axis=0)

@@ -1,0 +1,130 @@
+"""Nurseries: greenhouses at one place and in one season, each calibrated on its own eight weeks, then logged again.
+
+All greenhouses of a nursery, and later all logs, are simulated as one batch, which costs little more than one alone.
+The first greenhouse is the usual one, the others lie a quarter off in every parameter; every second one is unlit, and
+every third has a crop that was planted when the calibration log begins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from benchmarks.diagnosis.cases import SEASONS, Case, hidden
+from benchmarks.diagnosis.greenhouses import OTHERS_SPREAD, VirtualGreenhouse, site_of
+from benchmarks.diagnosis.logs import REFERENCE_DAYS, Reference, disturbances, referenced
+from igrow.core.greenhouse import GreenhouseParameters, recipe, simulate_many
+from igrow.core.greenhouse.parameters import stack
+from igrow.core.greenhouse.tomato import Crop, mature_crop, young_crop
+from igrow.core.telemetry import Telemetry
+
+DRIFT = 0.015
+"""Relative deviation of every plant parameter from its value at the calibration."""
+CLEANED = 1.06
+"""What a cleaned cover lets through, over before."""
+JITTER = 15
+"""Days by which a season may begin earlier or later."""
+
+
+@dataclass(frozen=True)
+class Nursery:
+    """Greenhouses at one place."""
+
+    season: str
+    greenhouses: tuple[VirtualGreenhouse, ...]
+
+    @property
+    def start(self) -> np.datetime64:
+        """First day after the calibration logs."""
+        return self.greenhouses[0].start
+
+
+def nursery(season: str, count: int, first: int) -> Nursery:
+    """Draw a nursery.
+
+    Args:
+        season: its logs begin about the day of `SEASONS`.
+        count: of greenhouses.
+        first: seed of the place; no other nursery within a thousand.
+    """
+    rng = np.random.default_rng(first)
+    usual = GreenhouseParameters(latitude=float(rng.uniform(42.0, 60.0)))
+    start = np.datetime64(f"{SEASONS[season]}T00:00:00") + np.timedelta64(int(rng.integers(-JITTER, JITTER + 1)), "D")
+    found = []
+    for number in range(count):
+        seed = first + 1 + number
+        plant = usual.varied(np.random.default_rng(seed), OTHERS_SPREAD if number else 0.0)
+        if number % 2:
+            plant = replace(plant, lamp_capacity=0.0)
+        found.append(VirtualGreenhouse(site_of(f"{season}-{first}-{number}", plant), plant, start, seed))
+    return Nursery(season, tuple(found))
+
+
+def calibration_logs(known: Nursery) -> list[tuple[Telemetry, Crop]]:
+    """Simulate the weeks before, with nothing hidden: of every greenhouse the log, and the crop at its end."""
+    houses = known.greenhouses
+    start, count = known.start - np.timedelta64(REFERENCE_DAYS, "D"), len(houses)
+    seasons = simulate_many(
+        [one.plant for one in houses],
+        [one.weather(start, known.start, one.seed) for one in houses],
+        recipe,
+        start,
+        known.start,
+        count=count,
+        seed=houses[0].seed,
+        crop=_planted(houses),
+    )
+    return [(one.measured, one.crop) for one in seasons]
+
+
+def calibrated(job: tuple[VirtualGreenhouse, tuple[Telemetry, Crop]]) -> Reference:
+    """Return a greenhouse calibrated on its log."""
+    greenhouse, (log, crop) = job
+    return referenced(greenhouse, log, crop)
+
+
+def later_logs(known: Sequence[Reference], cases: Sequence[Sequence[Case]], days: int) -> list[list[Telemetry]]:
+    """Simulate all cases of a nursery as one batch: its greenhouses themselves, some time after their calibration.
+
+    Args:
+        known: the greenhouses.
+        cases: of each of them.
+        days: of a log.
+    """
+    pairs = [(one, case) for one, own in zip(known, cases, strict=True) for case in own]
+    if not pairs:
+        return [[] for _ in known]
+    start = known[0].greenhouse.start
+    end = start + np.timedelta64(days, "D")
+    crops = [one.crop for one, _ in pairs]
+    seasons = simulate_many(
+        [later(one.greenhouse, case) for one, case in pairs],
+        [one.greenhouse.weather(start, end, case.seed) for one, case in pairs],
+        recipe,
+        start,
+        end,
+        count=len(pairs),
+        seed=pairs[0][1].seed,
+        effects=[hidden(case, one.unit, start) for one, case in pairs],
+        disturbances=[disturbances(case) for _, case in pairs],
+        crop=Crop(*(np.concatenate(parts, axis=-1) for parts in zip(*crops, strict=True))),
+    )
+    logs = iter(seasons)
+    return [[next(logs).measured for _ in own] for own in cases]
+
+
+def later(greenhouse: VirtualGreenhouse, case: Case) -> GreenhouseParameters:
+    """Return the greenhouse as it is when the log of a case is taken."""
+    plant = greenhouse.plant.varied(np.random.default_rng(case.seed), relative=DRIFT)
+    if case.group != "clean":
+        return plant
+    return replace(plant, cover_transmission=plant.cover_transmission * CLEANED)
+
+
+def _planted(houses: Sequence[VirtualGreenhouse]) -> Crop:
+    plants, like = stack([one.plant for one in houses]), np.zeros(len(houses))
+    young = np.arange(len(houses)) % 3 == 2
+    both = zip(young_crop(plants, like), mature_crop(plants, like), strict=True)
+    return Crop(*(np.where(young, planted, grown) for planted, grown in both))

@@ -1,0 +1,90 @@
+"""Whether the bundle in force predicts worse than it did, and since when.
+
+A tabular CUSUM over its live errors a day ahead (Page 1954, Biometrika 41:100; Montgomery, Introduction to Statistical
+Quality Control, ch. 9): what lies more than half a standard deviation above the first days is added up, and an excess
+of five standard deviations is no chance. The change began when the sum last left zero. Weather alone makes predictions
+a little worse for weeks, so the days since then must be half as wrong again in the mean.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+import numpy as np
+
+from igrow.core.quantities import QUANTITIES
+
+DAY = 86_400.0
+REFERENCE_DAYS = 5
+"""Days after which it is known how wrong a bundle is when all is well."""
+SLACK, LIMIT = 0.5, 5.0
+"""Allowance and decision interval of the CUSUM, in standard deviations."""
+LEAST_SCATTER = 0.2
+"""Standard deviation, as a share of the mean, that days have at least: five of them tell little of their scatter."""
+LEAST_RATIO = 1.5
+"""Mean error since the change over that of the first days."""
+HORIZON = " 24_h"
+
+
+@dataclass(frozen=True)
+class Worsening:
+    """One quantity that is predicted worse than it was."""
+
+    quantity: str
+    since: float
+    """Seconds since 1970 UTC."""
+    before: float
+    """Mean absolute error a day ahead in the first days of the bundle, in the quantity's unit."""
+    now: float
+    """The same since the change."""
+
+
+def find_worsening(history: Sequence[tuple[float, Mapping[str, float]]]) -> tuple[Worsening, ...]:
+    """Return the quantities that one bundle predicts worse than it did, the longest since first.
+
+    Args:
+        history: time and live errors by "quantity horizon" while this bundle was in force, oldest first.
+    """
+    names = {key.removesuffix(HORIZON) for _, errors in history for key in errors if key.endswith(HORIZON)}
+    found = [one for name in sorted(names) if (one := _worsening(name, history)) is not None]
+    return tuple(sorted(found, key=lambda one: one.since))
+
+
+def worsening_sentence(found: Sequence[Worsening]) -> str:
+    """Return what to tell people, in one line; times are in UTC."""
+    since = datetime.fromtimestamp(min(one.since for one in found), UTC)
+    how = ", ".join(
+        f"{one.quantity.replace('_', ' ')} {one.before:.2g} -> {one.now:.2g} {QUANTITIES[one.quantity].unit}"
+        for one in found
+    )
+    return (
+        f"the simulator predicts a day ahead worse since {since:%Y-%m-%d %H:%M} UTC ({how}): "
+        "something in the greenhouse has changed; the trainer looks for the cause at its next run"
+    )
+
+
+def _worsening(quantity: str, history: Sequence[tuple[float, Mapping[str, float]]]) -> Worsening | None:
+    days = _days([(time, errors[quantity + HORIZON]) for time, errors in history if quantity + HORIZON in errors])
+    reference = [error for _, error in days[:REFERENCE_DAYS]]
+    if len(days) <= REFERENCE_DAYS:
+        return None
+    mean = float(np.mean(reference))
+    scatter = max(float(np.std(reference, ddof=1)), LEAST_SCATTER * mean, 1e-9)
+    total, since = 0.0, days[REFERENCE_DAYS][0]
+    for time, error in days[REFERENCE_DAYS:]:
+        if total <= 0.0:
+            since = time - DAY
+        total = max(0.0, total + (error - mean) / scatter - SLACK)
+    later = float(np.mean([error for time, error in days if time > since]))
+    return Worsening(quantity, since, mean, later) if total > LIMIT and later > LEAST_RATIO * mean else None
+
+
+def _days(errors: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Return one error a day, since those of less than a day apart are of the same hours."""
+    kept: list[tuple[float, float]] = []
+    for time, error in errors:
+        if np.isfinite(error) and (not kept or time - kept[-1][0] >= 0.99 * DAY):
+            kept.append((time, error))
+    return kept

@@ -1,0 +1,168 @@
+"""How greenhouses change with time: the rate at which each parameter, effect and pattern wanders from a calibration.
+
+A wall hardly changes in a month; a crop grows, and its uptake and respiration of CO2 with it. The rates are those of
+independent random walks, learned from pairs of logs (a calibration, and a later log of the same greenhouse with nothing
+missing) of virtual greenhouses in several seasons: the standard deviations that make all later logs likeliest, each
+held a little to the usual one of its group (empirical Bayes by expectation maximisation; Bishop 2006, Pattern
+Recognition and Machine Learning, sections 3.5 and 9.4).
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from igrow.core.arrays import Floats
+from igrow.trainer.diagnosis.knowledge import CROP
+
+FILE = "learned/drift.json"
+ROUNDS = 40
+"""Of expectation maximisation."""
+HELD = 6.0
+"""Logs that the usual rate of a group counts as."""
+LEARNED_SHARE, CO2_SHARE = 0.5, 0.85
+"""Weight of a learned rate against the physically expected one, in logarithms. Where the structure is not the
+greenhouse's a likelihood takes its misfit for change, and what may change too much hides causes; a crop does change."""
+OVER_NULL = 1.3
+"""Times the largest gain of an effect where nothing had changed that it must gain."""
+CO2_OF_CROP = frozenset({
+    "parameter:assimilation_maximum", "parameter:assimilation_light", "parameter:assimilation_co2",
+    "parameter:respiration",
+})  # fmt: skip
+"""What a growing crop does with CO2."""
+CO2_SOURCES: Mapping[str, float] = {"soil_respiration": 0.1, "co2_valve_leak": 0.1}
+"""Least rate of sources of CO2 that a growing crop looks like."""
+
+
+@dataclass(frozen=True)
+class Drift:
+    """Standard deviations of the change between a calibration and a log some days later."""
+
+    rates: Mapping[str, float]
+    """By key (``parameter:name``, an effect, ``channel:when`` of a pattern): of a parameter relative to its value, of
+    an effect in typical amplitudes, of a pattern in its units."""
+    days: float
+    """From the middle of one log to that of the other, in the pairs that they were learned from."""
+    null_gains: Mapping[str, float] = field(default_factory=dict)
+    """Largest gain of an effect in logs with nothing missing of greenhouses that the rates were not learned from."""
+    least_gain: float = 12.0
+    """Gain that a change must have at least: so few of these logs have more, each by the gains of the others."""
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    """The command that learned it, its date and seeds."""
+
+    def needed_gain(self, effect: str) -> float:
+        """Return what a change must gain: more, by some, than it did in any greenhouse in which nothing had changed."""
+        return max(self.least_gain, OVER_NULL * self.null_gains.get(effect, 0.0))
+
+    def rate(self, key: str, expected: float, days: float) -> float:
+        """Return the rate of a key after so many days; no less than after those that it was learned from.
+
+        Args:
+            key: of a parameter, an effect or a pattern.
+            expected: the rate by which it changes within weeks, by physics.
+            days: from the middle of the calibration log to that of the later one.
+        """
+        expected = max(expected, CO2_SOURCES.get(key, 0.0))
+        learned = max(self.rates.get(key, expected), expected)
+        share = CO2_SHARE if key in CO2_OF_CROP else LEARNED_SHARE
+        usual = float(expected ** (1.0 - share) * learned**share)
+        return usual * float(np.sqrt(max(days, self.days) / self.days))
+
+
+@dataclass(frozen=True)
+class Pair:
+    """What a later log says of the change since the calibration, up to a constant."""
+
+    keys: tuple[str, ...]
+    """Of rates, (k,); columns of one effect at several shapes share a key."""
+    unit: Floats
+    """Size of a change of rate one, (k,)."""
+    expected: Floats
+    """Rates by physics, (k,)."""
+    known: Floats
+    """Covariance of what the calibration left open, (k, k)."""
+    information: Floats
+    """Of the later log, (k, k)."""
+    score: Floats
+    """Its gradient at no change, (k,)."""
+
+
+def read_drift(path: Path | None = None) -> Drift:
+    """Return a stored drift (None: the one that came with the trainer)."""
+    file = files("igrow.trainer.diagnosis").joinpath(FILE) if path is None else path
+    return Drift(**json.loads(file.read_text(encoding="utf-8")))
+
+
+def write_drift(path: Path, drift: Drift) -> None:
+    """Write a drift with its provenance."""
+    path.write_text(json.dumps(asdict(drift), indent=1) + "\n", encoding="utf-8")
+
+
+def group_of(key: str) -> str:
+    """Return what a key's rate is held to: the crop's, the walls', that of all effects, or of a channel's patterns."""
+    kind, _, name = key.partition(":")
+    if not name:
+        return "effect"
+    return "crop" if kind == "parameter" and name in CROP else kind
+
+
+def learn(pairs: Sequence[Pair], days: float) -> Drift:
+    """Return the drift that makes later logs likeliest.
+
+    Args:
+        pairs: of greenhouses in which nothing is missing.
+        days: from the middle of a calibration to that of a later log.
+    """
+    rates = {key: rate for one in pairs for key, rate in zip(one.keys, one.expected.tolist(), strict=True)}
+    for _ in range(ROUNDS):
+        squares: dict[str, list[float]] = {key: [] for key in rates}
+        for one in pairs:
+            change = np.array([rates[key] for key in one.keys]) * one.unit
+            for key, square in zip(one.keys, expected_squares(one, change) / one.unit**2, strict=True):
+                squares[key].append(float(square))
+        usual = _usual(squares)
+        for key, own in squares.items():
+            rates[key] = float(np.sqrt((HELD * usual[group_of(key)] + sum(own)) / (HELD + len(own))))
+    return Drift({key: float(f"{rate:.3g}") for key, rate in sorted(rates.items())}, days)
+
+
+def expected_squares(pair: Pair, change: Floats) -> Floats:
+    """Return the expected square of each change given the log, (k,), at changes of standard deviation `change`."""
+    variance = change**2
+    prior = _inverse(pair.known + np.diag(variance))
+    posterior = _inverse(pair.information + prior)
+    to_change = variance[:, None] * prior
+    mean = to_change @ (posterior @ pair.score)
+    spread = variance - variance * np.diag(prior) * variance + np.sum((to_change @ posterior) * to_change, axis=1)
+    squares: Floats = np.asarray(mean**2 + spread, dtype=np.float64)
+    return squares
+
+
+def evidence(pair: Pair, change: Floats) -> float:
+    """Return the log marginal likelihood of a later log over that of no change and full knowledge."""
+    prior = pair.known + np.diag(change**2)
+    posterior = _inverse(pair.information + _inverse(prior))
+    scaled = np.eye(len(prior)) + pair.information @ prior
+    return float(0.5 * pair.score @ posterior @ pair.score - 0.5 * np.linalg.slogdet(scaled)[1])
+
+
+def _usual(squares: Mapping[str, Sequence[float]]) -> dict[str, float]:
+    """Return the geometric mean square of every group."""
+    groups: dict[str, list[float]] = {}
+    for key, own in squares.items():
+        groups.setdefault(group_of(key), []).append(math.log(max(sum(own) / len(own), 1e-12)))
+    return {group: math.exp(sum(logs) / len(logs)) for group, logs in groups.items()}
+
+
+def _inverse(matrix: Floats) -> Floats:
+    """Return the inverse of a covariance whose entries differ by many orders of magnitude."""
+    scale = 1.0 / np.sqrt(np.diag(matrix))
+    inverse: Floats = np.linalg.inv(matrix * scale[:, None] * scale) * scale[:, None] * scale
+    return inverse

@@ -1,0 +1,165 @@
+"""The rounds of a search: one cause after the other, each in a model that has those before it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from igrow.core.arrays import Floats
+from igrow.core.effects import EFFECTS
+from igrow.core.site import Site
+from igrow.trainer.diagnosis import history
+from igrow.trainer.diagnosis.change import changed
+from igrow.trainer.diagnosis.compare import Round, compare
+from igrow.trainer.diagnosis.correction import LogDays
+from igrow.trainer.diagnosis.design import Design, prepare
+from igrow.trainer.diagnosis.estimate import Estimated, estimate, with_refitted, within_bounds
+from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, activate
+from igrow.trainer.diagnosis.nuisance import NuisanceSubspace, read_nuisance
+from igrow.trainer.diagnosis.refit import are_identifiable, refit
+from igrow.trainer.diagnosis.rules import HOUR, DecisionRules
+from igrow.trainer.diagnosis.structure import disagreement
+from igrow.trainer.fit.climate import site_prior
+from igrow.trainer.fit.discrepancy import Discrepancy
+from igrow.trainer.fit.gaussian import Gaussian
+from igrow.trainer.fit.model import FittedModel
+from igrow.trainer.fit.solver import DivergenceError
+
+
+@dataclass(frozen=True)
+class Search:
+    """The rounds of a search: one cause after the other, each in a model that has those before it.
+
+    A large effect moves the model far from where the search linearised it; further causes and what remains can
+    be told only after it has been put in.
+    """
+
+    days: LogDays
+    site: Site
+    knowledge: Knowledge
+    without: frozenset[str]
+    rules: DecisionRules
+    nuisance: NuisanceSubspace
+
+    def run(self, rng: np.random.Generator) -> tuple[Round, Round, list[Estimated]]:
+        """Return the first and the last round, and the causes that were found."""
+        design = self.resolved()
+        first: Round | None = None
+        found: list[Estimated] = []
+        while True:
+            explained = sum(one.gain for one in found)
+            judged = self.judge(design, explained, rng, causes=len(found) < self.rules.most_causes)
+            first = first or judged
+            new = estimate(judged, rng)
+            terms = [] if new is None else self.refitted(judged, [*found, new])
+            if not terms:
+                return first, judged, found
+            try:
+                design = self.design([*self.knowledge.terms, *(one.term for one in terms)], design.interval)
+            except DivergenceError:
+                # No cause: the log itself stayed within all bounds.
+                return first, judged, found
+            found = terms
+
+    def judge(self, design: Design, explained: float, rng: np.random.Generator, *, causes: bool) -> Round:
+        """Return what one round finds."""
+        return compare(design, explained, rng, causes=causes)
+
+    def design(self, terms: Sequence[ActiveTerm], interval: float) -> Design:
+        """Return the design of a model with terms; what usually differs stands in where its structure does not."""
+        hours = interval >= HOUR
+        record, split, known = self.days.record, self.days.split, self.knowledge
+        return prepare(
+            record, split, known.short_prior, activate(record, terms), self.site.longitude, self.rules,
+            discrepancy=known.discrepancy,
+            directions=self.nuisance.directions(transferred=known.transferred) if hours else (),
+            usual_size=self.nuisance.usual_size(split.days, self.rules) if hours else {},
+            without=self.without,
+            interval=interval,
+        )  # fmt: skip
+
+    def resolved(self) -> Design:
+        """Return the first design: by time steps where the model's structure is the greenhouse's, else by hours."""
+        hours = self.design(self.knowledge.terms, HOUR)
+        if self.days.record.step >= HOUR:
+            return hours
+        steps = self.design(self.knowledge.terms, self.days.record.step)
+        return steps if disagreement(hours, steps) <= self.rules.largest_disagreement else hours
+
+    def refitted(self, judged: Round, causes: list[Estimated]) -> list[Estimated]:
+        """Return all causes refitted together, or none where one turns round or a further one adds nothing of its own.
+
+        A further one that only mops up what is left runs to its bound; one that is confounded with another (two ways
+        for CO2 to leak in) leaves neither with a size.
+        """
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):
+                found = refit(judged.design, judged.named, [one.term for one in causes], self.knowledge.terms)
+        except (np.linalg.LinAlgError, DivergenceError):
+            # A poor start can run away; the causes then stay as the search found them.
+            return [within_bounds(one) for one in causes]
+        better = [with_refitted(one, two, self.rules) for one, two in zip(causes, found, strict=True)]
+        stands = all(one.term.amplitude != 0.0 for one in better) and all(map(_is_inside, better[1:]))
+        return better if stands and (len(found) == 1 or are_identifiable(found)) else []
+
+
+@dataclass(frozen=True)
+class Change(Search):
+    """The same in a greenhouse whose history is known: what has changed in it since."""
+
+    history: Discrepancy
+    plain: Design
+    """The log without any cause, before any noise."""
+    misfit: Floats
+    """What the model is expected to miss in this log."""
+
+    def judge(self, design: Design, explained: float, rng: np.random.Generator, *, causes: bool) -> Round:
+        """Return what one round finds."""
+        return changed(design, explained, rng, causes=causes)
+
+    def design(self, terms: Sequence[ActiveTerm], interval: float) -> Design:
+        """Return the design of a model with terms, about the calibrated parameters."""
+        plain = laid_out(self.days, self.site, self.history, terms, self.rules) if terms else self.plain
+        return history.expected(self.history, plain, self.misfit, self.without)
+
+    def resolved(self) -> Design:
+        """Return the first design: by the steps that the history was learned from."""
+        return self.design(self.knowledge.terms, self.days.record.step)
+
+
+def search_of(
+    days: LogDays,
+    site: Site,
+    model: FittedModel,
+    knowledge: Knowledge,
+    without: frozenset[str],
+    rules: DecisionRules,
+    nuisance: NuisanceSubspace | None,
+) -> Search:
+    """Return the search that fits what is known: of changes where the greenhouse's history applies to the log."""
+    common = (days, site, knowledge, without, rules, nuisance or read_nuisance())
+    known = model.history
+    if not rules.history or known is None or model.calibrated_on != site.name:
+        return Search(*common)
+    plain = laid_out(days, site, known, (), rules)
+    if not history.applies(known, plain):
+        return Search(*common)
+    return Change(*common, known, plain, history.expected_misfit(known, plain))
+
+
+def laid_out(
+    days: LogDays, site: Site, known: Discrepancy, terms: Sequence[ActiveTerm], rules: DecisionRules
+) -> Design:
+    """Return the design of a log about the parameters of the calibration, before any noise."""
+    names = tuple(known.parameters)
+    spread = site_prior(site).marginal(names).covariance
+    about = Gaussian(names, np.array(list(known.parameters.values())), spread)
+    return history.lay_out(days.record, days.split, about, activate(days.record, terms), site.longitude, rules)
+
+
+def _is_inside(one: Estimated) -> bool:
+    """Tell whether a cause lies inside its bounds."""
+    bound, amplitude = EFFECTS[one.effect].amplitude, one.term.amplitude
+    return amplitude < bound.high and (bound.low == 0.0 or amplitude > bound.low)
