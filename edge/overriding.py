@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Collection, Mapping
 from pathlib import Path
 
 from igrow.core.errors import IgrowError
 from igrow.edge.configuration import Configuration
 from igrow.edge.sources.override import RECIPE, Lease, read_leases, write_leases
+from igrow.edge.state_file import alone_in
 
 OVERRIDE_FILE = "override.json"
 
@@ -46,17 +48,17 @@ def override(
     if not path.parent.is_dir():
         # Made by root, it would shut out the service's own user.
         raise IgrowError(f"{path.parent}: is not there; the daemon makes it when it first starts, override after that")
-    leases = {name: lease for name, lease in read_leases(path).items() if name not in give_back}
     for name, value in values.items():
         if name not in configuration.setpoints:
             raise IgrowError(f"{name[:40]} is no setpoint of this site: {', '.join(configuration.setpoints)}")
         rule = configuration.guard_rules.points[name]
         if not rule.low <= value <= rule.high:
             raise IgrowError(f"{name}={value:g}: the site's limits are {rule.low:g} to {rule.high:g}")
-        leases[name] = Lease(value, seconds, by=by)
-    if recipe:
-        leases[RECIPE] = Lease(1.0, seconds, by=by)
-    problem = write_leases(path, leases, by if give_back else "")
+    wanted = {**values, RECIPE: 1.0} if recipe else values
+    taken = {name: Lease(value, seconds, by=by, asked=time.time_ns()) for name, value in wanted.items()}
+    with alone_in(path.parent):
+        kept = {name: lease for name, lease in read_leases(path).items() if name not in give_back}
+        problem = write_leases(path, kept | taken, by if give_back else "")
     if problem:
         raise IgrowError(problem)
-    return leases
+    return kept | taken

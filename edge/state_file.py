@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import json
-from collections.abc import Callable, Mapping
+import os
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TypeVar
 
@@ -36,6 +38,20 @@ def write_state(path: Path, content: Mapping[str, object]) -> str:
     return ""
 
 
+@contextlib.contextmanager
+def alone_in(folder: Path, *, wait: bool = True) -> Iterator[None]:
+    """Let nobody else in who changes what a file of the folder holds: command line, page and daemon all do.
+
+    Raises BlockingIOError where somebody is in it and there is no time to wait; OSError.
+    """
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+        yield
+    finally:
+        os.close(descriptor)
+
+
 class StateFile:
     """A state file as the control cycle has it: a disk that hangs can neither hold its reader nor its writer."""
 
@@ -59,11 +75,20 @@ class StateFile:
         return self._aside.ask(work)
 
     def write(self, content: Mapping[str, object], unless: Callable[[], bool] = lambda: False) -> None:
-        """Replace the file, at once where the disk answers in time; not where `unless` then holds."""
+        """Replace the file, at once where the disk answers in time; not where `unless` then holds.
+
+        Nor where somebody else is changing it in this very moment: what he leaves is seen the next time.
+        """
 
         def now() -> None:
-            if not unless():
-                self._problem = write_state(self.path, content)
+            try:
+                with alone_in(self.path.parent, wait=False):
+                    if not unless():
+                        self._problem = write_state(self.path, content)
+            except BlockingIOError:
+                pass
+            except OSError as error:
+                self._problem = f"{self.path}: {error.strerror or error}"
 
         with contextlib.suppress(LateError):
             self._aside.do(now)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from igrow.edge.hand_off import LateError
-from igrow.edge.state_file import StateFile, read_state, write_state
+from igrow.edge.state_file import StateFile, alone_in, read_state, write_state
 
 ACKNOWLEDGED_FILE = "acknowledged.json"
 
@@ -33,9 +33,13 @@ def read_acknowledged(path: Path) -> dict[str, Acknowledgement]:
 
 def acknowledge(path: Path, names: Collection[str], by: str, time: float, active: Collection[str]) -> str:
     """Add acknowledgements and forget those of alarms that are over; returns an empty text or why it failed."""
-    kept = {name: one for name, one in read_acknowledged(path).items() if name in active}
-    kept |= {name: Acknowledgement(by, time) for name in names}
-    return write_state(path, {name: {"by": one.by, "time": one.time} for name, one in kept.items()})
+    try:
+        with alone_in(path.parent):
+            kept = {name: one for name, one in read_acknowledged(path).items() if name in active}
+            kept |= {name: Acknowledgement(by, time) for name in names}
+            return write_state(path, {name: {"by": one.by, "time": one.time} for name, one in kept.items()})
+    except OSError as error:
+        return f"{path.parent}: {error.strerror or error}"
 
 
 class AcknowledgementWatch:

@@ -140,7 +140,12 @@ class PageServer:
         # The flash is taken here, in the one thread that sessions belong to.
         said = session.take_said() if session is not None and request.method == "GET" else ("", True)
         span = request.query.get("span", "day")
-        return await self._aside(lambda: self._pages.page(span, session, said, has_password=password is not None))
+
+        def make() -> Response:
+            made = self._pages.page(span, session, said, has_password=password is not None)
+            return made.packed() if request.takes_gzip else made
+
+        return await self._aside(make)
 
     async def _post(self, request: Request) -> Response:
         if not same_origin(request):

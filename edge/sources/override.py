@@ -40,6 +40,13 @@ class Lease:
     """When the daemon first saw it."""
     by: str = ""
     """Who asked for it."""
+    asked: int | None = None
+    """Tells one wish from another that is the same in all else."""
+
+    def is_that_of(self, known: Lease | None) -> bool:
+        """Tell whether the daemon knows this lease already, though the file may not say so yet."""
+        undated = known is not None and self.seen is None and self.asked is not None
+        return self == known or (undated and known is not None and self.asked == known.asked)
 
 
 def read_leases(path: Path) -> dict[str, Lease]:
@@ -57,8 +64,9 @@ def _leases(content: Mapping[str, object]) -> dict[str, Lease]:
             continue
         if math.isfinite(value) and math.isfinite(seconds):
             end = float(until) if isinstance(until, int | float) else None
-            by = str(entry.get("by") or "")
-            leases[name] = Lease(float(value), float(seconds), end, from_json(entry.get("seen")), by)
+            by, asked = str(entry.get("by") or ""), entry.get("asked")
+            asked = asked if isinstance(asked, int) else None
+            leases[name] = Lease(float(value), float(seconds), end, from_json(entry.get("seen")), by, asked)
     return leases
 
 
@@ -71,6 +79,7 @@ def _plain(leases: Mapping[str, Lease], given_back_by: str = "") -> dict[str, ob
     entries: dict[str, object] = {
         name: {
             "value": x.value, "seconds": x.seconds, "until": x.until, "seen": x.seen and to_json(x.seen), "by": x.by,
+            "asked": x.asked,
         }
         for name, x in leases.items()
     }  # fmt: skip
@@ -137,7 +146,7 @@ class GrowerOverride:
     def _say(self, leases: Mapping[str, Lease], given_back_by: str, image: Image) -> None:
         """Tell what is new, and what was given back before its time; what a restart finds again is neither."""
         for name, lease in leases.items():
-            if lease.seen is None and lease != self._leases.get(name):
+            if lease.seen is None and not lease.is_that_of(self._leases.get(name)):
                 by, seconds = lease.by or "unknown", lease.seconds
                 if name == RECIPE:
                     self._tell("recipe_wanted", seconds=seconds, by=by)
@@ -155,8 +164,9 @@ class GrowerOverride:
         now = Moment(self._boot, image.monotonic, image.true_time)
         dated: dict[str, Lease] = {}
         for name, lease in leases.items():
-            if lease == self._leases.get(name):
-                dated[name] = lease
+            known = self._leases.get(name)
+            if known is not None and lease.is_that_of(known):
+                dated[name] = known
                 continue
             passed = None if lease.seen is None else now.since(lease.seen)
             left = lease.seconds - (passed or 0.0)

@@ -25,7 +25,7 @@ from igrow.edge.sources import (
 )
 from igrow.edge.sources.override import RECIPE as WISH
 from igrow.edge.sources.override import read_leases, write_leases
-from igrow.edge.state_file import StateFile
+from igrow.edge.state_file import StateFile, alone_in
 from tests.control.control_fakes import image_of
 
 T0 = 1_772_323_200.0
@@ -293,3 +293,30 @@ def test_what_ends_by_itself_was_given_back_by_nobody(tmp_path):
     write_leases(path, {}, "Bert")
     heating(every, 62.0, T0 + 62.0)
     assert [kind for kind, _ in told] == ["overridden"]
+
+
+def test_a_lease_that_another_change_leaves_undated_does_not_begin_anew(tmp_path):
+    path, told = tmp_path / "override.json", []
+    every = wanting(path, None, told)
+    mine = {"heating_setpoint": Lease(21.0, 600.0, by="Anna", asked=1)}
+    write_leases(path, mine)
+    heating(every, 0.0, T0)
+    # Somebody has read the file before the daemon dated it, and writes it with a wish of his own.
+    write_leases(path, mine | {"co2_setpoint": Lease(500.0, 600.0, by="Bert", asked=2)})
+    heating(every, 300.0, T0 + 300.0)
+    assert [(detail["setpoint"], detail["by"]) for _, detail in told] == [
+        ("heating_setpoint", "Anna"), ("co2_setpoint", "Bert"),
+    ]  # fmt: skip
+    assert heating(every, 601.0, T0 + 601.0)[0] == "recipe"
+    # The same wish once more is a new one.
+    write_leases(path, {"heating_setpoint": Lease(21.0, 600.0, by="Anna", asked=3)})
+    assert heating(every, 602.0, T0 + 602.0)[0] == "override"
+
+
+def test_the_daemon_dates_no_lease_while_somebody_else_changes_the_file(tmp_path):
+    path = tmp_path / "override.json"
+    source = override_in(path)
+    write_leases(path, {"heating_setpoint": Lease(21.0, 600.0, asked=1)})
+    with alone_in(tmp_path):
+        assert source.offer(image_of(0.0, T0)).setpoints == {"heating_setpoint": 21.0}
+        assert read_leases(path)["heating_setpoint"].seen is None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import gzip
 import json
 import re
 import socket
@@ -14,7 +15,7 @@ from urllib.parse import urlencode
 import pytest
 
 from igrow.edge.notifications.acknowledged import ACKNOWLEDGED_FILE, read_acknowledged
-from igrow.edge.overriding import override_file
+from igrow.edge.overriding import override, override_file
 from igrow.edge.page import server as page_server
 from igrow.edge.page.password import hashed, remove_password, write_password
 from igrow.edge.page.server import PageServer
@@ -139,6 +140,16 @@ async def test_everything_comes_from_this_server_under_a_strict_policy(visitor: 
             assert "http://" not in found.body.replace("http://www.w3.org/2000/svg", "")
 
 
+async def test_a_browser_that_takes_it_gets_the_page_compressed(visitor: Visitor):
+    plain = await visitor.get()
+    reader, writer = await asyncio.open_connection("127.0.0.1", visitor.server.port)
+    writer.write(b"GET / HTTP/1.1\r\nHost: localhost\r\nAccept-Encoding: gzip;q=1.0, br\r\n\r\n")
+    head, _, body = (await asyncio.wait_for(reader.read(), 30.0)).partition(b"\r\n\r\n")
+    writer.close()
+    assert b"Content-Encoding: gzip" in head
+    assert len(gzip.decompress(body)) == pytest.approx(len(plain.body.encode()), rel=0.01)
+
+
 @pytest.mark.parametrize("path", ["/etc/passwd", "/../page.css", "/templates/page.html", "/page.html", "//", "/act"])
 async def test_there_is_nothing_else_to_be_had(visitor: Visitor, path: str):
     assert (await visitor.get(path)).status == 404
@@ -229,6 +240,18 @@ async def test_a_setpoint_is_taken_for_a_time_in_the_name_of_who_did_it_and_give
     await visitor.act(do="release", setpoint="heating_setpoint")
     assert list(visitor.leases) == ["lamp_on"]
     assert json.loads(override_file(visitor.folder / "state").read_text())["given_back_by"] == "Anna (page)"
+
+
+async def test_wishes_at_the_same_moment_are_all_kept(visitor: Visitor):
+    configuration = visitor.server._pages.configuration()
+
+    def wish(name: str, value: float) -> None:
+        for _ in range(20):
+            override(configuration, {name: value}, 3600.0, by="somebody")
+
+    wishes = {"heating_setpoint": 18.0, "co2_setpoint": 500.0, "lamp_on": 0.0, "irrigation_on": 1.0}
+    await asyncio.gather(*(asyncio.to_thread(wish, name, value) for name, value in wishes.items()))
+    assert {name: lease.value for name, lease in visitor.leases.items()} == wishes
 
 
 async def test_recipe_and_plan(visitor: Visitor):
