@@ -201,7 +201,7 @@ def speed(_: argparse.Namespace) -> None:
             values = rng.standard_normal(settings.offspring).astype(np.float32)
             random = draw(rng, settings, genes)
             began = time.perf_counter()
-            for _ in range(1000):
+            for _turn in range(1000):
                 parents, fitness, offspring = run(parents, fitness, offspring, values, random)
             rate = 1000 / (time.perf_counter() - began)
             print(f"{name:16s}{rate:9.0f} generations/s of {settings.offspring} candidates of {genes} genes")

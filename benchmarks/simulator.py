@@ -10,6 +10,7 @@ from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 
+from igrow.core.arrays import Floats
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.quantities import SETPOINTS
 from igrow.core.simulator.hybrid import climate
@@ -21,7 +22,7 @@ CANDIDATES, HOURS, ROUNDS = 1000, 48, 20
 START = np.datetime64("2020-03-01T00:00:00")
 
 
-def weather() -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+def weather() -> Floats:
     """Two plausible days in the planner's six columns."""
     hour = np.arange(HOURS)
     sun = np.maximum(np.sin((hour % 24 - 6) / 12 * np.pi), 0.0)
@@ -29,11 +30,11 @@ def weather() -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
     return np.stack(columns, axis=1)
 
 
-def candidates(seed: int) -> np.ndarray[tuple[int, int, int], np.dtype[np.float64]]:
+def candidates(seed: int) -> Floats:
     """Random strategies, (candidates, hours, setpoints)."""
     random = np.random.default_rng(seed)
     low, high = np.array([14.0, 400.0, 0.0, 0.0]), np.array([24.0, 1000.0, 1.0, 1.0])
-    return low + (high - low) * random.random((CANDIDATES, HOURS, len(SETPOINTS)))
+    return np.asarray(low + (high - low) * random.random((CANDIDATES, HOURS, len(SETPOINTS))))
 
 
 def graph_rate(seed: int) -> float:

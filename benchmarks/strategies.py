@@ -160,10 +160,10 @@ def lead(
         outcome = houses.advance(np.stack(chosen)[:, :every])
         for row, now in enumerate(states):
             again = simulator.simulate(now, coming[row], chosen[row][None], begin).first(every)
-            had = {name: each[[row]] for name, each in totals(outcome).items()}
+            used = {name: each[[row]] for name, each in totals(outcome).items()}
             driven = (0.0, 0.0) if simulator.growth is None else grown_days(simulator.growth, again)
             air = float(again.air_temperature.mean()), float(outcome.air_temperature[:, row].mean())
-            past[row].append((totals(again), had, driven, air))
+            past[row].append((totals(again), used, driven, air))
         for place, book in enumerate(books.values()):
             part = slice(place * scenario.count, (place + 1) * scenario.count)
             mine = Outcome(**{one.name: getattr(outcome, one.name)[:, part] for one in fields(Outcome)})
@@ -184,7 +184,10 @@ def recently(simulator: BundleSimulator, site: Site, days: Iterable[Day]) -> Cor
     """Return the simulator corrected by what was expected of the last days and what they used and grew."""
     found = list(days)
     factor = factors(
-        *({name: np.array([float(day[side][name][0]) for day in found]) for name in SCALED} for side in (0, 1))
+        *(
+            {name: np.array([float(total[name][0]) for total in side]) for name in SCALED}
+            for side in ([day[0] for day in found], [day[1] for day in found])
+        )
     )
     air = warmer(*np.array([day[3] for day in found]).reshape(-1, 2).T)
     balance = simulator.growth

@@ -87,7 +87,7 @@ class Rates(NamedTuple):
         return self.growth_respiration + self.fruit_maintenance + self.leaf_maintenance + self.stem_maintenance
 
 
-def young_crop(p: GreenhouseParameters, like: Array, leaf_area_index: float = 0.4) -> Crop:
+def young_crop(p: GreenhouseParameters, like: Array, leaf_area_index: Array = 0.4) -> Crop:
     """Return a transplanted crop; `like` gives the shape (a float, or an array (N,))."""
     zero = 0.0 * like
     leaf = zero + leaf_area_index / p.specific_leaf_area
@@ -106,7 +106,7 @@ def young_crop(p: GreenhouseParameters, like: Array, leaf_area_index: float = 0.
     )
 
 
-def mature_crop(p: GreenhouseParameters, like: Array, leaf_area_index: float = 2.8) -> Crop:
+def mature_crop(p: GreenhouseParameters, like: Array, leaf_area_index: Array = 2.8) -> Crop:
     """Return a crop in full production, with the fruit load of a steady state."""
     young = young_crop(p, like, leaf_area_index)
     shape = (STAGES, *([1] * np.ndim(like)))

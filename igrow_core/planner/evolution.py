@@ -119,7 +119,9 @@ def draw(rng: np.random.Generator, settings: EvolutionSettings, genes: int) -> M
 class Generation(Protocol):
     """Runs `generation`: in numpy, or from optimizer.onnx."""
 
-    settings: EvolutionSettings
+    @property
+    def settings(self) -> EvolutionSettings:
+        """The sizes that its arrays have."""
 
     def __call__(
         self,
