@@ -159,7 +159,7 @@ class _Front(asyncio.Protocol):
 
     async def connect(self) -> None:
         transport, _ = await self.loop.create_connection(lambda: _Back(self), "127.0.0.1", self.proxy.behind)
-        self.back = cast(asyncio.Transport, transport)
+        self.back = transport
         self.back.write(self.unsent)
         if self.transport.is_closing():
             self.back.close()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from igrow.edge.bus.modbus_bus import ModbusBus
 from igrow.edge.bus.plc import RegisterPlc
@@ -137,7 +138,7 @@ class PlcBench:
     def received(self, name: str) -> list[float]:
         return [value for _, value in self.unit_of(name).received.get(name, [])]
 
-    async def stop(self, during: asyncio.Future[object] | None = None) -> tuple[StopReport, float]:
+    async def stop(self, during: asyncio.Future[Any] | None = None) -> tuple[StopReport, float]:
         """Stop as the daemon does, in the middle of a cycle or between two; returns the report and how long it took."""
         begin = asyncio.get_running_loop().time()
         if during is not None and not during.done():

@@ -66,7 +66,7 @@ class MemoryServer:
         pass
 
 
-class _Selector(selectors.DefaultSelector):  # type: ignore[misc,valid-type]
+class _Selector(selectors.DefaultSelector):
     loop: SimulatedLoop
 
     def select(self, timeout: float | None = None) -> Any:

@@ -106,15 +106,19 @@ class WildSource:
 class LoopClock:
     """The simulated loop's time."""
 
+    doubt = ""
+
     def __init__(self) -> None:
         self.monotonic = asyncio.get_running_loop().time
 
-    @property
-    def clock_ok(self) -> bool:
-        return True
-
     def true_time(self) -> float:
         return 1.7e9 + self.monotonic()
+
+    def recall(self, known: float | None) -> None:
+        pass
+
+    def witness(self, other: float) -> None:
+        pass
 
 
 async def play(seed: int, cycles: int = 15) -> tuple[int, int]:

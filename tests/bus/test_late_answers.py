@@ -71,7 +71,8 @@ async def poll_a_late_line(seed: int, *, in_order: bool, share: float, polls: in
     loop = asyncio.get_running_loop()
     bus = ModbusBus(settings, monotonic=loop.time)
     bus.start()
-    tally, waiting, stamp = Tally(), {}, 0
+    tally, stamp = Tally(), 0
+    waiting: dict[ReadRequest, float] = {}
     confirmed: Counter[tuple[int, tuple[int, ...]]] = Counter()
     for _ in range(polls):
         for block in BLOCKS:

@@ -55,7 +55,7 @@ async def behind_proxy(
     await serve(*units, transport=transport)
     proxy = FaultProxy(PORT, rtu=transport.is_rtu, seed=1, rate=0.0, timeout=1.0)
     script = list(faults)
-    proxy.next_fault = lambda: script.pop(0) if script else Fault.NONE  # type: ignore[method-assign]
+    proxy.next_fault = lambda: script.pop(0) if script else Fault.NONE
     return make_bus(transport, await proxy.listen()), units[0]
 
 
@@ -353,9 +353,11 @@ def test_a_late_echo_does_not_confirm_the_next_write_to_the_same_registers() -> 
         line = LateLine({1: CodedUnit(1)}, seed=1, share=0.0, timeout=1.0, latest=1.0, in_order=False)
         bus = make_bus(Transport.RTU_OVER_TCP, await line.listen())
         echoes = iter((2.2, 60.0))  # the second request is lost, as good as
-        line.say = lambda answer: asyncio.get_running_loop().call_later(  # type: ignore[method-assign]
-            next(echoes), LateLine.say, line, answer
-        )
+
+        def say_later(answer: bytes) -> None:
+            asyncio.get_running_loop().call_later(next(echoes), LateLine.say, line, answer)
+
+        line.say = say_later
         first, second = (WriteRequest(1, Function.HOLDING, 300, values) for values in ((1, 1), (2, 2)))
         with pytest.raises(NoAnswerError):
             await bus.write(first, Priority.WRITE)
@@ -425,7 +427,7 @@ def test_a_connection_whose_other_end_has_vanished_is_given_up_after_three_silen
         proxy = FaultProxy(PORT, rtu=False, seed=1, rate=0.0, timeout=1.0)
         bus = make_bus(port=await proxy.listen())
         await read(bus)
-        proxy.next_fault = lambda: Fault.NO_REQUEST if bus.connects == 1 else Fault.NONE  # type: ignore[method-assign]
+        proxy.next_fault = lambda: Fault.NO_REQUEST if bus.connects == 1 else Fault.NONE
         for _ in range(3):
             with pytest.raises(NoAnswerError):
                 await read(bus)

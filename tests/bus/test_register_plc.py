@@ -17,7 +17,7 @@ from igrow.edge.bus.errors import (
     ValueDoesNotFitError,
 )
 from igrow.edge.bus.plc import RegisterPlc
-from igrow.edge.bus.protocol import Priority, ReadRequest, WriteRequest
+from igrow.edge.bus.protocol import Bus, Priority, ReadRequest, WriteRequest
 from igrow.edge.registers.loading import parse_register_map
 from igrow.edge.registers.model import Function
 from tests.bus.simulated_loop import run
@@ -54,6 +54,9 @@ class FakeBus:
         self.connected = True
 
     def start(self) -> None:
+        pass
+
+    def last_orders(self) -> None:
         pass
 
     async def close(self) -> None:
@@ -204,7 +207,7 @@ def test_two_buses_are_read_at_the_same_time() -> None:
 
     async def main() -> float:
         loop = asyncio.get_running_loop()
-        buses = {"net": SlowBus({0: 0}), "roof": SlowBus({0: 0})}
+        buses: dict[str, Bus] = {"net": SlowBus({0: 0}), "roof": SlowBus({0: 0})}
         plc = RegisterPlc(parse_register_map(MAP), monotonic=loop.time, buses=buses)
         begin = loop.time()
         await plc.read(["air_temperature", "wind_speed"])

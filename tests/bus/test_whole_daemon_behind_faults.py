@@ -16,6 +16,7 @@ import pytest
 from igrow.edge import pace
 from igrow.edge.bus import plc as bus_of_plc
 from igrow.edge.bus.modbus_bus import ModbusBus
+from igrow.edge.daemon import Daemon
 from igrow.edge.registers.codec import decode
 from igrow.edge.registers.model import BusSettings, Device, Function
 from igrow.edge.sources.override import Lease, write_leases
@@ -44,7 +45,7 @@ class Recorder:
         self._memory = plant.plc.memory
         self._write = self._memory.write
         self.received: dict[str, list[float]] = {name: [] for name in LIMITS}
-        self._memory.write = self.write  # type: ignore[method-assign]
+        self._memory.write = self.write
 
     def write(self, function: Function, address: int, values: Sequence[int]) -> None:
         self._write(function, address, values)
@@ -84,13 +85,17 @@ async def play(folder: Path, seed: int, cycles: int) -> Sequence[Fault]:
     (folder / "map.yaml").write_text(text)
     async with running(path) as daemon:
         for stage in range(10, cycles, 10):
-            await until(lambda stage=stage: daemon.cycles >= stage, 300.0)
+            await reached(daemon, stage)
             wishes = {name: Lease(generator.choice(WISHES[name]), 1e6) for name in LIMITS}
             assert write_leases(folder / "state" / "override.json", wishes) == ""
     proxy.close()
     await plant.down()
     judge(folder / "state" / "store", recorder.received)
     return proxy.faults
+
+
+async def reached(daemon: Daemon, cycles: int) -> None:
+    await until(lambda: daemon.cycles >= cycles, 300.0)
 
 
 def judge(store: Path, received: Mapping[str, Sequence[float]]) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
+from concurrent.futures import Future
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +14,7 @@ from igrow.edge.bus.errors import BusError, NoAnswerError
 from igrow.edge.bus.plc import Reading
 from igrow.edge.clock import FakeClock
 from igrow.edge.cycle import ControlCycle
+from igrow.edge.earlier import Earlier
 from igrow.edge.guard import GuardedWriter, GuardRules, Interlock, PointRule, Readback
 from igrow.edge.image import Image, Quality, Value
 from igrow.edge.journal import Journal
@@ -64,9 +67,10 @@ class MemoryStore:
     """Keeps every record in a list."""
 
     rows: list[tuple[float, Mapping[str, Value]]] = field(default_factory=list)
-    events: list[tuple[str, Mapping[str, object]]] = field(default_factory=list)
+    events: list[tuple[str, Mapping[str, Any]]] = field(default_factory=list)
     writes: list[WriteRecord] = field(default_factory=list)
     alarms: list[AlarmRecord] = field(default_factory=list)
+    states: list[Mapping[str, object]] = field(default_factory=list)
     health: str = ""
 
     def append(self, time: float, values: Mapping[str, Value]) -> None:
@@ -81,8 +85,15 @@ class MemoryStore:
     def record_alarm(self, record: AlarmRecord) -> None:
         self.alarms.append(record)
 
-    def writes_of_last_day(self) -> Sequence[WriteRecord]:
-        return [record for record in self.writes if record.outcome == "written"]
+    def earlier(self, log_seconds: float) -> Future[Earlier]:
+        found: Future[Earlier] = Future()
+        written = [record for record in self.writes if record.outcome == "written"]
+        state = self.states[-1] if self.states else None
+        found.set_result(Earlier(None, state, written, self.telemetry(0.0, 0.0)))
+        return found
+
+    def record_state(self, time: float | None, content: Mapping[str, object]) -> None:
+        self.states.append(dict(content))
 
     def telemetry(self, start: float, end: float) -> Telemetry:
         return Telemetry(np.array([], dtype="datetime64[s]"), {})

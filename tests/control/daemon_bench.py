@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 import socket
 from collections.abc import AsyncIterator, Callable, Mapping
 from pathlib import Path
@@ -11,10 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from igrow.edge.configuration import load_configuration
+from igrow.edge.cycle import CycleResult
 from igrow.edge.daemon import Daemon
+from igrow.edge.ports import ActiveBundle, PlanningService
 from igrow.edge.registers.loading import load_register_map
+from igrow.edge.status.server import StatusServer
 from igrow.edge.virtual_plc.pace import Lockstep, Pace
 from igrow.edge.virtual_plc.virtual_plc import VirtualPlc
+from igrow.edge.wiring import Control
 
 MAP = """
 title: test plant
@@ -115,19 +120,25 @@ class Plant:
         self._pace = pace or Lockstep(300.0)
         self._port = port
         self._device = device
-        self.plc: VirtualPlc | None = None
+        self._plc: VirtualPlc | None = None
+
+    @property
+    def plc(self) -> VirtualPlc:
+        """The PLC, from when the plant was up first."""
+        assert self._plc is not None
+        return self._plc
 
     async def up(self) -> None:
-        self.plc = VirtualPlc(self.table, self._map, self._pace, device=self._device)
+        self._plc = VirtualPlc(self.table, self._map, self._pace, device=self._device)
         await self.plc.start(port=self._port)
 
     async def down(self) -> None:
-        assert self.plc is not None
         await self.plc.close()
 
-    def shows(self, name: str) -> float | None:
-        assert self.plc is not None
-        return self.plc.memory.value(name)
+    def shows(self, name: str) -> float:
+        value = self.plc.memory.value(name)
+        assert value is not None
+        return value
 
 
 async def until(condition: Callable[[], object], seconds: float = 60.0) -> None:
@@ -135,6 +146,34 @@ async def until(condition: Callable[[], object], seconds: float = 60.0) -> None:
     async with asyncio.timeout(seconds):
         while not condition():  # noqa: ASYNC110 - what is waited for happens in other tasks and processes
             await asyncio.sleep(0.01)
+
+
+def control_of(daemon: Daemon) -> Control:
+    """What it controls with; it has begun to."""
+    assert daemon._control is not None
+    return daemon._control
+
+
+def last(daemon: Daemon) -> CycleResult:
+    """What its last cycle came to; there was one."""
+    assert daemon.last is not None
+    return daemon.last
+
+
+def status_port(daemon: Daemon) -> int:
+    """Where its page is served."""
+    assert isinstance(daemon.services.status, StatusServer)
+    return daemon.services.status.port
+
+
+def plan_at_once(daemon: Daemon, planner: PlanningService, bundle: Path) -> None:
+    """Have plans made by `planner`, from the next cycle on."""
+    daemon.services.planning = planner
+    daemon.services.updates.active = lambda: ActiveBundle("test", bundle)
+    schedule = control_of(daemon).schedule
+    assert schedule is not None
+    schedule._service = planner
+    schedule._due = schedule._young_until = -math.inf
 
 
 @contextlib.asynccontextmanager

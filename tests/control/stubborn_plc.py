@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from igrow.edge.bus.errors import AddressRefusedError, NoAnswerError, NoValueError
 from igrow.edge.bus.plc import Reading
@@ -126,7 +127,9 @@ class StubbornPlc(FakePlc):
         for name, aim in self._aims.items():
             step = self.ramps[name] * seconds
             self.values[name] += min(max(aim - self.values[name], -step), step)
-        for unit in {self.unit_of(name) for name in self.values} if self.fallback_after is not None else ():
+        if self.fallback_after is None:
+            return
+        for unit in {self.unit_of(name) for name in self.values}:
             if now - self._heard_at.setdefault(unit, now) > self.fallback_after:
                 self._fall_back({name for name in SAFE if name in self.values and self.unit_of(name) == unit})
                 if "plc_fallback" in self.values and self.unit_of("plc_fallback") == unit:
@@ -175,7 +178,7 @@ class StubbornBench(Bench):
         self.cycle = self.build()
         self.cycle.recall(self.notes.content, 0.0, same=self.cycle.readback.points, agree=away <= respect_hand)
 
-    def events(self, kind: str) -> list[Mapping[str, object]]:
+    def events(self, kind: str) -> list[Mapping[str, Any]]:
         return [detail for name, detail in self.store.events if name == kind]
 
     @property

@@ -15,16 +15,17 @@ import numpy as np
 import pytest
 
 from igrow.core.errors import IgrowError
+from igrow.core.greenhouse.described import parse_effect
 from igrow.edge.cli import COMMANDS, main
 from igrow.edge.cli.common import parse_duration, parse_time
 from igrow.edge.cli.plan import table
 from igrow.edge.cli.probe import parse_units
-from igrow.edge.cli.simulate_plc import make_plant, parse_effect
+from igrow.edge.cli.simulate_plc import make_plant
 from igrow.edge.cli.status import lines
 from igrow.edge.ports import Plan
 from igrow.edge.sources.override import read_leases
 from igrow.edge.state_lock import sole_use
-from tests.control.daemon_bench import Plant, free_port, running, until, write_files
+from tests.control.daemon_bench import Plant, free_port, running, status_port, until, write_files
 
 
 def call(capsys, *arguments: object) -> tuple[int, str, str]:
@@ -89,7 +90,7 @@ async def test_an_override_reaches_the_plc_and_status_says_so(tmp_path, capsys):
         await until(lambda: plant.shows("heating_setpoint") == 19.0)
         await asyncio.to_thread(main, ["override", str(path), "heating_setpoint=17", "--for", "300 d"])
         await until(lambda: plant.shows("heating_setpoint") == 17.0)
-        status = ["status", str(path), "--port", str(daemon.services.status.port)]
+        status = ["status", str(path), "--port", str(status_port(daemon))]
         text, said = "", "heating_setpoint   asked 17, written 17, PLC shows 17 degC (override)"
         for _ in range(200):
             # The daemon sees what it wrote with its next reading.
@@ -230,8 +231,11 @@ def test_simulate_plc_serves_what_mean_commands_ask_for(tmp_path):
         stdout=subprocess.PIPE, text=True,
     )  # fmt: skip
     try:
+        assert process.stdout is not None
         line = process.stdout.readline()
-        port = re.search(r":(\d+),", line).group(1)
+        found = re.search(r":(\d+),", line)
+        assert found is not None
+        port = found[1]
         assert "plant time 2020-01-15T00:00:00" in line
         probe = [
             sys.executable,

@@ -78,17 +78,17 @@ async def test_each_value_is_read_when_it_is_shown(tmp_path, monkeypatch):
     class Slow(Script):
         def ask(self, question):
             # Somebody changes a value at the PLC while the person still compares the values before it.
-            plant.plc.set_by_hand("heating_setpoint", 21.0)
+            plants[0].plc.set_by_hand("heating_setpoint", 21.0)
             return super().ask(question)
 
     person = Slow()
 
+    plants: list[Plant] = []
+
     def prepare(made):
-        nonlocal plant
-        plant = made
+        plants.append(made)
         made.plc.set_by_hand("heating_setpoint", 18.0)
 
-    plant = None
     await walk(tmp_path, person, only_read=True, prepare=prepare)
     assert "  heating_setpoint = 21 degC" in person.lines
 

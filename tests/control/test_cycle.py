@@ -232,7 +232,8 @@ def test_only_the_guards_writer_writes_to_a_plc():
         if "bus" in path.parts or "virtual_plc" in path.parts:
             continue
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-            is_write = isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "write"
-            if is_write and "plc" in ast.unparse(node.func.value).lower():
+            if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)):
+                continue
+            if node.func.attr == "write" and "plc" in ast.unparse(node.func.value).lower():
                 callers.add(path.relative_to(root).as_posix())
     assert callers == {"guard/writer.py"}

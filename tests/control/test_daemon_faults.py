@@ -3,20 +3,29 @@
 from __future__ import annotations
 
 import asyncio
-import math
 import signal
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from igrow.edge.daemon import Daemon
 from igrow.edge.image import Quality
 from igrow.edge.planning import GraphProcess, PlanningProcess
-from igrow.edge.ports import ActiveBundle
 from igrow.edge.store import read_records, read_telemetry
 from igrow.edge.virtual_plc.pace import Realtime
-from tests.control.daemon_bench import MAP, Plant, free_port, running, until, write_files
+from tests.control.daemon_bench import (
+    MAP,
+    Plant,
+    control_of,
+    free_port,
+    last,
+    plan_at_once,
+    running,
+    until,
+    write_files,
+)
 
 
 def kinds(folder: Path) -> list[str]:
@@ -51,7 +60,7 @@ async def test_a_server_that_is_down_at_boot_is_found_when_it_comes(tmp_path):
     path = write_files(tmp_path, port)
     async with running(path) as daemon:
         await until(lambda: daemon.cycles >= 1)
-        assert not daemon.last.image.link_ok
+        assert not last(daemon).image.link_ok
         plant = Plant(tmp_path, port)
         await plant.up()
         await until(lambda: plant.shows("heating_setpoint") == 19.0)
@@ -67,11 +76,11 @@ async def test_a_line_that_is_lost_and_comes_back_is_used_again(tmp_path):
         await until(lambda: daemon.cycles >= 20)
         plant.plc.drop_connections()
         cycles = daemon.cycles
-        await until(lambda: daemon.cycles > cycles + 20 and daemon.last.image.link_ok)
+        await until(lambda: daemon.cycles > cycles + 20 and last(daemon).image.link_ok)
         await plant.down()
         await until(lambda: [alarm.name for alarm in daemon._journal.alarms.active] == ["link"])
         await plant.up()
-        await until(lambda: daemon.last.image.link_ok and plant.shows("heating_setpoint") == 19.0)
+        await until(lambda: last(daemon).image.link_ok and plant.shows("heating_setpoint") == 19.0)
         assert not daemon._journal.alarms.active
     await plant.down()
     assert "changed_by_hand" not in kinds(tmp_path)
@@ -86,7 +95,7 @@ async def test_a_frozen_thermometer_moves_heating_to_the_safe_setpoint(tmp_path)
         await until(lambda: plant.shows("heating_setpoint") == 19.0)
         plant.table.frozen.add("air_temperature")
         await until(lambda: plant.shows("heating_setpoint") == 18.0)
-        await until(lambda: daemon.last.image.value_of("air_temperature").quality is Quality.FROZEN)
+        await until(lambda: last(daemon).image.value_of("air_temperature").quality is Quality.FROZEN)
         plant.table.frozen.clear()
         await until(lambda: plant.shows("heating_setpoint") == 19.0)
     await plant.down()
@@ -99,8 +108,8 @@ async def test_a_plc_in_1970_is_controlled_by_light_and_nothing_is_dated(tmp_pat
     await plant.up()
     async with running(path) as daemon:
         await until(lambda: daemon.cycles >= 30)
-        assert daemon.last.image.true_time is None
-        assert "told by the light" in daemon.last.decision.why
+        assert last(daemon).image.true_time is None
+        assert "told by the light" in last(daemon).decision.why
         assert plant.shows("heating_setpoint") == 19.0
     await plant.down()
     assert not (tmp_path / "state" / "store" / "telemetry.db").exists()
@@ -115,11 +124,14 @@ async def test_a_setpoint_changed_at_the_plc_is_respected_also_across_kill_9_and
     command = [sys.executable, "-m", "igrow.edge.cli", "run", str(path)]
     process = await asyncio.create_subprocess_exec(*command)
 
+    async def another_beat():
+        beat = plant.shows("heartbeat")
+        await until(lambda: plant.shows("heartbeat") not in (beat, 0.0))
+
     async def two_cycles():
         """The second change of the heartbeat comes after a whole cycle."""
-        for _ in range(2):
-            beat = plant.shows("heartbeat")
-            await until(lambda beat=beat: plant.shows("heartbeat") not in (beat, 0.0))
+        await another_beat()
+        await another_beat()
 
     try:
         await until(lambda: plant.shows("co2_setpoint") > 400.0)
@@ -146,10 +158,9 @@ async def test_a_setpoint_changed_at_the_plc_is_respected_also_across_kill_9_and
         r.body["detail"] for r in read_records(tmp_path / "state" / "store", "event") if r.body["kind"] == "stopped"
     ]
     assert stops == [{"setpoints": "the safe setpoints were written, but for co2_setpoint, which a hand has set"}]
-    (held,) = {
-        r.body["points"]["co2_setpoint"]["hand"] for r in read_records(tmp_path / "state" / "store", "state")[:1]
-    }
-    assert held == 555.0
+    (newest, *_) = read_records(tmp_path / "state" / "store", "state")
+    points: Any = newest.body["points"]
+    assert points["co2_setpoint"]["hand"] == 555.0
 
 
 async def test_a_hand_that_has_been_respected_for_long_enough_does_not_begin_again_with_a_restart(tmp_path):
@@ -181,13 +192,13 @@ async def test_a_reload_keeps_what_is_known_of_sensors_that_are_seldom_read(tmp_
     await plant.up()
     async with running(path) as daemon:
         await until(lambda: daemon.cycles >= 3)
-        before = daemon.last.image.value_of("air_temperature")
+        before = last(daemon).image.value_of("air_temperature")
         control = daemon._control
         daemon.reload()
-        await until(lambda: daemon._control is not control and daemon.last.image.monotonic > 0)
+        await until(lambda: daemon._control is not control and last(daemon).image.monotonic > 0)
         cycles = daemon.cycles
         await until(lambda: daemon.cycles >= cycles + 2)
-        value = daemon.last.image.value_of("air_temperature")
+        value = last(daemon).image.value_of("air_temperature")
         assert (value.value, value.quality) == (before.value, Quality.GOOD)
         assert value.age > before.age
         assert not daemon._journal.alarms.active
@@ -258,7 +269,7 @@ async def test_a_bus_that_is_down_while_another_one_is_up_falls_back_and_that_is
         await until(lambda: agreed(daemon, "co2_setpoint") == 700.0)
         await second.down()
         await until(lambda: [alarm.name for alarm in daemon._journal.alarms.active] == ["link second"])
-        assert daemon.last.image.link_ok
+        assert last(daemon).image.link_ok
         cycles = daemon.cycles
         await until(lambda: daemon.cycles >= cycles + 4)
         await second.up()
@@ -277,19 +288,18 @@ async def test_a_planner_that_hangs_delays_no_cycle_and_the_recipe_rules(tmp_pat
     await plant.up()
     async with running(path) as daemon:
         await until(lambda: daemon.cycles >= 2)
+        assert daemon.services.planning is not None
         daemon.services.planning.close()
         planner = PlanningProcess(
             daemon.configuration.site, GraphProcess(), seconds=3.0, planner="tests.control.hanging_planner:make_plan"
         )
-        daemon.services.planning = daemon._control.schedule._service = planner
-        daemon.services.updates.active = lambda: ActiveBundle("test", tmp_path)
         # A day of log is asked for before a first plan; this test has no day.
         monkeypatch.setattr("igrow.edge.planning_schedule.LEAST_HISTORY", 0.0)
-        daemon._control.schedule._due = daemon._control.schedule._young_until = -math.inf
+        plan_at_once(daemon, planner, tmp_path)
         await until(lambda: planner.busy)
         cycles = daemon.cycles
         await until(lambda: daemon.cycles >= cycles + 3)
-        assert daemon.last.decision.source == "recipe"
+        assert last(daemon).decision.source == "recipe"
         await until(lambda: not planner.busy)
         assert "too long" in planner.health
         cycles = daemon.cycles
@@ -325,8 +335,8 @@ async def test_a_plant_that_runs_faster_than_time_is_followed_at_the_cycles_inte
     await plant.up()
     async with running(path) as daemon:
         await until(lambda: daemon.cycles >= 8)
-        assert daemon.last.image.link_ok
-        spent = daemon.last.image.monotonic
+        assert last(daemon).image.link_ok
+        spent = last(daemon).image.monotonic
         assert spent / (daemon.cycles - 1) >= 300.0
     await plant.down()
     times = read_telemetry(tmp_path / "state" / "store", 0.0, 8e9).time
@@ -340,17 +350,17 @@ async def test_a_reload_of_the_same_registers_keeps_the_line(tmp_path):
     await plant.up()
     async with running(path) as daemon:
         await until(lambda: daemon.cycles >= 5)
-        control = daemon._control
+        control = control_of(daemon)
         daemon.reload()
         await until(lambda: daemon._control is not control)
-        assert daemon._control.plc is control.plc
-        control = daemon._control
+        assert control_of(daemon).plc is control.plc
+        control = control_of(daemon)
         (tmp_path / "map.yaml").write_text((tmp_path / "map.yaml").read_text().replace("0.5 s", "0.6 s"))
         daemon.reload()
         await until(lambda: daemon._control is not control)
-        assert daemon._control.plc is not control.plc
+        assert control_of(daemon).plc is not control.plc
         cycles = daemon.cycles
-        await until(lambda: daemon.cycles > cycles + 5 and daemon.last.image.link_ok)
+        await until(lambda: daemon.cycles > cycles + 5 and last(daemon).image.link_ok)
     await plant.down()
 
 
@@ -443,7 +453,7 @@ async def test_a_cycle_that_hangs_feeds_the_watchdog_no_more(tmp_path, clock, in
     async with running(path, notifier=recorder) as daemon:
         await until(lambda: daemon.cycles >= 3)
         go_on = asyncio.Event()
-        plc = daemon._control.cycle._plc
+        plc = control_of(daemon).cycle._plc
         read = plc.read
 
         hangs = []

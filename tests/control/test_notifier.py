@@ -42,7 +42,7 @@ async def test_a_wait_longer_than_the_watchdog_feeds_it_and_then_ends(tmp_path):
         await pace.wait(notifier)  # the first cycle is due at once
         await pace.wait(notifier)
         notifier.ready()
-        heard = []
+        heard: list[str] = []
         while not heard or heard[-1] != "READY=1":
             heard.append(server.recv(4096).decode())
         notifier.close()

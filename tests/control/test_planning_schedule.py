@@ -16,6 +16,7 @@ from igrow.edge.image import Image, Quality, Value
 from igrow.edge.planning_schedule import ESSENTIAL, PlanningRules, PlanningSchedule
 from igrow.edge.ports import ActiveBundle, Plan, PlanRequest
 from igrow.edge.sources import FreshPlan, PlanKeeper, Recipe
+from tests.control.control_fakes import MemoryStore
 
 T0 = 1_772_323_200.0
 HOUR = 3600.0
@@ -36,12 +37,18 @@ class FakePlanning:
     def latest(self) -> Plan | None:
         return None
 
+    async def wait(self, timeout: float) -> None:  # noqa: ASYNC109 - as the service has it
+        return
+
+    def close(self) -> None:
+        return
+
 
 @dataclass
-class LogStore:
+class LogStore(MemoryStore):
     """A store whose log began some hours before T0."""
 
-    hours: float
+    hours: float = 48.0
 
     def telemetry(self, start: float, end: float) -> Telemetry:
         first = T0 - self.hours * HOUR
@@ -52,7 +59,7 @@ class LogStore:
 def make(hours=48.0, forecast=None):
     planning = FakePlanning()
     rules = PlanningRules(every=6 * HOUR, horizon=48 * HOUR, step=HOUR, history=96 * HOUR, seed=5, forecast=forecast)
-    schedule = PlanningSchedule(rules, planning, LogStore(hours), Recipe(), ZoneInfo("UTC"))
+    schedule = PlanningSchedule(rules, planning, LogStore(hours=hours), Recipe(), ZoneInfo("UTC"))
     return schedule, planning
 
 
@@ -83,7 +90,7 @@ def test_nobody_else_leads_between_two_plans(every, takes):
     """Three days of five-minute cycles: from the first plan on, each is there when the one before it ends."""
     planning = FakePlanning()
     rules = PlanningRules(every=every * HOUR, horizon=24 * HOUR, step=HOUR, history=96 * HOUR, seed=5)
-    schedule = PlanningSchedule(rules, planning, LogStore(48.0), Recipe(), ZoneInfo("UTC"))
+    schedule = PlanningSchedule(rules, planning, LogStore(), Recipe(), ZoneInfo("UTC"))
     made = None
 
     def plan_of(request):

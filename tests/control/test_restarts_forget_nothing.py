@@ -8,7 +8,7 @@ import pytest
 from igrow.edge.clock import FakeClock
 from igrow.edge.moment import Moment, from_json, this_boot, to_json
 from igrow.edge.remembering import NOTE_AGAIN, StateNotes
-from tests.control.control_fakes import FixedSource
+from tests.control.control_fakes import FixedSource, MemoryStore
 from tests.control.stubborn_plc import RULES, SAFE, make_stubborn_bench
 
 WISH = {"heating_setpoint": 21.0, "co2_setpoint": 700.0, "lamp_on": 1.0, "irrigation_on": 0.5}
@@ -210,11 +210,12 @@ async def test_a_reload_keeps_hands_intervals_interlocks_and_writes_on_their_way
 # how long nobody was there
 
 
-class Ledger:
+class Ledger(MemoryStore):
     """A store that keeps states as they are on the disk."""
 
     def __init__(self):
-        self.lines = []
+        super().__init__()
+        self.lines: list[str] = []
 
     def record_state(self, time, content):
         self.lines.append(json.dumps(content))

@@ -264,7 +264,8 @@ def test_the_wanted_recipe_is_safe_where_nobody_knows_the_time_of_day(tmp_path):
 
 
 def test_who_takes_and_gives_back_is_told_once(tmp_path):
-    path, told = tmp_path / "override.json", []
+    path = tmp_path / "override.json"
+    told: list[tuple[str, dict[str, object]]] = []
     every = wanting(path, None, told)
     write_leases(path, {"heating_setpoint": Lease(21.0, 600.0, by="Anna"), WISH: Lease(1.0, 600.0, by="Anna")})
     for second in range(3):
@@ -285,7 +286,8 @@ def test_who_takes_and_gives_back_is_told_once(tmp_path):
 
 
 def test_what_ends_by_itself_was_given_back_by_nobody(tmp_path):
-    path, told = tmp_path / "override.json", []
+    path = tmp_path / "override.json"
+    told: list[tuple[str, dict[str, object]]] = []
     every = wanting(path, None, told)
     write_leases(path, {"heating_setpoint": Lease(21.0, 60.0, by="Anna")})
     heating(every, 0.0, T0)

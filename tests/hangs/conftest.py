@@ -6,15 +6,17 @@ import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from igrow.edge import daemon as daemon_module
 from igrow.edge.configuration import load_configuration
 from igrow.edge.daemon import Daemon
+from igrow.edge.pace import TickPace
 from igrow.edge.store import read_records
 from igrow.edge.virtual_plc.pace import Realtime
-from tests.control.daemon_bench import Plant, free_port, until, write_files
+from tests.control.daemon_bench import Plant, control_of, free_port, until, write_files
 
 PATIENCE = 120.0
 """Seconds; only says when a test has failed, on however busy a machine."""
@@ -22,6 +24,13 @@ SAFE = {"heating_setpoint": 18.0, "co2_setpoint": 400.0}
 PROMPT = "minimum_interval: 0 s, dead_band: 0.1}\n"
 CYCLES = 25
 """That have to follow while something hangs."""
+
+
+def hurry(daemon: Daemon) -> None:
+    """Let its cycles follow one another quickly."""
+    pace = control_of(daemon).pace
+    assert isinstance(pace, TickPace)
+    pace._interval = 0.05
 
 
 class Bench:
@@ -46,14 +55,14 @@ class Bench:
         return self.folder / "state" / "store"
 
     @contextlib.asynccontextmanager
-    async def running(self, stops_at: Mapping[str, float] = SAFE, **replaced: object) -> AsyncIterator[Daemon]:
+    async def running(self, stops_at: Mapping[str, float] = SAFE, **replaced: Any) -> AsyncIterator[Daemon]:
         """Run the daemon; then stop it, and hold it to what a stop promises, whatever hangs by then."""
         await self.plant.up()
         self.daemon = daemon = Daemon(load_configuration(self.configuration), **replaced)
         task = asyncio.create_task(daemon.run())
         try:
             await until(lambda: daemon._control is not None, PATIENCE)
-            daemon._control.pace._interval = 0.05
+            hurry(daemon)
             yield daemon
             assert self.plant.shows("co2_setpoint") != SAFE["co2_setpoint"]
             daemon.stop()
@@ -70,8 +79,9 @@ class Bench:
     async def goes_on(self) -> None:
         """Wait for many more cycles, and as many heartbeats."""
         assert self.daemon is not None
-        cycles, beat = self.daemon.cycles, self.plant.shows("heartbeat")
-        await until(lambda: self.daemon.cycles > cycles + CYCLES, PATIENCE)
+        daemon = self.daemon
+        cycles, beat = daemon.cycles, self.plant.shows("heartbeat")
+        await until(lambda: daemon.cycles > cycles + CYCLES, PATIENCE)
         assert self.plant.shows("heartbeat") >= beat + CYCLES - 2
 
     def events(self) -> list[str]:

@@ -90,6 +90,7 @@ class HangingDisk:
             if self._below(path):
                 self._wait()
             connection = connect(database, *arguments, factory=SlowConnection, **named)
+            assert isinstance(connection, SlowConnection)
             connection.below = self._below(path)
             return connection
 

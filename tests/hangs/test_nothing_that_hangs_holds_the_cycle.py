@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import math
 import os
 import signal
 import socket
@@ -16,15 +15,16 @@ import threading
 from pathlib import Path
 
 import pytest
+from pymodbus.transport.serialtransport import SerialTransport
 
 from igrow.core.whole_files import write_whole
-from igrow.edge.bus.pymodbus_link import SerialTransport
+from igrow.edge.exchange import ExchangeService
 from igrow.edge.notify import Notifier
 from igrow.edge.planning import GraphProcess, PlanningProcess
-from igrow.edge.ports import ActiveBundle
 from igrow.edge.sources.override import Lease, write_leases
-from tests.control.daemon_bench import until
-from tests.hangs.conftest import PATIENCE, Bench
+from igrow.edge.status.server import StatusServer
+from tests.control.daemon_bench import plan_at_once, until
+from tests.hangs.conftest import PATIENCE, Bench, hurry
 from tests.hangs.hanging_disk import HangingDisk
 from tests.tiny_bundle import endless_graph, write_tiny_bundle
 
@@ -105,9 +105,7 @@ async def test_a_forecast_on_a_share_that_hangs(bench: Bench, monkeypatch: pytes
         planner = PlanningProcess(
             daemon.configuration.site, daemon.services.graphs, planner=f"{FUNCTIONS}:wait_for_the_forecast"
         )
-        daemon.services.planning = daemon._control.schedule._service = planner
-        daemon.services.updates.active = lambda: ActiveBundle("test", bench.folder)
-        daemon._control.schedule._due = daemon._control.schedule._young_until = -math.inf
+        plan_at_once(daemon, planner, bench.folder)
         await until(lambda: planner.busy, PATIENCE)
         await bench.controls()
         await bench.goes_on()
@@ -119,11 +117,10 @@ async def test_a_planning_process_that_was_stopped(bench: Bench, monkeypatch: py
     async with bench.running() as daemon:
         graphs = GraphProcess()
         assert graphs.call(f"{FUNCTIONS}:nothing", seconds=PATIENCE) is None
+        assert graphs.pid is not None
         os.kill(graphs.pid, signal.SIGSTOP)
         planner = PlanningProcess(daemon.configuration.site, graphs, planner=f"{FUNCTIONS}:nothing")
-        daemon.services.planning = daemon._control.schedule._service = planner
-        daemon.services.updates.active = lambda: ActiveBundle("test", bench.folder)
-        daemon._control.schedule._due = daemon._control.schedule._young_until = -math.inf
+        plan_at_once(daemon, planner, bench.folder)
         await until(lambda: planner.busy, PATIENCE)
         await bench.controls()
         await bench.goes_on()
@@ -135,13 +132,16 @@ async def test_an_exchange_that_hangs(bench: Bench) -> None:
     bench.add("exchange: exchange\n")
     async with bench.running() as daemon:
         exchange = daemon.services.exchange
+        assert isinstance(exchange, ExchangeService)
         await until(lambda: exchange._process is not None, PATIENCE)
-        os.kill(exchange._process.pid, signal.SIGSTOP)
+        courier = exchange._process
+        assert courier is not None
+        os.kill(courier.pid, signal.SIGSTOP)
         await bench.controls()
         await bench.goes_on()
         assert exchange.busy
     with contextlib.suppress(ProcessLookupError):
-        os.kill(exchange._process.pid, signal.SIGKILL)
+        os.kill(courier.pid, signal.SIGKILL)
 
 
 async def test_updates_whose_trust_lies_on_a_disk_that_hangs(bench: Bench) -> None:
@@ -181,14 +181,16 @@ async def test_a_bundle_whose_self_test_never_ends(bench: Bench) -> None:
 async def test_visitors_of_the_status_page_who_say_nothing_and_read_nothing(bench: Bench) -> None:
     async with bench.running() as daemon:
         await bench.controls()
-        port = daemon.services.status.port
-        visitors = [await asyncio.open_connection("127.0.0.1", port, limit=1) for _ in range(200)]
+        status = daemon.services.status
+        assert isinstance(status, StatusServer)
+        visitors = [await asyncio.open_connection("127.0.0.1", status.port, limit=1) for _ in range(200)]
         for _, writer in visitors[:50]:
+            assert isinstance(writer.transport, asyncio.Transport)
             writer.transport.pause_reading()
             writer.write(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n" * 100)
         await bench.goes_on()
         handles = open_handles()
-        await until(lambda: not daemon.services.status._visits, PATIENCE)
+        await until(lambda: not status._visits, PATIENCE)
         assert open_handles() <= handles
         for _, writer in visitors:
             writer.transport.abort()
@@ -208,7 +210,7 @@ async def test_a_configuration_on_a_share_that_hangs(bench: Bench, monkeypatch: 
         away.rename(file)
         daemon.reload()
         await until(lambda: not daemon._configuration_problem, PATIENCE)
-        daemon._control.pace._interval = 0.05
+        hurry(daemon)
         file.unlink()
         os.mkfifo(file)
         daemon.reload()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -51,7 +53,7 @@ def spans(blocks: tuple[Block, ...]) -> list[tuple[int, int]]:
         "never above 125 registers",
     ],
 )
-def test_points_are_gathered(addresses: list[int], limits: dict[str, object], expected: list[tuple[int, int]]) -> None:
+def test_points_are_gathered(addresses: list[int], limits: dict[str, Any], expected: list[tuple[int, int]]) -> None:
     points = [register(f"p{address}", address) for address in addresses]
     assert spans(plan_reads(points, {"plc": device(**limits)})) == expected
 

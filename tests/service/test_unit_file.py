@@ -72,6 +72,6 @@ def test_the_daemon_has_a_user_of_its_own_that_sysusers_makes() -> None:
 
 def test_the_unit_is_readable_as_an_ini_file_apart_from_repeated_keys() -> None:
     parser = configparser.ConfigParser(strict=False, interpolation=None)
-    parser.optionxform = str
+    parser.optionxform = lambda optionstr: optionstr
     parser.read_string(UNIT.read_text())
     assert parser.sections() == ["Unit", "Service", "Install"]
