@@ -39,7 +39,7 @@ def linear_graph(slope: float, offset: float) -> bytes:
         ],
     )
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=9)
-    return model.SerializeToString()
+    return bytes(model.SerializeToString())
 
 
 def endless_graph() -> bytes:
@@ -89,7 +89,7 @@ def _graph_of(nodes: list[onnx.NodeProto], constants: list[onnx.TensorProto]) ->
         constants,
     )
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=9)
-    return model.SerializeToString()
+    return bytes(model.SerializeToString())
 
 
 def write_tiny_bundle(

@@ -78,7 +78,7 @@ def columns(path: Path) -> list[np.ndarray]:
 
 
 def days(serial: np.ndarray) -> np.ndarray:
-    return np.datetime64("1899-12-30") + np.floor(serial).astype(int)
+    return np.asarray(np.datetime64("1899-12-30") + np.floor(serial).astype(int))
 
 
 # From the table of computed totals beside the data, EUR/m2; the Reference counts its first harvest as of 2020.

@@ -28,7 +28,8 @@ def times(*texts: str) -> np.ndarray:
 
 def table(count: int = 10, step: int = 300) -> Telemetry:
     time = np.datetime64("2020-01-31T12:00:00") + np.arange(count) * np.timedelta64(step, "s")
-    return Telemetry(time, {"air_temperature": 20.0 + np.arange(count), "air_co2": np.full(count, 600.0)})
+    rising = 20.0 + np.arange(count, dtype=np.float64)
+    return Telemetry(time, {"air_temperature": rising, "air_co2": np.full(count, 600.0)})
 
 
 def refused(path: Path, text: str) -> str:

@@ -22,8 +22,17 @@ def test_the_content_is_on_the_disk_before_it_takes_the_name(tmp_path, monkeypat
     path = tmp_path / "state.json"
     done = []
     sync, replace = os.fsync, Path.replace
-    monkeypatch.setattr("os.fsync", lambda descriptor: (done.append("on the disk"), sync(descriptor)))
-    monkeypatch.setattr(Path, "replace", lambda *paths: (done.append("named"), replace(*paths)))
+
+    def note_sync(descriptor: int) -> None:
+        done.append("on the disk")
+        sync(descriptor)
+
+    def note_replace(old: Path, new: Path) -> Path:
+        done.append("named")
+        return replace(old, new)
+
+    monkeypatch.setattr("os.fsync", note_sync)
+    monkeypatch.setattr(Path, "replace", note_replace)
     write_whole(path, b"content")
     assert done == ["on the disk", "named"]
 

@@ -51,7 +51,8 @@ def test_a_day_that_is_over_is_sealed_and_sent_by_a_process_of_its_own(tmp_path:
     finish(exchange, START + DAY + 300)
     assert exchange.health == ""
     (path,) = (tmp_path / "exchange" / "house" / "segments").iterdir()
-    assert SegmentName.parse(path.name).number == 1
+    name = SegmentName.parse(path.name)
+    assert name is not None and name.number == 1
     exchange.tick(START + DAY + 310)
     assert not exchange.busy, "nothing is due"
     exchange.close()

@@ -113,15 +113,14 @@ def run_sequence(folder: Path, seed: int, patch: pytest.MonkeyPatch) -> None:
             now = later
             for _ in range(chance.random.randrange(1, 4)):
                 clock = now + 300 if not chance.hits(0.1) else now + chance.random.choice([-400, 3653]) * DAY
-                step = chance.random.choice(
-                    [
-                        lambda clock=clock: world.round(clock, partly=chance.random.random() < 0.2),
-                        lambda now=now: world.collect(now + 2 * DAY),
-                        place.repeat,
-                    ]
-                )
+                step = chance.random.choice(["round", "collect", "repeat"])
                 try:
-                    step()
+                    if step == "round":
+                        world.round(clock, partly=chance.random.random() < 0.2)
+                    elif step == "collect":
+                        world.collect(now + 2 * DAY)
+                    else:
+                        place.repeat()
                 except (Killed, IgrowError, OSError):
                     continue
         chance.healed = True

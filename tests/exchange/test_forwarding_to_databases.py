@@ -65,7 +65,8 @@ def influx(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 def ask(server: str, query: str) -> dict:
     data = urllib.parse.urlencode({"q": query, "db": "igrow"}).encode()
     with urllib.request.urlopen(f"{server}/query", data=data, timeout=60) as answer:
-        return json.load(answer)
+        found: dict = json.load(answer)
+    return found
 
 
 def test_influxdb_holds_each_value_once(archive: Archive, influx: str) -> None:

@@ -126,7 +126,8 @@ def test_a_power_cut_between_segment_and_state_seals_nothing_twice(world: World)
     run_days(world, 1, 2)
     (world.outbox / "chain.json").write_bytes(before)
     run_days(world, 2, 3)
-    assert [SegmentName.parse(name).number for name in world.waiting()] == [1, 2, 3]
+    waiting = [SegmentName.parse(name) for name in world.waiting()]
+    assert [name and name.number for name in waiting] == [1, 2, 3]
     assert world.collect(START + 3 * DAY).notes == []
     world.assert_complete()
 
@@ -160,10 +161,12 @@ def test_duckdb_and_pandas_read_the_archive_without_us(world: World, tmp_path: P
     run_days(world, 0, 2)
     world.collect(START + 2 * DAY)
     files = f"{tmp_path}/archive/telemetry/**/*.parquet"
-    (row,) = duckdb.sql(
+    found = duckdb.sql(
         "select site, month, count(*), max(air_temperature) "
         f"from read_parquet('{files}', hive_partitioning=true) group by all"
-    ).fetchall()
+    )
+    assert found is not None
+    (row,) = found.fetchall()
     assert row[:3] == (SITE, "2026-02", 288)
     assert row[3] == pytest.approx(max(world.logged.values()))
     frame = pd.read_parquet(tmp_path / "archive" / "telemetry")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -43,7 +44,7 @@ def sides(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Place, Place]
         return FolderPlace(tmp_path / "exchange"), FolderPlace(tmp_path / "exchange")
     if request.param == "sftp":
         server: Sftp = request.getfixturevalue("sftp")
-        keys = {"known_hosts": str(server.known_hosts), "identity": str(server.identity)}
+        keys: dict[str, Any] = {"known_hosts": str(server.known_hosts), "identity": str(server.identity)}
         url = f"{server.url}/{tmp_path.name}"
         (server.root / tmp_path.name).mkdir()
         return open_at_gateway(url, **keys), open_at_trainer(url, **keys)
@@ -98,7 +99,7 @@ def test_a_server_with_another_key_is_refused_on_both_sides(sftp: Sftp, tmp_path
     other = " ".join((tmp_path / "other.pub").read_text().split()[:2])
     pinned = tmp_path / "known_hosts"
     pinned.write_text(f"[127.0.0.1]:{sftp.port} {other}\n")
-    keys = {"known_hosts": str(pinned), "identity": str(sftp.identity)}
+    keys: dict[str, Any] = {"known_hosts": str(pinned), "identity": str(sftp.identity)}
     with pytest.raises(ExchangeError, match="not the pinned one"):
         open_at_gateway(sftp.url, **keys).entries("x")
     with pytest.raises(ExchangeError, match="not the pinned one"):
@@ -107,7 +108,7 @@ def test_a_server_with_another_key_is_refused_on_both_sides(sftp: Sftp, tmp_path
 
 def test_a_server_whose_key_is_not_known_is_refused_on_both_sides(sftp: Sftp, tmp_path: Path) -> None:
     (tmp_path / "known_hosts").write_text("")
-    keys = {"known_hosts": str(tmp_path / "known_hosts"), "identity": str(sftp.identity)}
+    keys: dict[str, Any] = {"known_hosts": str(tmp_path / "known_hosts"), "identity": str(sftp.identity)}
     with pytest.raises(ExchangeError):
         open_at_gateway(sftp.url, **keys).entries("x")
     with pytest.raises(ExchangeError):
@@ -116,7 +117,7 @@ def test_a_server_whose_key_is_not_known_is_refused_on_both_sides(sftp: Sftp, tm
 
 def test_a_client_whose_key_the_server_does_not_know_is_told_so(sftp: Sftp, tmp_path: Path) -> None:
     subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", str(tmp_path / "mine")], check=True)
-    keys = {"known_hosts": str(sftp.known_hosts), "identity": str(tmp_path / "mine")}
+    keys: dict[str, Any] = {"known_hosts": str(sftp.known_hosts), "identity": str(tmp_path / "mine")}
     with pytest.raises(ExchangeError, match="does not know our key"):
         open_at_gateway(sftp.url, **keys).entries("x")
 

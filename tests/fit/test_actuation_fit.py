@@ -21,7 +21,7 @@ def test_rules_fitted_to_a_log_do_what_its_computer_did() -> None:
     assert inferred == ()
     rules = fit_actuation([(record, setpoints, None)], nominal(SITE))
     usual = actuation.default_rules()
-    seen = record.inputs | record.measured | {"par": np.zeros(len(record))}
+    seen = {**record.inputs, **record.measured, "par": np.zeros(len(record))}
     for name, size in (("vent_lee", 3.0), ("rail_pipe_temperature", 4.0), ("energy_screen", 10.0)):
         wanted = actuation.targets(np, setpoints, seen, seen, seen, usual)[name]
         got = actuation.targets(np, setpoints, seen, seen, seen, rules)[name]

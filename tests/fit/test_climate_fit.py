@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -86,7 +87,7 @@ def test_it_lowers_the_error_on_days_it_has_not_seen(truth: dict[str, float]) ->
 
 def test_no_other_method_finds_a_lower_minimum(record: Record, monkeypatch: pytest.MonkeyPatch) -> None:
     """Scipy's trust-region reflective method, from another start and to the last digit, on the same rows."""
-    seen = {}
+    seen: dict[str, Any] = {}
 
     def spied(residuals, jacobian, prior, low, high, **options):
         seen.update(residuals=residuals, jacobian=jacobian, weights=options["weights"], low=low, high=high)

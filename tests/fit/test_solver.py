@@ -120,7 +120,7 @@ def test_a_step_on_which_the_model_diverges_is_shortened() -> None:
     def residuals(point: np.ndarray) -> np.ndarray:
         if point[0] > 3.0:
             raise DivergenceError("out of all bounds")
-        return 100.0 * (np.exp(point) - np.exp(2.9))
+        return np.asarray(100.0 * (np.exp(point) - np.exp(2.9)))
 
     prior = Gaussian(("a",), np.zeros(1), np.eye(1) * 100.0)
     found = solve(residuals, lambda x: 100.0 * np.exp(x)[:, None], prior, -FAR[:1], FAR[:1])

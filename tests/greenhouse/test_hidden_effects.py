@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -63,7 +65,8 @@ def test_a_sensor_fault_is_in_the_measurement_and_the_plc_follows_it(spring: Tel
 
 
 def evaluate(effect: HiddenEffect, now: float = 0.0, repeat: int = 1, **drivers: float) -> float:
-    bank, memory = EffectBank(Floats, [effect], None, 0.0), []
+    bank = EffectBank(Floats, [effect], None, 0.0)
+    memory: list[Any] = []
     for _ in range(repeat):
         result = bank.evaluate({**REFERENCE_DRIVERS, **drivers}, now, 60.0, memory)
     return float(next(iter(result.values())))

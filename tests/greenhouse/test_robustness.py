@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from igrow.core.greenhouse import Disturbances, GreenhouseParameters, generate_weather, recipe, simulate, simulate_many
@@ -56,13 +58,13 @@ def test_wild_setpoints_in_odd_greenhouses_stay_physical() -> None:
 def test_unwatered_crops_close_their_stomata() -> None:
     weather = generate_weather(SPRING, SPRING + hours(24 * 6 + 1), seed=3)
 
-    def schedule(permitted: float) -> dict[str, float]:
-        return {"heating_setpoint": 20.0, "co2_setpoint": 600.0, "lamp_on": 0.0, "irrigation_on": permitted}
+    def schedule(permitted: float) -> Callable[[np.datetime64], dict[str, float]]:
+        wanted = {"heating_setpoint": 20.0, "co2_setpoint": 600.0, "lamp_on": 0.0, "irrigation_on": permitted}
+        return lambda _time: wanted
 
     wet, dry = (
         simulate(
-            GreenhouseParameters(), weather, lambda _time, share=share: schedule(share), SPRING,
-            SPRING + hours(24 * 6), seed=1,
+            GreenhouseParameters(), weather, schedule(share), SPRING, SPRING + hours(24 * 6), seed=1,
         )
         for share in (1.0, 0.0)
     )  # fmt: skip

@@ -107,7 +107,7 @@ def test_a_published_bundle_is_shadowed_and_adopted_while_the_daemon_controls(si
 
     report = site.reports("adopted")[0]
     assert report["site"] == "demo"
-    assert {row["quantity"] for row in report["comparison"]} == {"air_temperature", "air_humidity", "air_co2"}  # type: ignore[attr-defined,index]
+    assert {row["quantity"] for row in report["comparison"]} == {"air_temperature", "air_humidity", "air_co2"}  # type: ignore[attr-defined]
 
     site.running.remove(daemon)
     daemon.send_signal(signal.SIGTERM)

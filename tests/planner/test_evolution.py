@@ -10,13 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from igrow.core.errors import IgrowError
-from igrow.core.planner.evolution import WORST, EvolutionSettings, NumpyGeneration, draw
+from igrow.core.planner.evolution import WORST, EvolutionSettings, Fitness, Genes, NumpyGeneration, draw
 from igrow.core.planner.onnx_generation import OnnxGeneration
 
+Population = tuple[Genes, Fitness, Genes, Fitness]
 SMALL = EvolutionSettings(parents=6, offspring=10, contestants=2)
 
 
-def population(rng: np.random.Generator, genes: int, sizes: EvolutionSettings = SMALL) -> tuple[np.ndarray, ...]:
+def population(rng: np.random.Generator, genes: int, sizes: EvolutionSettings = SMALL) -> Population:
     return (
         rng.random((sizes.parents, genes), dtype=np.float32),
         rng.standard_normal(sizes.parents).astype(np.float32),

@@ -79,7 +79,7 @@ def test_the_learner_finds_the_action_that_is_paid() -> None:
     wanted = np.where(np.arange(ACTIONS) % 2, 0.6, -0.6)
 
     def paid(action: np.ndarray) -> np.ndarray:
-        return -np.square(action - wanted).mean(axis=1)
+        return np.asarray(-np.square(action - wanted).mean(axis=1))
 
     seen = rng.standard_normal((256, OBSERVATIONS)).astype(np.float32)
     before = paid(learner.act(seen, explore=False)).mean()

@@ -12,8 +12,10 @@ import pytest
 
 from igrow.core.errors import IgrowError
 from igrow.core.planner import Budget
+from igrow.core.telemetry import Telemetry
 from igrow.edge.planning.make_plan import make_plan
 from igrow.edge.planning.open_meteo import MOST_MEMBERS, read_forecast
+from igrow.edge.ports import Plan
 from tests.planning.test_plan_from_bundle import SITE, START, request
 
 HOURS = 26
@@ -89,7 +91,6 @@ def test_an_unknown_unit_is_refused(tmp_path: Path) -> None:
 
 def test_a_plan_holds_against_the_spread_of_an_ensemble(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Members that differ add to the doubt that caution takes off."""
-    monkeypatch.setattr("igrow.edge.planning.make_plan.forecast_in_time", lambda members: (members, ""))
     monkeypatch.setattr("igrow.edge.planning.make_plan.Budget", lambda: Budget(generations=4))
     path = write(tmp_path, content("", "_member01", "_member02", unix=True))
     members = read_forecast(path)
@@ -97,7 +98,12 @@ def test_a_plan_holds_against_the_spread_of_an_ensemble(tmp_path: Path, monkeypa
         one.with_columns({"outdoor_temperature": one["outdoor_temperature"] + 12.0 * (number - 1)})
         for number, one in enumerate(members)
     )
-    calm, spread = (make_plan(SITE, replace(request(), forecast=each)) for each in ((members[0],) * 3, wild))
+
+    def plan_with(forecast: tuple[Telemetry, ...]) -> Plan:
+        monkeypatch.setattr("igrow.edge.planning.make_plan.forecast_in_time", lambda _: (forecast, ""))
+        return make_plan(SITE, replace(request(), forecast=path))
+
+    calm, spread = plan_with((members[0],) * 3), plan_with(wild)
     assert calm.explanation is not None and spread.explanation is not None
     assert spread.explanation.plan["heat"].deviation > 2.0 * calm.explanation.plan["heat"].deviation
     assert np.isfinite(spread.expected_profit)

@@ -203,6 +203,7 @@ def test_the_process_ends_with_a_daemon_that_was_killed(tmp_path: Path, when: st
         "time.sleep(600)\n"
     )
     daemon = subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE)
+    assert daemon.stdout is not None
     pid = int(daemon.stdout.readline())
     if when == "in the middle of a call":
         wait_until(begun.exists)

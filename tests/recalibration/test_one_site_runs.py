@@ -68,7 +68,8 @@ def test_a_site_without_telemetry_is_an_error_in_its_history_and_publishes_nothi
 def test_an_error_is_tried_again_at_the_next_run_and_a_success_waits_for_the_sites_pace(
     tmp_path: Path, archive: Archive, diagnosed: list[str]
 ) -> None:
-    state, published = tmp_path / "state", []
+    state = tmp_path / "state"
+    published: list[Path] = []
     assert recalibrate(SITE, Archive(tmp_path / "none"), state, refuse, now=NOON).verdict == "error"
     hour = timedelta(hours=1)
     assert recalibrate(SITE, archive, state, published.append, now=NOON + hour).published

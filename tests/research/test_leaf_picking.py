@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -10,7 +12,7 @@ from igrow.core.simulator.leaf_picking import LeafPicking, pick
 from igrow.trainer.research.network.leaf_picking import CERTAIN, FADED, fit_picking, followed, picked_area, smooth
 
 HOURS = 60 * 24
-HOUR = np.arange(HOURS) % 24.0
+HOUR = np.arange(HOURS, dtype=np.float64) % 24.0
 Values = NDArray[np.float64]
 READY = np.array([50, 150, 260, 370, 480], dtype=np.float32)
 RULE = LeafPicking(12.0, 3.0, 4.0, READY, np.full(5, 0.3, dtype=np.float32), certain=1e3, faded=2e3)
@@ -60,8 +62,7 @@ def test_the_rule_is_found_in_seasons_that_were_run_by_it(thermal: Values) -> No
     assert found.hour == RULE.hour
     assert found.threshold == pytest.approx(RULE.threshold, abs=0.2)
     np.testing.assert_allclose(found.share[:3], 0.3, atol=0.02)
-    again = run(LeafPicking(*(vars(found)[key] for key in ("hour", "threshold", "base", "ready", "share")), 1e3, 2e3),
-                thermal, 0.008)  # fmt: skip
+    again = run(replace(found, certain=1e3, faded=2e3), thermal, 0.008)
     assert np.abs(again - area).mean() < 0.25 * np.abs(area - smooth(area)).mean()
 
 

@@ -27,7 +27,7 @@ from tests.virtual_log import SITE, virtual_log
 
 DAYS, RUNS = 165, 3
 LENGTH = DAYS * HOURS + 1
-HOUR = np.arange(LENGTH) % float(HOURS)
+HOUR = np.arange(LENGTH, dtype=np.float64) % float(HOURS)
 Columns = dict[str, NDArray[np.float64]]
 
 
@@ -139,8 +139,8 @@ def test_the_harvest_of_the_graph_is_that_of_numpy(simulator: NetworkSimulator, 
         hours = []
         for row in range(part.start, part.stop):
             hour = np.full((RUNS, 1), HOUR[row], dtype=np.float32)
-            known = {name: values[:, row : row + 1] for name, values in rows.items()}
-            carried, values = run_hour(np, simulator, carried, known, hour)
+            now = {name: values[:, row : row + 1] for name, values in rows.items()}
+            carried, values = run_hour(np, simulator, carried, now, hour)
             hours.append(values)
         stage = simulator.harvest
         means = {name: np.mean([values[name] for values in hours], axis=0) for name in stage.drivers}

@@ -32,7 +32,7 @@ HOURS = 600
 def seasons(count: int, seed: int = 0) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.float64]]:
     """Greenhouses that warm towards their setpoint and the sun, with a crop that grows with light."""
     generator = np.random.default_rng(seed)
-    hour = np.arange(HOURS) % 24.0
+    hour = np.arange(HOURS, dtype=np.float64) % 24.0
     sun = np.maximum(0.0, np.sin((hour - 6) / 12 * np.pi)) * 500 * (0.5 + generator.random((1, HOURS)))
     sun = np.repeat(sun, count, axis=0)
     days = HOURS // 24

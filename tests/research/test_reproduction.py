@@ -99,7 +99,7 @@ def test_a_short_training_writes_a_bundle_that_evaluates_to_the_same_scores(data
 
 
 def crop(name: str, yield_per_mol: float, days: int = 120) -> Compartment:
-    light = 10 + 0.1 * np.arange(days)
+    light = 10 + 0.1 * np.arange(days, dtype=np.float64)
     harvest_day = np.arange(60, days, 5)
     since = np.cumsum(light) - np.cumsum(light)[50]
     harvested = yield_per_mol * np.maximum(since, 0)[harvest_day]

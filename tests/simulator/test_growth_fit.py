@@ -62,7 +62,7 @@ def test_the_covariance_covers_the_truth() -> None:
         rng = np.random.default_rng(1000 + seed)
         truth = np.array([0.60, 2.5e-4]) * (1.0 + np.array(PRIOR) * [0.5, 0.4] * rng.standard_normal(2))
         prior = np.diag((np.array(PRIOR) * [0.5 * 0.60, 0.4 * 2.5e-4]) ** 2)
-        stages, fit = fit_growth(days, weekly(days, *truth, 0.01, seed), STAGES, CROP, prior)
+        stages, fit = fit_growth(days, weekly(days, truth[0], truth[1], 0.01, seed), STAGES, CROP, prior)
         away = np.array([stages.conversion, stages.maintenance]) - truth
         errors.append(away @ np.linalg.solve(fit.covariance, away))
     assert np.mean(errors) == pytest.approx(2.0, abs=0.5)

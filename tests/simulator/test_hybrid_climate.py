@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from datetime import date
+
 import numpy as np
 import pytest
 
@@ -156,7 +158,7 @@ def test_a_log_without_leaf_area_gets_the_crops_usual_course_and_says_so() -> No
     record = site_record(log, SITE, 300.0)
     assert "leaf_area_index" in record.missing
     curve = leaf_area_curve(
-        Site(name="young", latitude=0, longitude=0, crop=Crop(planting_date=np.datetime64("2020-02-01").item())),
+        Site(name="young", latitude=0, longitude=0, crop=Crop(planting_date=date(2020, 2, 1))),
         log.time,
     )
     assert curve[0] < 0.2

@@ -23,7 +23,7 @@ def bundle() -> Bundle:
 
 def heat(bundle: Bundle, greenhouse: Greenhouse) -> np.ndarray:
     """MJ m-2 of a cold day, by each member of the posterior."""
-    return BundleSimulator(bundle, greenhouse).simulate({}, NIGHT, WARM, START).heat[:, 0].sum(axis=-1)
+    return np.asarray(BundleSimulator(bundle, greenhouse).simulate({}, NIGHT, WARM, START).heat[:, 0].sum(axis=-1))
 
 
 def test_all_that_leaves_the_pipes_is_paid_and_not_only_what_reaches_the_air(bundle: Bundle) -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 from igrow.edge.image import Quality, Value
 from igrow.edge.ports import WriteRecord
 from igrow.edge.store import SqliteStore, StoreLimits
+from igrow.edge.store.ledger import Record
 
 START = 1_780_000_000.0
 
@@ -22,6 +24,13 @@ def values(temperature: float, quality: Quality = Quality.GOOD) -> dict[str, Val
 
 def write_record(time: float | None, outcome: str = "written") -> WriteRecord:
     return WriteRecord(time, 1.0, "heating_setpoint", 18.0, 18.0, "recipe", "", outcome)
+
+
+def number_of(record: Record) -> object:
+    """Return the number in the detail of an event."""
+    detail = record.body["detail"]
+    assert isinstance(detail, Mapping)
+    return detail["number"]
 
 
 def write_until_killed(folder: Path) -> None:

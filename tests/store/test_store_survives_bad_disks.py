@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from igrow.edge.store import SqliteStore, StoreLimits, read_telemetry
-from tests.store.store_helpers import START, values
+from tests.store.store_helpers import START, number_of, values
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -38,7 +38,7 @@ def test_no_event_is_lost_when_one_ledger_file_is_damaged(tmp_path: Path, name: 
     damage(path, how)
     (tmp_path / f"{name}-wal").touch()  # as after a power cut, so that the file is checked
     store = SqliteStore(tmp_path)
-    numbers = [r.body["detail"]["number"] for r in store.records("event", 10**6) if r.body["kind"] == "test"]
+    numbers = [number_of(r) for r in store.records("event", 10**6) if r.body["kind"] == "test"]
     assert numbers[::-1] == list(range(200))
     store.record_event(START, "after", {})
     assert "after" in kinds(store)

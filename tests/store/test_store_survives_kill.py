@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from igrow.edge.store import SqliteStore
-from tests.store.store_helpers import START
+from tests.store.store_helpers import START, number_of
 
 BATCH_ROWS = 11
 """50 s of rows every 5 s, and the row that closes the batch."""
@@ -47,7 +47,7 @@ def check_nothing_dear_is_lost(folder: Path, rows: int, events: int) -> None:
     assert rows - BATCH_ROWS <= len(telemetry) <= rows + 1
     found = (telemetry.time.astype("int64") - int(START)) // 5
     assert found.tolist() == list(range(len(telemetry)))
-    numbers = [record.body["detail"]["number"] for record in store.records("event", 10**9)][::-1]
+    numbers = [number_of(record) for record in store.records("event", 10**9)][::-1]
     assert numbers == list(range(len(numbers)))
     assert events <= len(numbers) <= events + 1
     assert store.health == ""

@@ -208,12 +208,16 @@ def archive_with(path: Path, change) -> Path:
     return path
 
 
+def link_elsewhere(member: tarfile.TarInfo) -> None:
+    member.type, member.linkname = tarfile.SYMTYPE, "/etc"
+
+
 @pytest.mark.parametrize(
     "change",
     [
         lambda member: setattr(member, "name", "../outside"),
         lambda member: setattr(member, "name", "/tmp/outside"),
-        lambda member: (setattr(member, "type", tarfile.SYMTYPE), setattr(member, "linkname", "/etc")),
+        link_elsewhere,
         lambda member: setattr(member, "type", tarfile.FIFOTYPE),
         lambda member: setattr(member, "name", ".hidden"),
     ],

@@ -49,11 +49,11 @@ def test_a_better_bundle_is_adopted_after_its_shadow_run_and_kept_after_its_prob
     gateway.run(36)
     better = send(gateway, "better", 5.0)
     gateway.run(29)
-    assert gateway.updates.active().name != better.label, "not before the shadow run is over"
+    assert gateway.active.name != better.label, "not before the shadow run is over"
     gateway.run(4)
-    assert gateway.updates.active().name == better.label
+    assert gateway.active.name == better.label
     gateway.run(50)
-    assert gateway.updates.active().name == better.label
+    assert gateway.active.name == better.label
     kinds = gateway.kinds()
     assert kinds.index("shadow_began") < kinds.index("bundle_adopted") < kinds.index("bundle_kept")
     reports = read_exchange_reports(gateway)
@@ -61,7 +61,7 @@ def test_a_better_bundle_is_adopted_after_its_shadow_run_and_kept_after_its_prob
     live = reports[-1]["live_error"]
     assert live["before"]["air_temperature 24_h"] == pytest.approx(1.0, abs=0.1)
     assert live["after"]["air_temperature 24_h"] < 0.2
-    description = gateway.updates.describe()
+    description = gateway.described()
     assert description["live_errors"]["air_temperature 24_h"] < 0.2
     assert len(description["live_error_history"]) > 10
 
@@ -78,7 +78,7 @@ def test_a_worse_bundle_is_rejected_after_its_shadow_run_and_never_tried_again(g
     gateway.run(100)
     assert gateway.updates.active() == first
     assert gateway.kinds().count("shadow_began") == 1
-    assert worse.identity in gateway.updates.describe()["rejected"]
+    assert worse.identity in gateway.described()["rejected"]
     gateway.stop()
     gateway.start()
     gateway.run(10)
@@ -90,11 +90,11 @@ def test_a_bundle_that_gets_worse_than_its_predecessor_is_taken_back_by_itself(g
     first = gateway.updates.active()
     newer = send(gateway, "newer", 5.0)
     gateway.run(36)
-    assert gateway.updates.active().name == newer.label
+    assert gateway.active.name == newer.label
     gateway.offset = 4.0
     gateway.run(30)
     assert gateway.updates.active() == first
-    assert newer.identity in gateway.updates.describe()["rejected"]
+    assert newer.identity in gateway.described()["rejected"]
     report = read_exchange_reports(gateway)[-1]
     assert report["verdict"] == "went_back"
     assert report["live_error"]["after"]["air_temperature 24_h"] > 0.5
@@ -108,7 +108,7 @@ def test_a_bundle_that_fails_its_self_test_is_refused_reported_and_marked(gatewa
     # The archive is right but this machine computes something else: played by a stricter manifest check.
     gateway.updates._bundles._shelf._site = "other"
     gateway.run(3)
-    assert bad.identity in gateway.updates.describe()["rejected"]
+    assert bad.identity in gateway.described()["rejected"]
     assert gateway.kinds().count("update_refused") == 1
     assert read_exchange_reports(gateway)[0]["verdict"] == "rejected"
 
@@ -120,7 +120,7 @@ def test_a_shadow_run_survives_a_restart(gateway: Gateway) -> None:
     gateway.stop()
     gateway.start()
     gateway.run(18)
-    assert gateway.updates.active().name == better.label
+    assert gateway.active.name == better.label
 
 
 def test_a_shadow_run_without_measurements_waits(gateway: Gateway) -> None:
@@ -131,7 +131,7 @@ def test_a_shadow_run_without_measurements_waits(gateway: Gateway) -> None:
     gateway.run(60, measured=False)
     assert gateway.updates.active() == first
     gateway.run(40)
-    assert gateway.updates.active().name == better.label
+    assert gateway.active.name == better.label
 
 
 def test_only_the_last_two_bundles_stay_on_the_disk(gateway: Gateway) -> None:
@@ -147,7 +147,7 @@ def test_a_damaged_active_bundle_gives_way_to_its_predecessor_at_the_next_start(
     gateway.run(2)
     send(gateway, "better", 5.0)
     gateway.run(33)
-    newer = gateway.updates.active()
+    newer = gateway.active
     assert newer != first
     gateway.stop()
     (newer.folder / "simulator.onnx").write_bytes(b"flash rot")
@@ -168,7 +168,7 @@ def test_an_unknown_time_starts_nothing(gateway: Gateway) -> None:
     send(gateway, "better", 5.0)
     gateway.updates.tick(None)
     assert not gateway.updates.busy
-    assert gateway.updates.describe()["candidate"] is None
+    assert gateway.described()["candidate"] is None
 
 
 def test_a_refusal_is_recorded_once_and_not_at_every_check(gateway: Gateway) -> None:
@@ -176,7 +176,7 @@ def test_a_refusal_is_recorded_once_and_not_at_every_check(gateway: Gateway) -> 
     (gateway.repository / "metadata" / "timestamp.json").write_text("{}")
     gateway.run(10)
     assert gateway.kinds().count("update_refused") == 1
-    assert "refused" in str(gateway.updates.describe()["refusal"])
+    assert "refused" in str(gateway.described()["refusal"])
 
 
 def test_the_trainer_reads_what_the_gateway_left(gateway: Gateway) -> None:

@@ -27,9 +27,10 @@ PATIENCE = 300.0
 @pytest.fixture
 def gateway(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("igrow.trainer.publishing.repository.self_test", lambda bundle: ())
-    made = Gateway(tmp_path, RULES, graphs=GraphProcess(ProcessLimits(memory_bytes=2**29)))
+    graphs = GraphProcess(ProcessLimits(memory_bytes=2**29))
+    made = Gateway(tmp_path, RULES, graphs=graphs)
     yield made
-    made.graphs.close()
+    graphs.close()
     made.stop()
 
 
@@ -54,13 +55,13 @@ def test_a_bundle_that_needs_all_memory_is_refused_and_the_daemon_grows_by_nothi
     gateway.run(0.5)
     over.set()
     assert largest[0] - before < 100 * 2**20
-    assert bad.identity in gateway.updates.describe()["rejected"]
+    assert bad.identity in gateway.described()["rejected"]
     assert gateway.kinds().count("bundle_rejected") == 1
     gateway.run(3.0)
     assert gateway.kinds().count("bundle_rejected") == 1
     good = send(gateway)
     gateway.run(2.0)
-    assert gateway.updates.active().name == good.label
+    assert gateway.active.name == good.label
 
 
 def test_a_bundle_whose_self_test_never_ends_is_ended_and_refused(
@@ -69,16 +70,17 @@ def test_a_bundle_whose_self_test_never_ends_is_ended_and_refused(
     monkeypatch.setattr(bundles, "TAKE_SECONDS", 8.0)
     bad = send(gateway, endless_graph())
     gateway.run(0.2)
-    assert "took too long" in gateway.updates.describe()["rejected"][bad.identity]
+    assert "took too long" in gateway.described()["rejected"][bad.identity]
     monkeypatch.setattr(bundles, "TAKE_SECONDS", PATIENCE)
     good = send(gateway)
     gateway.run(2.0)
-    assert gateway.updates.active().name == good.label
+    assert gateway.active.name == good.label
 
 
 def test_a_stop_waits_for_no_self_test_and_holds_nothing_against_the_bundle(gateway: Gateway) -> None:
     send(gateway, endless_graph())
     gateway.updates.tick(gateway.now)
+    assert isinstance(gateway.graphs, GraphProcess)
     while gateway.graphs.pid is None or load_state(gateway.folder / "updates" / "state.json").attempt is None:
         time.sleep(0.01)
     gateway.graphs.close()
@@ -113,7 +115,7 @@ def test_a_bundle_that_took_the_gateway_down_is_not_tried_again_and_the_trainer_
     daemon.wait()
     gateway.start()
     gateway.run(3.0)
-    assert gateway.updates.describe()["rejected"] == {bad.identity: bundles.WENT_DOWN}
+    assert gateway.described()["rejected"] == {bad.identity: bundles.WENT_DOWN}
     assert gateway.kinds().count("bundle_rejected") == 1
     (report,) = (gateway.folder / "transfer" / "reports").iterdir()
     assert json.loads(report.read_text())["reason"] == bundles.WENT_DOWN
@@ -126,7 +128,7 @@ def test_a_first_bundle_that_took_the_gateway_down_is_not_tried_again(gateway: G
     save_state(gateway.folder / "updates" / "state.json", UpdateState(attempt=first.identity))
     gateway.start(first_bundle=first.folder)
     assert gateway.updates.active() is None
-    assert bundles.WENT_DOWN in gateway.updates.describe()["refusal"]
+    assert bundles.WENT_DOWN in gateway.described()["refusal"]
 
 
 def test_a_candidate_that_took_the_gateway_down_in_its_shadow_run_gives_way(gateway: Gateway) -> None:
@@ -135,7 +137,7 @@ def test_a_candidate_that_took_the_gateway_down_in_its_shadow_run_gives_way(gate
     first = gateway.updates.active()
     candidate = send(gateway)
     gateway.run(2.0)
-    assert gateway.updates.describe()["candidate"] == candidate.label
+    assert gateway.described()["candidate"] == candidate.label
     gateway.stop()
     state_file = gateway.folder / "updates" / "state.json"
     state = load_state(state_file)
@@ -157,8 +159,8 @@ def test_a_trial_that_cannot_be_noted_is_not_made(gateway: Gateway, monkeypatch:
     monkeypatch.setattr(bundles, "save_state", full)
     gateway.run(0.5)
     assert gateway.updates.active() is None
-    assert "a trial cannot be noted: No space left on device" in gateway.updates.describe()["refusal"]
-    assert gateway.updates.describe()["rejected"] == {}
+    assert "a trial cannot be noted: No space left on device" in gateway.described()["refusal"]
+    assert gateway.described()["rejected"] == {}
 
 
 class HangingPredictor:
@@ -178,7 +180,7 @@ def test_a_candidate_whose_prediction_never_ends_is_rejected(gateway: Gateway, m
     monkeypatch.setattr(life, "JUDGE_SECONDS", 5.0)
     gateway.updates._life._predictor = HangingPredictor()
     gateway.run(4.0)
-    assert "cannot predict: it took too long" in gateway.updates.describe()["rejected"][candidate.identity]
+    assert "cannot predict: it took too long" in gateway.described()["rejected"][candidate.identity]
     assert gateway.updates.active() == first
     wait_for(gateway.updates)
 
@@ -197,10 +199,10 @@ def test_a_clock_that_was_wrong_for_a_moment_holds_no_bundle_up_for_ever(gateway
     gateway.run(0.5, measured=False)
     gateway.now = right
     gateway.run(34.0)
-    assert gateway.updates.active().name == better.label
+    assert gateway.active.name == better.label
     gateway.now, right = gateway.now + years * 365 * 86_400.0, gateway.now
     gateway.run(0.5, measured=False)
     gateway.now = right
     gateway.run(52.0)
-    assert gateway.updates.describe()["probation_until"] is None
-    assert gateway.updates.active().name == better.label
+    assert gateway.described()["probation_until"] is None
+    assert gateway.active.name == better.label

@@ -7,12 +7,14 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from igrow.core.bundle import Bundle, open_session, run_graph
 from igrow.edge.exchange import ExchangeService
 from igrow.edge.image import Quality, Value
+from igrow.edge.ports import ActiveBundle
 from igrow.edge.store import SqliteStore, StoreLimits
 from igrow.edge.updates import BundleUpdates, SignedSource, UpdateRules
 from igrow.edge.updates.rules import Graphs
@@ -89,6 +91,17 @@ class Gateway:
     def stop(self) -> None:
         self.updates.close()
         self.store.close()
+
+    @property
+    def active(self) -> ActiveBundle:
+        """The bundle in force; there is one."""
+        bundle = self.updates.active()
+        assert bundle is not None
+        return bundle
+
+    def described(self) -> dict[str, Any]:
+        """What the status says of the updates."""
+        return dict(self.updates.describe())
 
     def run(self, hours: float, *, measured: bool = True) -> None:
         """Let the plant run; the services are ticked every 10 minutes."""
