@@ -123,7 +123,8 @@ def tune(arguments: argparse.Namespace) -> None:
         for prices, best in result["strategies"].items():
             season, began = season_of(described(prices, days), days), time.process_time()
             crop = tomato.mature_crop(season.plant, 1.0)
-            found = rule_and_strategy(season, *kinds.values(), crop, arguments.generations, SEARCHES[label])
+            search = SEARCHES[label]
+            found = rule_and_strategy(season, kinds["rule"], kinds["season"], crop, arguments.generations, search)
             seconds = time.process_time() - began
             for name, (genes, history) in found.items():
                 half, last = history[len(history) // 2], history[-1]

@@ -70,6 +70,7 @@ def test_a_log_that_counts_nothing_leaves_what_is_known_of_other_crops_and_says_
     log = prepare_log(telemetry, SITE)
     stages, fit = growth_of_log(log, log.record(), PARAMETERS, before)
     assert (stages.conversion, stages.maintenance) == (before.conversion, before.maintenance)
+    assert stages.covariance is not None
     np.testing.assert_allclose(stages.covariance, prior_of(before))
     assert "counts no growth" in growth_notes(SITE, before, fit)[0]
 

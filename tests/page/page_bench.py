@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import re
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -36,6 +37,13 @@ time_zone: Europe/Amsterdam
 greenhouse: {floor_area: 1000}
 crop: {planting_date: 2025-12-16}
 """
+
+
+def found_in(pattern: str, text: str) -> str:
+    """The part of the text that stands where the pattern's parentheses are."""
+    found = re.search(pattern, text, re.MULTILINE)
+    assert found is not None
+    return found[1]
 
 
 def write_house(folder: Path, daemon: str = "", site: str = "") -> Path:

@@ -19,7 +19,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from tests.control.daemon_bench import free_port
-from tests.page.page_bench import ROOT
+from tests.page.page_bench import ROOT, found_in
 
 BIN = Path(sys.executable).parent
 PATIENCE = 300.0
@@ -29,14 +29,14 @@ PATIENCE = 300.0
 def typed() -> list[str]:
     """The commands of the documentation, without their comments."""
     text = (ROOT / "docs" / "installation.md").read_text()
-    block = re.search(r"From the box to the first plan.*?```sh\n(.*?)```", text, re.DOTALL)[1]
+    block = found_in(r"(?s)From the box to the first plan.*?```sh\n(.*?)```", text)
     return [line.split("  #")[0].strip() for line in block.splitlines()]
 
 
 def exec_start(unit: str) -> list[str]:
     """The command that a unit starts."""
     text = (ROOT / "systemd" / f"{unit}.service").read_text()
-    return re.search(r"^ExecStart=(.*)$", text, re.MULTILINE)[1].split()
+    return found_in(r"^ExecStart=(.*)$", text).split()
 
 
 @contextlib.contextmanager
@@ -85,7 +85,7 @@ def page_shows(port: int, text: str) -> str:
     ends, seen = time.monotonic() + PATIENCE, ""
     while time.monotonic() < ends:
         with contextlib.suppress(OSError, urllib.error.HTTPError):
-            seen = urllib.request.urlopen(f"http://localhost:{port}/", timeout=60).read().decode()
+            seen = str(urllib.request.urlopen(f"http://localhost:{port}/", timeout=60).read().decode())
             if text in seen:
                 return seen
         time.sleep(0.5)
@@ -100,7 +100,7 @@ def test_five_commands_lead_from_the_box_to_the_first_plan(tmp_path):
     subprocess.run(["sh", "-n", str(script)], check=True)
     units = enable.removeprefix("sudo systemctl enable --now ").split()
     assert units == ["igrow-edge", "igrow-page"]
-    assert set(units) <= set(re.search(r"for unit in ([^;]*);", script.read_text())[1].split())
+    assert set(units) <= set(found_in(r"for unit in ([^;]*);", script.read_text()).split())
     # 3
     assert edit.split() == ["sudoedit", "/etc/igrow/daemon.yaml", "/etc/igrow/site.yaml"]
     port, page = free_port(), free_port()

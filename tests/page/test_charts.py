@@ -44,6 +44,11 @@ def of_class(tree: ElementTree.Element, name: str) -> list[ElementTree.Element]:
     return [one for one in tree.iter() if name in one.get("class", "").split()]
 
 
+def course_of(tree: ElementTree.Element, name: str) -> str:
+    """What the first shape of this class goes along."""
+    return of_class(tree, name)[0].attrib["d"]
+
+
 def corners(path: str) -> list[tuple[float, float]]:
     return [(float(x), float(y)) for x, y in re.findall(r"[ML](-?[\d.]+) (-?[\d.]+)", path)]
 
@@ -54,18 +59,18 @@ def test_a_chart_says_what_it_shows_to_those_who_do_not_see_it():
 
 
 def test_a_greater_value_is_higher_and_a_later_one_farther_right():
-    ((x0, y0), (x1, y1)) = corners(of_class(drawn([line([1.0, 2.0])]), "line")[0].get("d"))
+    ((x0, y0), (x1, y1)) = corners(course_of(drawn([line([1.0, 2.0])]), "line"))
     assert x1 > x0
     assert y1 < y0
 
 
 def test_a_gap_in_the_log_is_a_gap_in_the_line():
-    path = of_class(drawn([line([1.0, 1.0, 2.0], [T0 - 7000, T0 - 6400, T0 - 1000], gap=1800.0)]), "line")[0].get("d")
+    path = course_of(drawn([line([1.0, 1.0, 2.0], [T0 - 7000, T0 - 6400, T0 - 1000], gap=1800.0)]), "line")
     assert path.count("M") == 2
 
 
 def test_a_setpoint_holds_until_the_next():
-    points = corners(of_class(drawn([line([1.0, 2.0], stepped=True)]), "line")[0].get("d"))
+    points = corners(course_of(drawn([line([1.0, 2.0], stepped=True)]), "line"))
     assert points[0][1] == points[1][1] != points[2][1]
     assert points[1][0] == points[2][0]
 
@@ -73,8 +78,8 @@ def test_a_setpoint_holds_until_the_next():
 def test_least_and_greatest_values_lie_around_the_mean_and_within_the_scale():
     low, high = np.array([0.0, 0.0]), np.array([9.0, 9.0])
     tree = drawn([line([4.0, 5.0], low=low, high=high)])
-    ribbon = [y for _, y in corners(of_class(tree, "ribbon")[0].get("d"))]
-    mean = [y for _, y in corners(of_class(tree, "line")[0].get("d"))]
+    ribbon = [y for _, y in corners(course_of(tree, "ribbon"))]
+    mean = [y for _, y in corners(course_of(tree, "line"))]
     assert min(ribbon) < min(mean)
     assert max(ribbon) > max(mean)
     assert min(ribbon) >= 0
@@ -96,7 +101,7 @@ def test_a_limit_is_drawn_where_it_is_near_and_left_out_where_it_is_far():
 def test_bands_and_what_stands_in_the_way_are_drawn_and_named():
     band = Band("allowed", np.array([T0 - 7200.0, T0]), np.array([1.0, 2.0]), np.array([3.0, 4.0]))
     tree = drawn([line([1.0, 2.0])], bands=[band], stretches=[Stretch("the night's limit", T0, T0 + 3600.0)])
-    assert len(corners(of_class(tree, "band")[0].get("d"))) == 8
+    assert len(corners(course_of(tree, "band"))) == 8
     (held,) = of_class(tree, "binds")
     assert held[0].text == "the night's limit"
 

@@ -6,6 +6,7 @@ import asyncio
 import re
 import urllib.request
 from http.cookiejar import CookieJar
+from typing import Any
 from urllib.parse import urlencode
 
 import pytest
@@ -25,12 +26,16 @@ class Browser:
         self._opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor(CookieJar()))
 
     def look(self) -> str:
-        return self._opener.open(self._url, timeout=60).read().decode()
+        return self._read(self._url)
 
     def fill(self, path: str, **fields: str) -> str:
         token = re.search(r'name="token" value="([^"]*)"', self.look())
         form = fields | ({"token": token[1]} if token else {})
-        return self._opener.open(self._url + path, urlencode(form).encode(), timeout=60).read().decode()
+        return self._read(self._url + path, urlencode(form).encode())
+
+    def _read(self, url: str, form: bytes | None = None) -> str:
+        with self._opener.open(url, form, timeout=60) as answer:
+            return str(answer.read().decode())
 
 
 @pytest.fixture
@@ -48,7 +53,7 @@ async def test_the_growers_word_reaches_the_plc_and_the_ledger_with_his_name(hou
     plant = Plant(tmp_path, port, start="2026-03-01T00:00:00")
     await plant.up()
 
-    def events(kind: str) -> list[dict]:
+    def events(kind: str) -> list[Any]:
         found = [record.body for record in read_records(tmp_path / "state" / "store", "event")]
         return [body["detail"] for body in found if body["kind"] == kind]
 

@@ -116,7 +116,7 @@ def keep(page, name: str, height: int) -> None:
 @pytest.mark.parametrize(("width", "scheme"), LOOKS)
 def test_every_state_of_the_page_passes_the_rules_of_accessibility_and_fits_its_screen(visit, house, width, scheme):
     def fits() -> bool:
-        return page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
+        return bool(page.evaluate("document.documentElement.scrollWidth <= window.innerWidth"))
 
     page = visit(width, scheme)
     page.evaluate("document.querySelectorAll('details').forEach((one) => { one.open = true; })")

@@ -20,7 +20,7 @@ from igrow.edge.page import server as page_server
 from igrow.edge.page.password import hashed, remove_password, write_password
 from igrow.edge.page.server import PageServer
 from igrow.edge.sources.override import read_leases
-from tests.page.page_bench import PASSWORD, Told, alarm, pages_of, state, write_house
+from tests.page.page_bench import PASSWORD, Told, alarm, found_in, pages_of, state, write_house
 
 HASHED = hashed(PASSWORD)
 
@@ -33,7 +33,7 @@ class Answer:
 
     @property
     def cookie(self) -> str:
-        return re.search(r"Set-Cookie: ([^;]*)", self.head)[1]
+        return found_in(r"Set-Cookie: ([^;]*)", self.head)
 
 
 class Visitor:
@@ -72,7 +72,7 @@ class Visitor:
         return answer
 
     async def token(self) -> str:
-        return re.search(r'name="token" value="([^"]*)"', (await self.get()).body)[1]
+        return found_in(r'name="token" value="([^"]*)"', (await self.get()).body)
 
     async def act(self, **fields: str) -> Answer:
         answer = await self.post("/act", {"token": await self.token(), **fields})
@@ -128,7 +128,7 @@ async def test_without_a_password_the_page_only_shows_and_says_how_to_set_one(vi
 
 async def test_everything_comes_from_this_server_under_a_strict_policy(visitor: Visitor):
     answer = await visitor.get()
-    policy = re.search(r"Content-Security-Policy: (.*)", answer.head)[1]
+    policy = found_in(r"Content-Security-Policy: (.*)", answer.head)
     assert "default-src 'none'" in policy
     assert "unsafe" not in policy
     assert not re.search(r"https?://", answer.body.replace("http://www.w3.org/2000/svg", ""))
@@ -189,7 +189,7 @@ async def test_a_name_that_points_here_from_elsewhere_is_not_served(tmp_path, ho
 async def test_a_sign_in_gives_a_cookie_that_no_script_and_no_other_site_can_use(visitor: Visitor):
     answer = await visitor.sign_in()
     assert answer.status == 303
-    cookie = re.search(r"Set-Cookie: (.*)", answer.head)[1]
+    cookie = found_in(r"Set-Cookie: (.*)", answer.head)
     assert "HttpOnly" in cookie
     assert "SameSite=Strict" in cookie
     assert "<b>Anna</b>" in (await visitor.get()).body

@@ -21,6 +21,7 @@ def test_only_a_hash_is_kept_and_only_its_owner_reads_it(tmp_path):
     assert PASSWORD not in path.read_text()
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
     kept = read_password(tmp_path)
+    assert kept is not None
     assert kept.fits(PASSWORD)
     assert not kept.fits(PASSWORD + " ")
     assert not kept.fits("")
@@ -46,7 +47,8 @@ def test_the_command_sets_and_removes_it(tmp_path, capsys, monkeypatch):
     path = write_house(tmp_path)
     monkeypatch.setattr("sys.stdin", io.StringIO(PASSWORD + "\n"))
     assert main(["password", str(path)]) == 0
-    assert read_password(tmp_path / "state").fits(PASSWORD)
+    kept = read_password(tmp_path / "state")
+    assert kept is not None and kept.fits(PASSWORD)
     monkeypatch.setattr("sys.stdin", io.StringIO("short\n"))
     assert main(["password", str(path)]) == 2
     assert "10 to 256 are right" in capsys.readouterr().err
@@ -74,7 +76,8 @@ def test_a_session_ends_by_time_by_hand_and_by_a_new_password():
     sessions = Sessions(3600.0, lambda: now[0])
     first, second, third = (sessions.begin("Anna", b"digest") for _ in range(3))
     assert len({first, second, third}) == 3
-    assert sessions.find(first, b"digest").who == "Anna"
+    found = sessions.find(first, b"digest")
+    assert found is not None and found.who == "Anna"
     assert sessions.find(first, b"another") is None
     assert sessions.find(first, b"digest") is None  # it does not come back with the old password
     sessions.end(second)

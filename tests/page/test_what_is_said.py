@@ -195,6 +195,7 @@ def test_every_limit_of_the_crop_has_its_words(site, limit):
 
 def test_the_gain_is_said_with_its_doubt_and_the_rows_add_up(site):
     found = money.expected(plan(), 1000.0)
+    assert found is not None
     assert found.gain == "The plan is expected to bring 38.00 € more than your recipe, between +30.16 € and +45.84 €."
     rows = {title: ours for title, ours, *_ in found.rows}
     assert rows == {
@@ -203,12 +204,18 @@ def test_the_gain_is_said_with_its_doubt_and_the_rows_add_up(site):
     }  # fmt: skip
 
 
+def gain_of(plan: dict) -> str:
+    found = money.expected(plan, 100.0)
+    assert found is not None
+    return found.gain
+
+
 def test_a_plan_that_loses_or_changes_nothing_is_not_called_a_gain():
     worse = plan()
     worse["explanation"] = worse["explanation"] | {"gain": amount(-0.01)}
-    assert money.expected(worse, 100.0).gain == "The plan is expected to bring 1.00 € less than your recipe."
+    assert gain_of(worse) == "The plan is expected to bring 1.00 € less than your recipe."
     worse["explanation"] = worse["explanation"] | {"gain": amount(0.0)}
-    assert money.expected(worse, 100.0).gain == "The plan and your recipe are expected to bring the same."
+    assert gain_of(worse) == "The plan and your recipe are expected to bring the same."
     assert money.expected(plan(explanation=None), 100.0) is None
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 from zoneinfo import ZoneInfo
 
 import numpy as np
@@ -14,6 +15,7 @@ from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.errors import IgrowError
 from igrow.core.planner import Budget
 from igrow.core.planner.season import SeasonPlan
+from igrow.core.planner.season.search import genetic
 from igrow.core.site import Crop, Site
 from igrow.edge.cli.plan import reasons
 from igrow.edge.planning.make_plan import make_plan
@@ -57,13 +59,12 @@ def test_a_search_that_was_cut_short_goes_on(
 ) -> None:
     bundle, partial = read_bundle(default_bundle_folder()), tmp_path / "partial"
     searched = []
-    search = season.genetic
 
-    def interrupted(*arguments: object) -> object:
+    def interrupted(*arguments: Any) -> object:
         searched.append(arguments)
         if len(searched) == 2:
             raise KeyboardInterrupt
-        return search(*arguments)
+        return genetic(*arguments)
 
     monkeypatch.setattr(season, "genetic", interrupted)
     with pytest.raises(KeyboardInterrupt):
