@@ -298,7 +298,8 @@ def test_what_ends_by_itself_was_given_back_by_nobody(tmp_path):
 
 
 def test_a_lease_that_another_change_leaves_undated_does_not_begin_anew(tmp_path):
-    path, told = tmp_path / "override.json", []
+    path = tmp_path / "override.json"
+    told: list[tuple[str, dict[str, object]]] = []
     every = wanting(path, None, told)
     mine = {"heating_setpoint": Lease(21.0, 600.0, by="Anna", asked=1)}
     write_leases(path, mine)
