@@ -17,11 +17,12 @@ from pathlib import Path
 from igrow.core.errors import IgrowError
 from igrow.edge import store
 from igrow.edge.configuration import Configuration, load_configuration
+from igrow.edge.page.password import PASSWORD_FILE
 from igrow.edge.state_lock import LOCK_FILE, daemon_stopped
 
 STORE, CONFIGURATION, STATE, DAEMON_FILE = "store.tar.gz", "configuration", "state", "daemon.yaml"
-_PASSING = (".part", ".new", "status.json")
-"""Ends of names of files that are just being written, or made anew all the time."""
+_LEFT_OUT = (".part", ".new", "status.json", PASSWORD_FILE)
+"""Ends of names of files that are just being written or made anew all the time, and of the page's password."""
 
 
 class BackupError(IgrowError):
@@ -104,7 +105,7 @@ def _state_files(folder: Path) -> Iterator[Path]:
     for path in sorted(folder.rglob("*")):
         relative = path.relative_to(folder)
         beside = relative.parts[0] != "store" and relative.name != LOCK_FILE
-        if beside and path.is_file() and not path.is_symlink() and not path.name.endswith(_PASSING):
+        if beside and path.is_file() and not path.is_symlink() and not path.name.endswith(_LEFT_OUT):
             yield path
 
 

@@ -18,6 +18,7 @@ import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 
+from igrow.edge.page.settings import PAGE_PORT
 from tests.control.daemon_bench import free_port
 from tests.page.page_bench import ROOT, found_in
 
@@ -101,6 +102,7 @@ def test_five_commands_lead_from_the_box_to_the_first_plan(tmp_path):
     units = enable.removeprefix("sudo systemctl enable --now ").split()
     assert units == ["igrow-edge", "igrow-page"]
     assert set(units) <= set(found_in(r"for unit in ([^;]*);", script.read_text()).split())
+    assert f"\nSocketBindAllow=tcp:{PAGE_PORT}\n" in (ROOT / "systemd" / "igrow-page.service").read_text()
     # 3
     assert edit.split() == ["sudoedit", "/etc/igrow/daemon.yaml", "/etc/igrow/site.yaml"]
     port, page = free_port(), free_port()

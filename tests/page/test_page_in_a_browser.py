@@ -23,7 +23,7 @@ BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or ""
 pytestmark = pytest.mark.skipif(not BROWSER, reason="no Chromium on this machine: apt-get install chromium")
 LOOKS = [(width, scheme) for width in (390, 1280) for scheme in ("light", "dark")]
 PICTURES = ROOT / "docs" / "page"
-KEPT = ("calm-1280-light", "calm-390-dark", "not-heard-390-light")
+KEPT = ("calm-1280-light", "plan-1280-light", "calm-390-dark", "not-heard-390-light")
 """The pictures that docs/page.md shows."""
 SECONDS = 20_000
 """Longest wait for anything, in milliseconds: this machine may be busy."""
@@ -100,17 +100,19 @@ def violations(page) -> list[str]:
     return [f"{one['id']}: {node['html'][:120]}" for one in result["violations"] for node in one["nodes"]]
 
 
-def keep(page, name: str, height: int) -> None:
-    """Take a picture; keep it for the documentation where it is asked for."""
-    taken = page.screenshot(
-        full_page=True, clip={"x": 0, "y": 0, "width": page.viewport_size["width"], "height": height}
-    )
+def keep(taken: bytes, name: str) -> None:
+    """Keep a picture for the documentation, where that is asked for."""
     assert len(taken) > 5000
     if os.environ.get("IGROW_PICTURES") and name in KEPT:
         from PIL import Image
 
         PICTURES.mkdir(exist_ok=True)
         Image.open(io.BytesIO(taken)).convert("RGB").quantize(96).save(PICTURES / f"{name}.png", optimize=True)
+
+
+def top(page, height: int) -> bytes:
+    width = page.viewport_size["width"]
+    return page.screenshot(full_page=True, clip={"x": 0, "y": 0, "width": width, "height": height})
 
 
 @pytest.mark.parametrize(("width", "scheme"), LOOKS)
@@ -123,7 +125,8 @@ def test_every_state_of_the_page_passes_the_rules_of_accessibility_and_fits_its_
     assert violations(page) == []
     assert fits()
     page.reload()
-    keep(page, f"calm-{width}-{scheme}", 1900 if width == 1280 else 1700)
+    keep(top(page, 1900 if width == 1280 else 1700), f"calm-{width}-{scheme}")
+    keep(page.locator("#plan").screenshot(), f"plan-{width}-{scheme}")
     page.get_by_role("link", name="Sign in").click()
     assert violations(page) == []
     page.go_back()
@@ -143,7 +146,7 @@ def test_every_state_of_the_page_passes_the_rules_of_accessibility_and_fits_its_
     page.locator("#change-recipe summary").click()
     assert violations(page) == []
     assert fits()
-    keep(page, f"not-heard-{width}-{scheme}", 900)
+    keep(top(page, 900), f"not-heard-{width}-{scheme}")
 
 
 def test_a_setpoint_is_taken_and_given_back_by_keyboard_alone(visit, house):

@@ -5,14 +5,18 @@ from __future__ import annotations
 import io
 import json
 import stat
+import tarfile
+from pathlib import Path
 
 import pytest
 
 from igrow.core.errors import IgrowError
+from igrow.edge.backup import back_up
 from igrow.edge.cli import main
+from igrow.edge.configuration import load_configuration
 from igrow.edge.page.password import PASSWORD_FILE, hashed, read_password, remove_password, write_password
 from igrow.edge.page.sessions import ALL_TRIES, MOST_ADDRESSES, MOST_SESSIONS, TRIES, TRY_SECONDS, Sessions, Tries
-from tests.page.page_bench import PASSWORD, write_house
+from tests.page.page_bench import PASSWORD, fill_log, write_house
 
 
 def test_only_a_hash_is_kept_and_only_its_owner_reads_it(tmp_path):
@@ -64,6 +68,18 @@ def test_a_password_before_the_first_start_leaves_no_folder(tmp_path, capsys, mo
     assert main(["password", str(path)]) == 2
     assert "the daemon makes it when it first starts" in capsys.readouterr().err
     assert not (tmp_path / "state").exists()
+
+
+def test_no_backup_holds_it(tmp_path):
+    configuration = load_configuration(write_house(tmp_path))
+    fill_log(tmp_path, days=0.1)
+    write_password(tmp_path / "state", hashed(PASSWORD))
+    (tmp_path / "state" / "override.json").write_text("{}")
+    back_up(configuration, tmp_path / "backup.tar.gz")
+    with tarfile.open(tmp_path / "backup.tar.gz") as archive:
+        names = [Path(name).name for name in archive.getnames()]
+    assert "override.json" in names
+    assert PASSWORD_FILE not in names
 
 
 def test_the_file_of_the_password_is_plain_json(tmp_path):
