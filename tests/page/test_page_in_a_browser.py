@@ -112,7 +112,7 @@ def keep(taken: bytes, name: str) -> None:
 
 def top(page, height: int) -> bytes:
     width = page.viewport_size["width"]
-    return page.screenshot(full_page=True, clip={"x": 0, "y": 0, "width": width, "height": height})
+    return bytes(page.screenshot(full_page=True, clip={"x": 0, "y": 0, "width": width, "height": height}))
 
 
 @pytest.mark.parametrize(("width", "scheme"), LOOKS)
