@@ -96,6 +96,13 @@ RESULTS = {
         "greenhouses and weather 700; random strategies 5",
         long=True,
     ),
+    "season-plans": Result(
+        "A plan a day through a short season",
+        ("benchmarks.season_plans",),
+        "With the season's marginal values, and with an average price instead; the same greenhouses for all.",
+        "greenhouses and weather 700; searches 0 and on",
+        long=True,
+    ),
     "limits": Result(
         "Whether a plan leaves a limit of the crop",
         ("benchmarks.limits", "--cases", "1000"),

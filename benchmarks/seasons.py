@@ -20,12 +20,14 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import spearmanr
+from scipy.stats import t as student
 
 from benchmarks.planner import SITE, recipe_table
 from benchmarks.season_houses import DAY, PARTS, START, Led, Recipe, Way, lead, money
@@ -46,8 +48,6 @@ TYPICAL = 10
 TUNING_SEEDS = (9_001, 9_002, 9_003)
 RANKED_SEED = 5
 PRICES = ("today", "doubled")
-STUDENT_95 = 2.09
-"""Of a two-sided interval with twenty greenhouses."""
 
 
 def described(prices: str, days: int) -> Site:
@@ -155,26 +155,28 @@ def judge(arguments: argparse.Namespace) -> None:
     for prices in PRICES:
         site = described(prices, days)
         led = {"recipe": "recipe"} | {name: f"{name} {prices}" for name in kinds}
-        brought(f"energy at {prices} prices", {name: money(site, books[key]) for name, key in led.items()}, books, led)
+        brought(
+            f"energy at {prices} prices", {name: (money(site, books[key]), books[key]) for name, key in led.items()}
+        )
         expected_and_obtained(site, days, {name: ways[key] for name, key in led.items()}, books, led)
     ranked(described("today", days), days, kinds["season"], random, books["random"])
 
 
-def brought(title: str, found: dict[str, dict[str, Values]], books: Any, led: dict[str, str]) -> None:
-    """Print what each way brought, and what more than the recipe and than the rule."""
-    count = len(found["recipe"]["net"])
+def brought(title: str, found: dict[str, tuple[dict[str, Values], dict[str, Values]]]) -> None:
+    """Print what each way brought, by its money and its book, and what more than each that stands above it."""
+    count = len(next(iter(found.values()))[0]["net"])
     print(f"\n{title}: {count} greenhouses, EUR m-2 of a season (mean)")
     heads = ("income", *PARTS, "net")
     print(f"{'':10s}{'kg':>9s}" + "".join(f"{head:>12s}" for head in heads))
-    for name, one in found.items():
-        kg = books[led[name]]["kg"].sum(axis=1).mean()
+    for name, (one, book) in found.items():
+        kg = book["kg"].sum(axis=1).mean()
         print(f"{name:10s}{kg:9.2f}" + "".join(f"{one[head].mean():12.2f}" for head in heads))
     print(f"{'net of':10s}{'over':>12s}{'median %':>12s}{'worst %':>12s}{'mean EUR':>12s}{'lower 95':>12s}")
-    for name, other in (("rule", "recipe"), ("season", "recipe"), ("season", "rule")):
-        more = found[name]["net"] - found[other]["net"]
-        share = 100.0 * more / np.abs(found[other]["net"])
-        lower = more.mean() - STUDENT_95 * more.std(ddof=1) / np.sqrt(count)
-        cells = (np.median(share), share.min(), more.mean(), lower)
+    for (other, (less, _)), (name, (one, _)) in combinations(found.items(), 2):
+        more = one["net"] - less["net"]
+        share = 100.0 * more / np.abs(less["net"])
+        error = float(student.ppf(0.975, count - 1)) * more.std(ddof=1) / np.sqrt(count) if count > 1 else np.nan
+        cells = (np.median(share), share.min(), more.mean(), more.mean() - error)
         print(f"{name:10s}{other:>12s}" + "".join(f"{cell:12.2f}" for cell in cells))
 
 

@@ -1,0 +1,123 @@
+"""A plan a day through a whole season: with the season's marginal values, and with an average price instead.
+
+    python -m benchmarks.season_plans [--days 45] [--houses 2] [--generations 30]
+
+A season of `--days` is tuned (as many generations as a plan of a day has, a rule beside it), and its marginal values
+are taken. Then greenhouses that no simulator was fitted to are led by the recipe, the rule, the season's strategy, and
+by a search each midnight on the built-in bundle's simulator, corrected by what the last days used and grew, under the
+mean weather of the last three days. All that counts in the end is fruit that was picked, less costs. Searches here are
+smaller than the daemon's (one member, fewer generations), so that a season of them can be paid for.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections import deque
+
+import numpy as np
+
+from benchmarks.season_houses import Led, Morning, Recipe, Values, Way, lead, money
+from benchmarks.seasons import brought, described, season_of, ways_of
+from benchmarks.strategies import Day, recently
+from igrow.core.agronomy.memory import one_of
+from igrow.core.bundle import default_bundle_folder, read_bundle
+from igrow.core.greenhouse import tomato
+from igrow.core.planner import Budget, EvolutionSettings, NumpyGeneration, PlanningState, optimise
+from igrow.core.planner.objective import Outcome
+from igrow.core.planner.recent_use import grown_days, totals
+from igrow.core.planner.season import SeasonPlan, valued
+from igrow.core.planner.season.search import rule_and_strategy
+from igrow.core.quantities import SETPOINTS
+from igrow.core.simulator.plan import BundleSimulator
+from igrow.core.site import Site
+from igrow.edge.planning.make_plan import RECENT_DAYS
+
+SEARCH = NumpyGeneration(EvolutionSettings(parents=24, offspring=48))
+
+
+class Planned(Recipe):
+    """A search each midnight, over the day that follows and the one after it."""
+
+    def __init__(self, site: Site, simulator: BundleSimulator, season: SeasonPlan | None, generations: int) -> None:
+        self._site = site
+        self._simulator = simulator
+        self._season = season
+        self._budget = Budget(generations, generations)
+        self._past: dict[int, deque[Day]] = {}
+        self._warmth: dict[int, float] = {}
+        self._chosen: list[Values] = []
+
+    def ask(self, morning: Morning) -> Values:
+        """Return the first day of a plan for each house."""
+        self._chosen = [self._plan(morning, house) for house in range(len(morning.weather))]
+        return np.stack(self._chosen)
+
+    def _plan(self, morning: Morning, house: int) -> Values:
+        past = self._past.setdefault(house, deque(maxlen=RECENT_DAYS))
+        present = _present(morning, house)
+        row = morning.rows.start + house
+        state = PlanningState(
+            morning.begin,
+            present,
+            dict(zip(SETPOINTS, morning.applied[house].tolist(), strict=True)),
+            co2_before=float(morning.co2_before[house]),
+            memory=None if morning.memory is None else one_of(morning.memory, row),
+        )
+        worth = None
+        if self._season is not None:
+            worth = self._season.worth(self._site, morning.begin, present, self._warmth.get(house))
+        found = optimise(
+            recently(self._simulator, self._site, past),
+            self._site,
+            state,
+            np.tile(morning.weather[house], (2, 1)),
+            np.tile(morning.recipe, (2, 1)),
+            np.random.default_rng(1000 * morning.day + house),
+            self._budget,
+            generation=SEARCH,
+            worth=worth,
+        )
+        return found.setpoints[:24]
+
+    def learn(self, morning: Morning, outcome: Outcome, weather: Values) -> None:
+        """Remember what the day used and grew beside what the simulator says of it."""
+        for house, chosen in enumerate(self._chosen):
+            again = self._simulator.simulate(_present(morning, house), weather[house], chosen[None], morning.begin)
+            had = {name: each[[house]] for name, each in totals(outcome).items()}
+            driven = (0.0, 0.0) if self._simulator.growth is None else grown_days(self._simulator.growth, again)
+            warmth = float(outcome.air_temperature[:, house].mean())
+            self._past[house].append((totals(again), had, driven, (float(again.air_temperature.mean()), warmth)))
+            self._warmth[house] = warmth
+
+
+def _present(morning: Morning, house: int) -> dict[str, float]:
+    return {name: float(value[house]) for name, value in morning.present.items()}
+
+
+def main() -> int:
+    """Tune, lead and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--days", type=int, default=45)
+    parser.add_argument("--houses", type=int, default=2)
+    parser.add_argument("--generations", type=int, default=30)
+    given = parser.parse_args()
+    site, kinds = described("today", given.days), ways_of(given.days)
+    season = season_of(site, given.days)
+    found = rule_and_strategy(season, *kinds.values(), tomato.mature_crop(season.plant, 1.0), given.generations)
+    plan = valued(season, kinds["season"], found["season"][0], tomato.mature_crop(season.plant, 1.0))
+    simulator = BundleSimulator(read_bundle(default_bundle_folder()), site.greenhouse, members=1)
+    ways: dict[str, Way] = {
+        "recipe": Recipe(),
+        **{name: Led(kinds[name], genes[None]) for name, (genes, _) in found.items()},
+        "by price": Planned(site, simulator, None, given.generations),
+        "by season": Planned(site, simulator, plan, given.generations),
+    }
+    books = lead(site, given.days, ways, {name: list(range(given.houses)) for name in ways})
+    title = f"{given.days} days, energy at today's prices"
+    brought(title, {name: (money(site, book), book) for name, book in books.items()})
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
