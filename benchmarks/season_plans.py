@@ -104,7 +104,9 @@ def main() -> int:
     given = parser.parse_args()
     site, kinds = described("today", given.days), ways_of(given.days)
     season = season_of(site, given.days)
-    found = rule_and_strategy(season, *kinds.values(), tomato.mature_crop(season.plant, 1.0), given.generations)
+    found = rule_and_strategy(
+        season, kinds["rule"], kinds["season"], tomato.mature_crop(season.plant, 1.0), given.generations
+    )
     plan = valued(season, kinds["season"], found["season"][0], tomato.mature_crop(season.plant, 1.0))
     simulator = BundleSimulator(read_bundle(default_bundle_folder()), site.greenhouse, members=1)
     ways: dict[str, Way] = {

@@ -31,8 +31,9 @@ ln -sf "$TARGET/venv/bin/igrow-edge" /usr/local/bin/igrow-edge
 echo "2. user, folders, service"
 install -m 644 "$SOURCE/systemd/igrow-edge.sysusers.conf" /usr/lib/sysusers.d/igrow-edge.conf
 install -m 644 "$SOURCE/systemd/igrow-edge.tmpfiles.conf" /usr/lib/tmpfiles.d/igrow-edge.conf
-for unit in igrow-edge igrow-page igrow-notify igrow-mqtt; do
-    install -m 644 "$SOURCE/systemd/$unit.service" "/etc/systemd/system/$unit.service"
+for unit in igrow-edge.service igrow-page.service igrow-notify.service igrow-mqtt.service \
+    igrow-forecast.service igrow-forecast.timer; do
+    install -m 644 "$SOURCE/systemd/$unit" "/etc/systemd/system/$unit"
 done
 systemd-sysusers igrow-edge.conf
 systemd-tmpfiles --create igrow-edge.conf

@@ -15,6 +15,7 @@ COMMANDS = {
     "page": ("igrow.edge.cli.page", "serve the grower's page"),
     "password": ("igrow.edge.cli.password", "set the password of the page, so that one can act from there"),
     "plan": ("igrow.edge.cli.plan", "compute one plan now, from the bundle in force and the log, and print it"),
+    "forecast": ("igrow.edge.cli.forecast", "fetch the weather forecast that plans read"),
     "override": ("igrow.edge.cli.override", "set a setpoint by hand for some time, or give it back"),
     "alarms": ("igrow.edge.cli.alarms", "list the alarms, or say that you know of them"),
     "notify": ("igrow.edge.cli.notify", "tell people of alarms, by e-mail, ntfy or a web hook"),

@@ -62,7 +62,9 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
     hours = 24 * math.ceil(max(horizon, followed + BEYOND * HOUR) / DAY)
     members, problem = forecast_in_time(request.forecast)
     courses = [from_forecast(one, request.telemetry, start, hours) for one in members]
-    courses = courses or [persistence(request.telemetry, start, hours)]
+    if not courses:
+        usual, lacking = _without_forecast(request.telemetry, season, start, hours)
+        courses, problem = [usual], "; ".join(filter(None, (problem, lacking)))
     forecast = np.mean(courses, axis=0)
     state = PlanningState(
         time=np.datetime64(start, "s"),
@@ -118,6 +120,19 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
         explanation=explain(expected, state, forecast, result),
         season=() if season is None or worth is None else tuple(told(season, worth, state.time)),
     )
+
+
+def _without_forecast(
+    log: Telemetry, season: SeasonPlan | None, start: int, hours: int
+) -> tuple[NDArray[np.float64], str]:
+    """Return the weather of the last days, else what is usual at the date, and one line where it is that."""
+    try:
+        return persistence(log, start, hours), ""
+    except IgrowError as error:
+        time = np.datetime64(start, "s")
+        if season is None or not season.covers(time):
+            raise
+        return season.typical_weather(time, hours), f"planned with the weather that is usual at this date: {error}"
 
 
 def _note(result: PlanResult, binding: Mapping[str, Sequence[Sequence[str]]], corrected: Corrected) -> str:

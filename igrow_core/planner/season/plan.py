@@ -50,6 +50,8 @@ class SeasonPlan:
     values: tuple[MarginalValues, ...]
     crops: tuple[Crop, ...]
     """As they are expected, one crop each: floats, and (STAGES,) for fruit."""
+    weather: Values
+    """Of the typical day of each date's stretch, hourly means in the registry's order, (dates, 24, 6)."""
 
     @property
     def strategy(self) -> Strategy:
@@ -68,6 +70,13 @@ class SeasonPlan:
         """Return what the strategy says on the day of a UTC time, in a grower's terms."""
         said = self.strategy.numbers(self.genes[None], self.day_of(time))
         return {name: float(value[0]) for name, value in said.items()}
+
+    def typical_weather(self, time: np.datetime64, hours: int) -> Values:
+        """Return the weather that is usual from a UTC time on, (hours, 6)."""
+        ahead = time + np.arange(hours) * np.timedelta64(3600, "s")
+        since = ((ahead - self.start) / np.timedelta64(3600, "s")).astype(np.int64)
+        stretch = np.clip(since // (24 * self.every), 0, len(self.weather) - 1)
+        return np.asarray(self.weather[stretch, since % 24])
 
     def worth(
         self, site: Site, time: np.datetime64, present: Mapping[str, float], warmth: float | None = None
@@ -109,6 +118,7 @@ class SeasonPlan:
             "values": [
                 {"buffer": one.buffer, "leaf": one.leaf, "fruit": one.fruit.tolist()} for one in self.values
             ],
+            "weather": np.round(self.weather, 2).tolist(),
             "crops": [{name: np.asarray(part).tolist() for name, part in one._asdict().items()} for one in self.crops],
         }  # fmt: skip
         return json.dumps(content)
@@ -135,11 +145,12 @@ class SeasonPlan:
                     Crop(**{name: np.asarray(part, dtype=np.float64) for name, part in one.items()})
                     for one in given["crops"]
                 ),
+                np.array(given["weather"], dtype=np.float64),
             )
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise BundleError(f"{where}: is no season: {error}") from None
-        whole = len(plan.values) == len(plan.crops) > 0 and len(plan.genes) == plan.strategy.genes
-        if not whole or any(one.fruit.shape != (STAGES,) for one in plan.values):
+        whole = len(plan.values) == len(plan.crops) == len(plan.weather) > 0 and len(plan.genes) == plan.strategy.genes
+        if not whole or plan.weather.shape[1:] != (24, 6) or any(one.fruit.shape != (STAGES,) for one in plan.values):
             raise BundleError(f"{where}: is no season: its parts do not fit each other")
         return plan
 
@@ -175,7 +186,10 @@ def valued(season: Season, strategy: Strategy, genes: Genes, crop: Crop) -> Seas
         for place, each in enumerate(crops)
     )
     net_profit = float(outcome.balance.net_profit[0])
-    return SeasonPlan(season.start, season.days, season.every, strategy.knots, genes, net_profit, values, crops)
+    weather = season.weather[: len(crops)]
+    return SeasonPlan(
+        season.start, season.days, season.every, strategy.knots, genes, net_profit, values, crops, weather
+    )
 
 
 def _one(crop: Crop) -> Crop:
