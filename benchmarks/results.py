@@ -110,6 +110,13 @@ RESULTS = {
         "0 and on",
         long=True,
     ),
+    "diagnosis-same": Result(
+        "The same greenhouse later",
+        ("benchmarks.diagnosis", "same"),
+        "Calibrated on eight weeks of its own, diagnosed weeks later by its history, and by what greenhouses show.",
+        "300000 and on",
+        long=True,
+    ),
     "diagnosis-real": Result(
         "Real logs",
         ("benchmarks.diagnosis", "real", "../shared/data"),

@@ -52,16 +52,21 @@ def main() -> int:
     parser.add_argument("what", nargs="?", default="scoring", choices=WHAT)
     parser.add_argument("data", nargs="?", type=Path, help="folder of the public data sets, for `real`")
     parser.add_argument("--cases", type=int, help="default: 208; of `same` 60")
-    parser.add_argument("--greenhouses", type=int, default=11, help="of `same`: the usual one by season, then others")
+    parser.add_argument("--greenhouses", type=int, help="of `same`: in the nursery of a season (default: 6)")
     parser.add_argument("--tuning", action="store_true", help="of `same`: greenhouses and seeds that rules are set on")
+    parser.add_argument("--compartment", default="", help="of `real`: those whose name has this in it (default: all)")
+    parser.add_argument("--withheld-only", action="store_true", help="of `real`: leave out lost terms and placebo")
+    parser.add_argument("--history-only", action="store_true", help="of `same`: leave out what is known in general")
     parser.add_argument("--days", type=int, default=28)
-    parser.add_argument("--season", action="append", choices=tuple(SEASONS), help="default: winter and spring")
+    parser.add_argument(
+        "--season", action="append", choices=tuple(SEASONS), help="default: winter and spring; of `same` all"
+    )
     parser.add_argument("--seed", type=int, help="of the first case; earlier tables had others")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--json", type=Path, help="write each case's outcome as a line of JSON")
     options = parser.parse_args()
     if options.what == "real":
-        return real.main(options.data)
+        return real.main(options.data, options.compartment, withheld_only=options.withheld_only)
     if options.what == "matched":
         return matched.main(options.processes)
     if options.what == "nuisance":

@@ -2,38 +2,37 @@
 
 Every greenhouse is calibrated on eight weeks of its own. Then its crop has grown on, each of its parameters has drifted
 by a little, and in some cases its cover was cleaned or its disturbances are others: nothing of that is a finding. Each
-log is diagnosed twice, by the greenhouse's history and by what greenhouses show in general.
+log is diagnosed twice, by the greenhouse's history and by what greenhouses show in general. Greenhouses stand in
+nurseries, one a season, and have seeds that nothing was learned or tuned on.
 """
 
 from __future__ import annotations
 
+import itertools
 import json
 import sys
 from argparse import Namespace
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, replace
+from functools import partial
 
 import numpy as np
 
-from benchmarks.diagnosis.cases import FORMS, Case, Turn, hidden
-from benchmarks.diagnosis.greenhouses import OTHERS_SEED, VirtualGreenhouse, of_seasons, others
-from benchmarks.diagnosis.logs import Reference, disturbances, reference
+from benchmarks.diagnosis.cases import FORMS, SEASONS, Case, Turn
+from benchmarks.diagnosis.logs import Reference
+from benchmarks.diagnosis.nurseries import calibrated, calibration_logs, later_logs, nursery
 from benchmarks.diagnosis.scoring import Outcome, judge
 from igrow.core.effects import EFFECTS
-from igrow.core.greenhouse import GreenhouseParameters, recipe, simulate_many
-from igrow.core.greenhouse.tomato import Crop
 from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.diagnosis import DEFAULT
 
-DRIFT = 0.015
-"""Relative deviation of every plant parameter from its value at the calibration."""
-CLEANED = 1.06
-"""What a cleaned cover lets through, over before."""
 CASES, DAYS = 60, 28
 SEEDS = {"tuning": 200_000, "scoring": 300_000}
-OTHERS = {"tuning": 70_000, "scoring": OTHERS_SEED}
+"""Of the first nursery; each season's are ten thousand on."""
+GREENHOUSES = 6
+"""In a nursery."""
 GROUPS = (
     ("nothing", 0.0, 0.13), ("noise", 0.0, 0.06), ("clean", 0.0, 0.06), ("single", 3.0, 0.1), ("single", 1.0, 0.25),
     ("single", 0.3, 0.12), ("onset", 1.5, 0.1), ("pair", 1.5, 0.06), ("outside", 3.0, 0.06), ("outside", 1.0, 0.06),
@@ -44,16 +43,15 @@ CONFOUNDED = ({"co2_valve_leak", "soil_respiration"},)
 """Effects that no log tells apart."""
 
 
-def draw(kind: str, count: int, units: Mapping[str, Mapping[str, float]]) -> list[Case]:
-    """Draw cases; arguments as in `cases.draw`."""
-    rng = np.random.default_rng(SEEDS[kind])
+def draw(kind: str, first: int, count: int, units: Mapping[str, Mapping[str, float]]) -> list[Case]:
+    """Draw cases; arguments as in `cases.draw`, and the first seed."""
+    rng = np.random.default_rng(first)
     turn, beyond = Turn(rng, list(EFFECTS)), Turn(rng, list(UNCATALOGUED))
-    greenhouses = list(units)
+    greenhouses = itertools.cycle(units)
     cases: list[Case] = []
     for group, size, share in GROUPS:
         for _ in range(max(1, round(share * count))):
-            number = len(cases)
-            greenhouse = greenhouses[number % len(greenhouses)]
+            greenhouse, number = next(greenhouses), len(cases)
             causes: tuple[str, ...] = ()
             if size:
                 causes = ((beyond if group == "outside" else turn).next(units[greenhouse], ()),)
@@ -64,7 +62,7 @@ def draw(kind: str, count: int, units: Mapping[str, Mapping[str, float]]) -> lis
                     name=f"{kind}-{group}-{number:03d}",
                     group=group,
                     greenhouse=greenhouse,
-                    seed=SEEDS[kind] + number,
+                    seed=first + 1000 + number,
                     causes=causes,
                     size=size,
                     forms=tuple(FORMS[kind][int(rng.integers(len(FORMS[kind])))] for _ in causes),
@@ -74,35 +72,6 @@ def draw(kind: str, count: int, units: Mapping[str, Mapping[str, float]]) -> lis
                 )
             )
     return cases
-
-
-def later_logs(known: Reference, cases: Sequence[Case], days: int) -> list[Telemetry]:
-    """Simulate all cases of a greenhouse as one batch: the greenhouse itself, some time after its calibration."""
-    if not cases:
-        return []
-    start, count = known.greenhouse.start, len(cases)
-    end = start + np.timedelta64(days, "D")
-    seasons = simulate_many(
-        [later(known.greenhouse, case) for case in cases],
-        [known.greenhouse.weather(start, end, case.seed) for case in cases],
-        recipe,
-        start,
-        end,
-        count=count,
-        seed=cases[0].seed,
-        effects=[hidden(case, known.unit, start) for case in cases],
-        disturbances=[disturbances(case) for case in cases],
-        crop=Crop(*(np.repeat(part, count, axis=-1) for part in known.crop)),
-    )
-    return [one.measured for one in seasons]
-
-
-def later(greenhouse: VirtualGreenhouse, case: Case) -> GreenhouseParameters:
-    """Return the greenhouse as it is when the log of a case is taken."""
-    plant = greenhouse.plant.varied(np.random.default_rng(case.seed), relative=DRIFT)
-    if case.group != "clean":
-        return plant
-    return replace(plant, cover_transmission=plant.cover_transmission * CLEANED)
 
 
 def table(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int, str]]:
@@ -146,39 +115,67 @@ def is_first(one: Outcome) -> bool:
     )
 
 
-def _judge(job: tuple[Case, Telemetry, Reference]) -> dict[str, Outcome]:
-    return {name: judge(*job, rules) for name, rules in RULES.items()}
+def prepared(job: tuple[str, str, int, int, int]) -> list[tuple[Case, Telemetry, Reference]]:
+    """Simulate and calibrate the nursery of a season; return its cases, their logs, and their greenhouses."""
+    kind, season, greenhouses, count, days = job
+    first = SEEDS[kind] + 10_000 * list(SEASONS).index(season)
+    known = nursery(season, greenhouses, first)
+    references: dict[str, Reference] = {}
+    for own_log in zip(known.greenhouses, calibration_logs(known), strict=True):
+        one = calibrated(own_log)
+        references[one.greenhouse.site.name] = one
+        print(f"{season}: {len(references)} of {greenhouses} calibrated", file=sys.stderr, flush=True)
+    cases = draw(kind, first, count, {name: one.unit for name, one in references.items()})
+    own = [[case for case in cases if case.greenhouse == name] for name in references]
+    logs = later_logs(list(references.values()), own, days)
+    print(f"{season}: {len(cases)} logs", file=sys.stderr, flush=True)
+    return [
+        (case, log, one)
+        for one, mine, seen in zip(references.values(), own, logs, strict=True)
+        for case, log in zip(mine, seen, strict=True)
+    ]
+
+
+def _judge(job: tuple[Case, Telemetry, Reference], names: Sequence[str]) -> dict[str, Outcome]:
+    return {name: judge(*job, RULES[name]) for name in names}
 
 
 def main(options: Namespace) -> int:
     """Print both tables side by side."""
     kind = "tuning" if options.tuning else "scoring"
-    every = {**of_seasons(), **others(8, OTHERS[kind])}
-    greenhouses = dict(list(every.items())[: options.greenhouses])
+    seasons = options.season or list(SEASONS)
+    greenhouses, count = options.greenhouses or GREENHOUSES, (options.cases or CASES) // len(seasons)
+    names = ["history"] if options.history_only else list(RULES)
     outcomes: list[dict[str, Outcome]] = []
     with ProcessPoolExecutor(options.processes) as pool:
-        print(f"calibrating {', '.join(greenhouses)}", file=sys.stderr)
-        references = dict(zip(greenhouses, pool.map(reference, greenhouses.values()), strict=True))
-        cases = draw(kind, options.cases or CASES, {name: one.unit for name, one in references.items()})
-        own = {name: [case for case in cases if case.greenhouse == name] for name in greenhouses}
-        print(f"simulating {len(cases)} logs", file=sys.stderr)
-        logs = pool.map(later_logs, references.values(), own.values(), [options.days] * len(own))
-        jobs = [
-            (case, log, references[name])
-            for name, found in zip(own, logs, strict=True)
-            for case, log in zip(own[name], found, strict=True)
-        ]
-        for number, one in enumerate(pool.map(_judge, jobs), 1):
+        wanted = [(kind, season, greenhouses, count, options.days) for season in seasons]
+        jobs = [job for own in pool.map(prepared, wanted) for job in own]
+        for number, one in enumerate(pool.map(partial(_judge, names=names), jobs), 1):
             outcomes.append(one)
             case = one["history"].case
             said = "; ".join(f"{name}: {told.verdict} {told.found}" for name, told in one.items())
-            print(f"{number} of {len(jobs)}: {case.name} {case.causes} {case.size:g} -> {said}", file=sys.stderr)
+            where = f"{case.name} in {case.greenhouse}"
+            print(
+                f"{number} of {len(jobs)}: {where} {case.causes} {case.size:g} -> {said}", file=sys.stderr, flush=True
+            )
     if options.json:
         lines = [json.dumps({name: asdict(told) for name, told in one.items()}) + "\n" for one in outcomes]
         options.json.write_text("".join(lines), encoding="utf-8")
-    print(f"{len(outcomes)} logs of {len(greenhouses)} greenhouses, {options.days} days, {kind} seeds")
-    tables = [table([one[name] for one in outcomes]) for name in RULES]
-    print(f"{'':50} {'history':>9} {'in general':>11} {'cases':>12}  bound of the history")
-    for (what, figure, count, bound), (_, general, other, _) in zip(*tables, strict=True):
-        print(f"{what:50} {figure:9.2f} {general:11.2f} {f'{count}, {other}':>12}  {bound}")
+    print(
+        f"{len(outcomes)} logs of {greenhouses * len(seasons)} greenhouses ({', '.join(seasons)}), {options.days} days"
+    )
+    tables = [table([one[name] for one in outcomes]) for name in names]
+    print(f"{'':50}" + "".join(f" {name:>11} {'cases':>5}" for name in names) + "  bound of the history")
+    for line in zip(*tables, strict=True):
+        figures = "".join(f" {figure:11.2f} {cases:5}" for _, figure, cases, _ in line)
+        print(f"{line[0][0]:50}{figures}  {line[0][3]}")
+    print()
+    print("by season, of the history: false claims; right first at ENR 1")
+    for season in seasons:
+        mine = [one["history"] for one in outcomes if one["history"].case.greenhouse.startswith(season)]
+        rows = table(mine)
+        nothing = [one for one in mine if one.case.group in {"nothing", "noise", "clean"}]
+        false = sum(one.verdict != "nothing" for one in nothing)
+        right = next((figure, cases) for what, figure, cases, _ in rows if what == "right cause first, ENR 1")
+        print(f"  {season:8} {false} of {len(nothing)}; {right[0]:.2f} of {right[1]}")
     return 0

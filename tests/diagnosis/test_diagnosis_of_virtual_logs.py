@@ -75,7 +75,8 @@ def test_the_document_has_the_fields_that_are_promised(leak: Diagnosis) -> None:
     assert set(document["span"]) == {"start", "end", "fit_days", "held_out_days"}
     finding = document["findings"][0]
     assert set(finding) == {
-        "effect", "kind", "balances", "parameters", "onset", "p_value", "confounded", "drivers", "separating_test",
+        "effect", "kind", "balances", "parameters", "onset", "p_value", "confounded", "drivers", "resembles",
+        "separating_test",
     }  # fmt: skip
     assert set(finding["parameters"]["air_changes"]) == {"value", "low", "high", "unit"}
     assert finding["effect"] in finding["confounded"]

@@ -145,8 +145,14 @@ def is_proven_change(one: Estimated, kept: Sequence[Estimated], rules: DecisionR
     if stands(one, kept, rules):
         return True
     large = one.effect_to_noise >= rules.least_effect_to_noise and same_in_all_regimes(one.regimes, rules)
-    likelier = one.bootstrap_p <= rules.further_bootstrap_p
-    return large and likelier and one.gain >= rules.further_gain_share * sum(other.gain for other in kept)
+    if not kept:
+        # A few held-out days are no second test of a gain that all others bear out: they must not speak against it.
+        return large and one.bootstrap_p <= rules.largest_bootstrap_p
+    return (
+        large
+        and one.bootstrap_p <= rules.further_bootstrap_p
+        and one.gain >= rules.further_gain_share * sum(other.gain for other in kept)
+    )
 
 
 def same_in_all_regimes(regimes: Mapping[str, Interval], rules: DecisionRules) -> bool:

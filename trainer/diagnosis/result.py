@@ -67,6 +67,8 @@ class Finding:
     """RMS that it moves in a 24 h free run over the RMS that no model removes."""
     regimes: Mapping[str, Interval] = field(default_factory=dict)
     """The coefficient refitted by regime."""
+    resembles: tuple[str, ...] = ()
+    """Parameters of the model whose growth would be the same finding: more air leaks in the wind either way."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -220,6 +222,7 @@ def _finding(finding: Finding) -> dict[str, Any]:
         "p_value": _number(finding.p_value),
         "confounded": list(finding.confounded),
         "drivers": list(finding.drivers),
+        "resembles": list(finding.resembles),
         "separating_test": finding.separating_test,
     }
 

@@ -56,6 +56,7 @@ def finding(one: Estimated) -> Finding:
         sentence(one),
         one.effect_to_noise,
         one.regimes,
+        effect.resembles,
     )
 
 

@@ -19,7 +19,8 @@ import numpy as np
 from igrow.core.errors import IgrowError
 from igrow.trainer.fit.gaussian import Gaussian
 
-_ARRAYS = ("mean", "covariance")
+_ARRAYS = ("mean", "deviation", "correlation")
+"""Of the amplitudes; of the correlation the lower triangle in single precision, a tenth of the covariance's size."""
 
 
 @dataclass(frozen=True)
@@ -49,13 +50,14 @@ class Discrepancy:
             "own_gains": dict(self.own_gains),
             "middle": str(self.middle.astype("datetime64[s]")),
         }
-        buffer = io.BytesIO()
+        buffer, below = io.BytesIO(), np.tril_indices(len(self.amplitudes.names), -1)
         np.savez_compressed(
             buffer,
             allow_pickle=False,
             plain=np.array(json.dumps(plain)),
             mean=self.amplitudes.mean,
-            covariance=self.amplitudes.covariance,
+            deviation=self.amplitudes.standard_deviation,
+            correlation=self.amplitudes.correlation[below].astype(np.float32),
         )
         return buffer.getvalue()
 
@@ -68,10 +70,15 @@ class Discrepancy:
         """
         try:
             with np.load(io.BytesIO(content), allow_pickle=False) as file:
-                plain, (mean, covariance) = json.loads(str(file["plain"])), (file[name] for name in _ARRAYS)
+                plain, arrays = json.loads(str(file["plain"])), [file[name] for name in _ARRAYS]
+            mean, deviation, correlation = arrays
             keys = tuple(plain["keys"])
-            if mean.shape != (len(keys),) or covariance.shape != (len(keys), len(keys)):
-                raise ValueError(f"{len(keys)} keys, but a mean {mean.shape} and a covariance {covariance.shape}")
+            count = len(keys)
+            if [one.shape for one in arrays] != [(count,), (count,), (count * (count - 1) // 2,)]:
+                raise ValueError(f"{count} keys, but arrays of {', '.join(str(one.shape) for one in arrays)}")
+            covariance = np.zeros((count, count))
+            covariance[np.tril_indices(count, -1)] = correlation
+            covariance = (covariance + covariance.T + np.eye(count)) * np.outer(deviation, deviation)
             return cls(
                 {str(name): float(value) for name, value in plain["parameters"].items()},
                 Gaussian(keys, mean, covariance),
