@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test page-pictures notebooks lint format soak bench bench-diagnosis results bundle wheel api clean
+.PHONY: help demo test page-pictures notebooks lint format soak bench bench-diagnosis results bundle wheel translations api clean
 
 help: ## List the targets.
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-16s %s\n", $$1, $$2}'
@@ -61,6 +61,9 @@ wheel: $(STAMP) ## Build the wheel into dist, and try the gateway's commands fro
 	dist/venv/bin/pip install --quiet --disable-pip-version-check "$$(ls dist/*.whl)[edge]"
 	dist/venv/bin/igrow-edge --version
 	dist/venv/bin/igrow-edge check-config config/daemon.yaml
+
+translations: $(STAMP) ## Add new texts to the trainer's languages, and tell which are untranslated.
+	$(BIN)/python -m igrow.trainer.language.messages
 
 api: $(STAMP) ## Write the pages of the Python interface to out/api.
 	$(BIN)/pdoc --docformat google --output-directory out/api igrow

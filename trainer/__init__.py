@@ -8,6 +8,8 @@
     bundle = export(result.corrected, "out/bundle")     # what a gateway runs
     publish(bundle, "/srv/igrow", "keys")               # signed, into the exchange
 
+    compare([model, result.corrected], later)           # simulators side by side on a log that none has seen
+
 Every command, benchmark and service goes this road. Names are imported when they are first used.
 """
 
@@ -16,17 +18,22 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from igrow import __version__
+
 if TYPE_CHECKING:
     from igrow.trainer.data import Log, prepare_log, read_log
     from igrow.trainer.diagnosis import diagnose
     from igrow.trainer.exporting import export, read_model
     from igrow.trainer.fit import FittedModel, calibrate
+    from igrow.trainer.fit.comparison import Comparison, compare
     from igrow.trainer.publishing import publish
 
 _PLACES = {
+    "Comparison": "igrow.trainer.fit.comparison",
     "FittedModel": "igrow.trainer.fit",
     "Log": "igrow.trainer.data",
     "calibrate": "igrow.trainer.fit",
+    "compare": "igrow.trainer.fit.comparison",
     "diagnose": "igrow.trainer.diagnosis",
     "export": "igrow.trainer.exporting",
     "prepare_log": "igrow.trainer.data",
@@ -36,9 +43,12 @@ _PLACES = {
 }
 
 __all__ = [
+    "Comparison",
     "FittedModel",
     "Log",
+    "__version__",
     "calibrate",
+    "compare",
     "diagnose",
     "export",
     "prepare_log",
@@ -57,4 +67,4 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     """List the road's names."""
-    return sorted(_PLACES)
+    return sorted(__all__)

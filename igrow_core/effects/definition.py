@@ -98,6 +98,8 @@ class Effect:
     """How its trace differs from that of others."""
     separating_test: str
     """The cheapest safe test that would tell it from those it is confounded with."""
+    title: str
+    """What it is, for the grower: a noun phrase."""
     sentence: str
     """For the grower; `{value}` and `{unit}` stand for the amplitude."""
     source: str

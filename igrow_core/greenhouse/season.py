@@ -109,10 +109,12 @@ def simulate_many(
     step: int = 300,
     tick: float = TICK,
     crop: str | Crop = "mature",
+    reached: Callable[[np.datetime64], None] | None = None,
 ) -> list[Season]:
     """Run a batch of `count` greenhouses at once; arguments as in `simulate`.
 
     Parameters, weather, setpoint tables, lists of effects and disturbances may be one for all or a sequence of `count`.
+    `reached` is told of the time of each row.
     """
     if not isinstance(parameters, GreenhouseParameters):
         if len(parameters) != count:
@@ -126,7 +128,7 @@ def simulate_many(
         parameters, WeatherTable(weather), float(unix_seconds(start)), count=count, effects=effects,
         disturbances=disturbances, sensors=sensors, computer=computer, crop=crop, seed=seed, tick=tick,
     )  # fmt: skip
-    return _run(plant, _schedule(setpoints), end, step)
+    return _run(plant, _schedule(setpoints), end, step, reached)
 
 
 def _schedule(setpoints: Telemetry | Sequence[Telemetry] | Schedule) -> Schedule:
@@ -164,7 +166,13 @@ def _filled(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return gaps.held(values)
 
 
-def _run(plant: Plant, schedule: Schedule, end: np.datetime64, step: int) -> list[Season]:
+def _run(
+    plant: Plant,
+    schedule: Schedule,
+    end: np.datetime64,
+    step: int,
+    reached: Callable[[np.datetime64], None] | None = None,
+) -> list[Season]:
     seconds = int(plant.state.seconds)
     rows = (int(unix_seconds(end)) - seconds) // step + 1
     times = np.datetime64(seconds, "s") + np.arange(rows) * np.timedelta64(step, "s")
@@ -187,6 +195,8 @@ def _run(plant: Plant, schedule: Schedule, end: np.datetime64, step: int) -> lis
                     log[name] = np.full((rows, count), np.nan)
                 log[name][row] = value
         plant.reset_means()
+        if reached is not None:
+            reached(times[row])
     return [
         Season(
             measured=_table(times, logs["measured"], column),

@@ -29,7 +29,7 @@ def _effect(
 ) -> Effect:
     return Effect(
         name=name, kind=kind, balances=balances, drivers=drivers, parameters=(amplitude,), contribution=contribution,
-        signature=sentence, separating_test="", sentence=sentence, source=_SOURCE, memory=memory,
+        signature=sentence, separating_test="", title=sentence, sentence=sentence, source=_SOURCE, memory=memory,
     )  # fmt: skip
 
 

@@ -52,7 +52,7 @@ def test_an_export_is_read_after_one_command(tmp_path: Path, site: Path, truth: 
     assert main(["import", str(path), "--site", str(site)]) == 0
     told = capsys.readouterr().out
     assert "672 rows, 2020-02-01 00:00 to 2020-02-14 23:30 UTC, every 30 min" in told
-    assert f"next: igrow-trainer diagnose {path} --site {site}" in told
+    assert f"next: igrow-trainer calibrate {path} --site {site}" in told
     assert (tmp_path / "export.import.svg").read_text().startswith("<?xml")
     log = read_log(path, site)
     assert log.faults == ()

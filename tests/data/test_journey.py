@@ -41,16 +41,25 @@ def site(tmp_path: Path) -> Path:
     return tmp_path / "site.yaml"
 
 
-def test_two_commands_lead_from_an_export_to_a_report(tmp_path: Path, site: Path, log: Telemetry, capsys) -> None:
+def test_three_commands_lead_from_an_export_to_a_report(tmp_path: Path, site: Path, log: Telemetry, capsys) -> None:
     frame = pd.DataFrame({theirs: log[ours] for theirs, ours in NAMES.items()})
     frame.insert(0, "Datum", pd.to_datetime(to_local(log.time, "Europe/Amsterdam")).strftime("%d-%m-%Y %H:%M"))
-    export, out = tmp_path / "export.csv", tmp_path / "diagnosis"
+    export, bundle, out = tmp_path / "export.csv", tmp_path / "bundle", tmp_path / "diagnosis"
     frame.to_csv(export, sep=";", decimal=",", index=False, float_format="%.5f", encoding="cp1252")
     assert main(["import", str(export), "--site", str(site)]) == 0
     assert "data fault" not in capsys.readouterr().out
-    assert main(["diagnose", str(export), "--site", str(site), "--out", str(out)]) in {0, 10, 11, 12}
-    assert (out / "report.html").read_text().startswith("<!")
+    known = ["--site", str(site)]
+    assert main(["calibrate", str(export), *known, "--fit-weeks", "4", "--out", str(bundle)]) == 0
+    found = main(["diagnose", str(export), *known, "--bundle", str(bundle), "--out", str(out), "--language", "nl"])
+    assert found in {0, 10, 11, 12}
+    assert '<html lang="nl">' in (out / "report.html").read_text()
     assert json.loads((out / "diagnosis.json").read_text())["verdict"] != "data_fault"
+
+
+def test_the_commands_are_those_of_the_documentation() -> None:
+    text = (Path(__file__).resolve().parents[2] / "docs" / "data.md").read_text()
+    typed = [line.split()[:2] for line in text.split("```")[1].splitlines() if line]
+    assert typed == [["igrow-trainer", name] for name in ("import", "calibrate", "diagnose")]
 
 
 @pytest.mark.parametrize(

@@ -144,6 +144,7 @@ def test_an_effect_tells_its_bounds_its_source_and_the_test_that_separates_it(na
     assert effect.source
     assert effect.signature
     assert effect.separating_test
+    assert effect.title
     assert "{value}" not in effect.sentence.format(value="1", unit=effect.amplitude.unit)
     assert set(effect.resembles) <= set(PARAMETERS)
 

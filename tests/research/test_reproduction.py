@@ -14,7 +14,7 @@ from igrow.core.site import Prices
 from igrow.trainer.data.public import automatoes2020, liaoyang2020
 from igrow.trainer.data.public.wur2020 import FAULTY_DAYS, TrajectoryFileError, read_seasons
 from igrow.trainer.research.network.leaf_picking import smooth
-from igrow.trainer.research.paper import figure3, harvests, incremental, seasons, table1
+from igrow.trainer.research.paper import figure3, harvests, incremental, pilot, seasons, table1
 from igrow.trainer.research.paper.compartments import Compartment, read_2019
 from igrow.trainer.research.paper.scores import SCORED, r2, score
 from igrow.trainer.training.stage import StageData, TrainingPlan
@@ -174,10 +174,38 @@ def test_weeks_outside_those_named_are_not_seen() -> None:
 
 
 def test_the_second_pilot_is_read_per_square_metre(data_folder: Path) -> None:
-    pilot = liaoyang2020.read(data_folder / "liaoyang2020")
-    grown = {house: values.sum() for house, values in pilot.production.items()}
+    season = liaoyang2020.read(data_folder / "liaoyang2020")
+    grown = {house: values.sum() for house, values in season.production.items()}
     assert set(grown) == set(liaoyang2020.GREENHOUSES)
     assert all(1.0 < total < 30.0 for total in grown.values())
-    assert pilot.costs["gh01"]["labour"] == pytest.approx(1543.96 / 667)
+    assert season.costs["gh01"]["labour"] == pytest.approx(1543.96 / 667)
     experiment, control = liaoyang2020.read_climate_pair(data_folder / "liaoyang2020", 3, 1)
     assert experiment["air_temperature"].size == control["air_temperature"].size > 100
+
+
+def test_the_pilots_table_is_computed_again_with_its_spreads_and_tests(data_folder: Path, tmp_path: Path) -> None:
+    told: list[str] = []
+    lines = pilot.run(data_folder / "liaoyang2020", tmp_path, told.append)
+    harvest, profit = lines["yield"], lines["net profit"]
+    assert harvest.change == pytest.approx(10.15, abs=0.005)
+    # The paper prints a tenth of these, and of each line the p-value of another test.
+    assert (harvest.control_spread, harvest.experiment_spread) == (
+        pytest.approx(533.2, abs=0.1),
+        pytest.approx(454.2, abs=0.1),
+    )
+    assert (harvest.p_one_sample, harvest.p_student, harvest.p_welch) == pytest.approx((7.7e-3, 0.063, 0.245), rel=0.02)
+    assert (profit.control, profit.experiment) == pytest.approx((1498.56, 2887.70), abs=0.01)
+    assert profit.p_student == pytest.approx(2.8e-4, rel=0.02)
+    assert any("as published" in line for line in told)
+    figures = {path.stem for path in tmp_path.glob("*.svg")}
+    assert figures == {"figure5", *(f"figureS{number}" for number in range(4, 14))}
+
+
+def test_figure_3_has_both_panels_and_every_curve(data_folder: Path, tmp_path: Path) -> None:
+    told: list[str] = []
+    found = figure3.run(data_folder / "agc2019", data_folder / "automatoes2020", tmp_path, told.append)
+    assert found["Wageningen's simulator"] == pytest.approx(349, abs=0.5)
+    drawn = (tmp_path / "figure3.svg").read_text()
+    assert "cumulative net profit" in drawn and "sum of absolute daily differences" in drawn
+    assert all(name.replace("'", "&#x27;") in drawn or name in drawn for name in (*found, "measured"))
+    assert sum("as published" in line for line in told) == 3

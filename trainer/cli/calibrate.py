@@ -10,6 +10,7 @@ import numpy as np
 
 from igrow.core.errors import IgrowError
 from igrow.trainer.cli.log_arguments import add_log_arguments, log_of
+from igrow.trainer.cli.progress import progress
 from igrow.trainer.exporting import export, read_model
 from igrow.trainer.fit import FittedModel, calibrate
 from igrow.trainer.fit.population import read_population
@@ -50,8 +51,10 @@ def run(arguments: argparse.Namespace) -> int:
     elif arguments.population:
         prior = read_population(arguments.population).prior(log.known_site)
         before = replace(FittedModel.described(log.known_site), posterior=prior)
-    model = calibrate(log, prior_model=before, progress=lambda line: print(line, flush=True))
-    print(f"\n{model.summary()}\n")
-    bundle = export(model, arguments.out)
+    with progress("calibrating") as say:
+        model = calibrate(log, prior_model=before, progress=say)
+        say("writing the bundle")
+        bundle = export(model, arguments.out)
+    print(f"{model.summary()}\n")
     print(f"wrote {bundle.folder} ({bundle.label})")
     return 0

@@ -12,11 +12,13 @@ from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.greenhouse import HiddenEffect
 from igrow.core.greenhouse.described import parse_effect
 from igrow.trainer.cli.log_arguments import add_log_arguments, log_of
+from igrow.trainer.cli.progress import progress
 from igrow.trainer.diagnosis import diagnose
 from igrow.trainer.diagnosis.evidence import errors_with
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
 from igrow.trainer.exporting import export, read_model
 from igrow.trainer.fit import FittedModel
+from igrow.trainer.language import LANGUAGES
 from igrow.trainer.report import write_diagnosis
 
 EXAMPLE = "igrow-trainer diagnose logs/ --bundle bundle/ --site site.yaml --out diagnosis/"
@@ -36,6 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of a virtual greenhouse: what is hidden in it; the errors with that known go to truth.json",
     )
     parser.add_argument("--seed", type=int, default=0, help="of random flips and bootstraps")
+    parser.add_argument("--language", choices=LANGUAGES, default=LANGUAGES[0], help="of the report (default: en)")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -48,10 +51,13 @@ def run(arguments: argparse.Namespace) -> int:
     log = log_of(arguments)
     bundle = read_bundle(arguments.bundle or default_bundle_folder())
     model = read_model(bundle, log.known_site)
-    result = diagnose(log, model, without=arguments.without, seed=arguments.seed)
-    write_diagnosis(arguments.out, result)
-    if result.findings:
-        replace_bundle(arguments.out / "bundle", result.corrected)
+    with progress("diagnosing") as say:
+        result = diagnose(log, model, without=arguments.without, seed=arguments.seed, progress=say)
+        say("writing the report")
+        write_diagnosis(arguments.out, result, arguments.language)
+        if result.findings:
+            say("writing the corrected bundle")
+            replace_bundle(arguments.out / "bundle", result.corrected)
     if truth and result.evidence is not None:
         errors = errors_with(result.evidence, [known_term(one) for one in truth])
         (arguments.out / "truth.json").write_text(json.dumps({"errors_24_h": errors}), encoding="utf-8")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -12,8 +13,9 @@ from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import QUANTITIES
 from igrow.trainer.cli.log_arguments import add_log_arguments, log_of
+from igrow.trainer.cli.progress import progress
 from igrow.trainer.fit.evaluation import Evaluation
-from igrow.trainer.fit.scoring import score_bundle
+from igrow.trainer.fit.scoring import score_bundle, unseen
 
 EXAMPLE = "igrow-trainer evaluate later.csv --bundle out/bundle --site config/site.yaml"
 
@@ -29,7 +31,10 @@ def run(arguments: argparse.Namespace) -> int:
     """Score and print."""
     log = log_of(arguments)
     bundle = read_bundle(arguments.bundle or default_bundle_folder())
-    found = score_bundle(log, bundle, progress=lambda line: print(line, flush=True))
+    for note in unseen(log, bundle).notes[len(log.notes) :]:
+        print(f"note: {note}", file=sys.stderr)
+    with progress("evaluating") as say:
+        found = score_bundle(log, bundle, progress=say)
     if not any(found.values()):
         raise IgrowError(f"{log.name}: no stretch of the log is complete enough to run the bundle on")
     print(f"\n{bundle.label} on {log.name}\n{table(found)}")

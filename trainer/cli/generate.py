@@ -14,6 +14,7 @@ from igrow.core.greenhouse.described import parameters_of, parse_effect
 from igrow.core.greenhouse.weather import WeatherClimate
 from igrow.core.site import load_site
 from igrow.core.telemetry import Telemetry, read_csv, write_csv
+from igrow.trainer.cli.progress import days_done
 from igrow.trainer.default_bundle import varied_recipe
 
 EXAMPLE = "igrow-trainer generate --site config/site.yaml --days 28 --effect wind_infiltration=0.1 --out out/virtual"
@@ -57,18 +58,21 @@ def run(arguments: argparse.Namespace) -> int:
     setpoints: list[Telemetry] | Callable[[np.datetime64], dict[str, float]] = recipe
     if arguments.setpoints == "varied":
         setpoints = [varied_recipe(start, end, random) for _ in houses]
-    print(f"simulating {arguments.count} greenhouses for {arguments.days} days", flush=True)
-    seasons = simulate_many(
-        houses,
-        weather
-        or [generate_weather(start, end, seed=arguments.seed + row, climate=place) for row in range(len(houses))],
-        setpoints,
-        start,
-        end,
-        count=len(houses),
-        seed=arguments.seed,
-        effects=effects,
-    )
+    weathers = weather or [
+        generate_weather(start, end, seed=arguments.seed + row, climate=place) for row in range(len(houses))
+    ]
+    with days_done(f"simulating {arguments.count} greenhouses", start, end) as reached:
+        seasons = simulate_many(
+            houses,
+            weathers,
+            setpoints,
+            start,
+            end,
+            count=len(houses),
+            seed=arguments.seed,
+            effects=effects,
+            reached=reached,
+        )
     arguments.out.mkdir(parents=True, exist_ok=True)
     for number, season in enumerate(seasons):
         path = arguments.out / f"greenhouse-{number:03d}.csv.gz"

@@ -63,7 +63,8 @@ def run(arguments: argparse.Namespace) -> int:
         return 2
     if not arguments.dry_run:
         files, place = " ".join(map(str, arguments.file)), arguments.site or "site.yaml"
-        print(f"\nnext: igrow-trainer diagnose {files} --site {place} --out diagnosis")
+        print(f"\nnext: igrow-trainer calibrate {files} --site {place} --fit-weeks 4 --out bundle")
+        print(f"then: igrow-trainer diagnose {files} --site {place} --bundle bundle --out diagnosis")
     return 0
 
 

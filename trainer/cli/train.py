@@ -11,6 +11,7 @@ from igrow.core.errors import IgrowError
 from igrow.core.simulator.crop import CropStages
 from igrow.core.simulator.hybrid.nominal import site_record
 from igrow.core.site import load_site
+from igrow.trainer.cli.progress import progress
 from igrow.trainer.data import read_log
 from igrow.trainer.exporting import export, read_model
 from igrow.trainer.training.crop import fit_net_growth, train_networks
@@ -34,10 +35,12 @@ def run(arguments: argparse.Namespace) -> int:
     site = load_site(arguments.site)
     model = read_model(arguments.bundle or default_bundle_folder(), site)
     seasons = [read_log(path, site).telemetry for path in arguments.seasons]
-    growth, harvest = train_networks(seasons, seed=arguments.seed, report=lambda line: print(line, flush=True))
-    records = [site_record(season, site, max(300.0, season.step)) for season in seasons]
-    conversion, maintenance = fit_net_growth(records, model.posterior.values, seasons)
-    crop = CropStages(growth, harvest, conversion, maintenance)
-    bundle = export(replace(model, crop=crop), arguments.out)
+    with progress("training") as say:
+        growth, harvest = train_networks(seasons, seed=arguments.seed, report=say)
+        say("fitting the net growth")
+        records = [site_record(season, site, max(300.0, season.step)) for season in seasons]
+        conversion, maintenance = fit_net_growth(records, model.posterior.values, seasons)
+        crop = CropStages(growth, harvest, conversion, maintenance)
+        bundle = export(replace(model, crop=crop), arguments.out)
     print(f"wrote {bundle.folder} ({bundle.label})")
     return 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -51,10 +51,13 @@ def read(path: Path, mapping: ExportMapping) -> Merged:
 
 def read_table(table: ExportTable, mapping: ExportMapping) -> Merged:
     """Return the telemetry of an export's chosen rows; raises IgrowError as `read` does."""
+    table, notes = readings(table, mapping.time.column, mapping.time.time_of_day)
     if mapping.long is not None:
-        return _read_long(table, mapping)
-    time = times(table, mapping)
-    return merge(time, {name: quantity(table, rule, mapping, time) for name, rule in mapping.columns.items()})
+        merged = _read_long(table, mapping)
+    else:
+        time = times(table, mapping)
+        merged = merge(time, {name: quantity(table, rule, mapping, time) for name, rule in mapping.columns.items()})
+    return replace(merged, notes=(*notes, *merged.notes))
 
 
 def as_table(cells: Cells, header: Sequence[int] = (1,), first_row: int | None = None) -> ExportTable:
@@ -91,10 +94,7 @@ def as_table(cells: Cells, header: Sequence[int] = (1,), first_row: int | None =
 
 def _spread(row: Sequence[str], width: int) -> list[str]:
     """Return a row whose empty cells have the text of the cell before them."""
-    texts: list[str] = []
-    for cell in [*row, *[""] * (width - len(row))]:
-        texts.append(cell or (texts[-1] if texts else ""))
-    return texts
+    return _held([*row, *[""] * (width - len(row))])
 
 
 def chosen_rows(table: ExportTable, only: Mapping[str, str]) -> ExportTable:
@@ -107,6 +107,40 @@ def chosen_rows(table: ExportTable, only: Mapping[str, str]) -> ExportTable:
         columns = {key: [texts[row] for row in kept] for key, texts in table.columns.items()}
         table = ExportTable(table.path, columns, [table.lines[row] for row in kept])
     return table
+
+
+def readings(table: ExportTable, column: str, time_of_day: str | None) -> tuple[ExportTable, tuple[str, ...]]:
+    """Return the rows that are readings, with notes on the others.
+
+    A text without any digit is no time: a line of sums below the table, or its header once more. A day that stands on
+    the first of its rows alone holds for those below it.
+    """
+    notes: list[str] = []
+    if time_of_day is not None and not all(table[column]):
+        days, hours = _held(table[column]), table[time_of_day]
+        filled = [day if hour else own for day, hour, own in zip(days, hours, table[column], strict=True)]
+        if filled != list(table[column]):
+            notes.append(f"{column!r} is empty on some rows: the day above holds there")
+            table = ExportTable(table.path, {**table.columns, column: filled}, table.lines)
+    texts = table[column]
+    strange = [row for row, text in enumerate(texts) if text and not any(map(str.isdigit, text))]
+    if not strange:
+        return table, tuple(notes)
+    where = ", ".join(f"line {table.lines[row]} ({texts[row]!r})" for row in strange[:3])
+    more = f" and {len(strange) - 3} more" if len(strange) > 3 else ""
+    notes.append(f"no readings, set aside: {where}{more}")
+    out = set(strange)
+    kept = [row for row in range(len(texts)) if row not in out]
+    columns = {name: [cells[row] for row in kept] for name, cells in table.columns.items()}
+    return ExportTable(table.path, columns, [table.lines[row] for row in kept]), tuple(notes)
+
+
+def _held(texts: Sequence[str]) -> list[str]:
+    """Return texts whose empty ones have the text above."""
+    held: list[str] = []
+    for text in texts:
+        held.append(text or (held[-1] if held else ""))
+    return held
 
 
 def times(table: ExportTable, mapping: ExportMapping) -> Times:

@@ -18,6 +18,7 @@ from igrow.trainer.data.fault import DataFault
 from igrow.trainer.data.record import grid_record
 from igrow.trainer.data.screening import NEEDED, Screened
 from igrow.trainer.data.source import DailyTable
+from igrow.trainer.language import speak
 
 LEAST_DAYS = 7
 """Days that a log must span for anything to be fitted to it."""
@@ -122,4 +123,5 @@ class Log:
         """Return a matplotlib figure of the log with what was set aside, and write it to `path` where that is given."""
         from igrow.trainer.data.plot import plot_log  # noqa: PLC0415  (matplotlib is slow to import)
 
-        return plot_log(self, path)
+        language = speak("en", self.site.time_zone if self.site else "UTC")
+        return plot_log(self, path, language=language)

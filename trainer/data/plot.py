@@ -1,69 +1,72 @@
-"""A log at a glance: each quantity over time, with what was set aside in red."""
+"""A log at a glance: each quantity over local time, with what was set aside in red."""
 
 from __future__ import annotations
 
-import io
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import matplotlib.dates
 import numpy as np
 from matplotlib.figure import Figure
 
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import QUANTITIES
+from igrow.trainer.figure_style import COLOURS, WIDTH, date_axis, few_ticks, local, name_above, panels, thinned
+from igrow.trainer.language import ENGLISH, Language
 
 if TYPE_CHECKING:
     from igrow.trainer.data.log import Log
 
-_MOST_POINTS = 2000
+_MOST_POINTS = 1000
 """Rows of a panel; longer logs are thinned to bands from the lowest to the highest of each stretch."""
 
 
-class LogFigure(Figure):
-    """A figure that a notebook shows by itself."""
-
-    def _repr_svg_(self) -> str:
-        text = io.StringIO()
-        self.savefig(text, format="svg")
-        return text.getvalue()
-
-
-def plot_log(log: Log, path: str | Path | None = None) -> LogFigure:
+def plot_log(
+    log: Log,
+    path: str | Path | None = None,
+    *,
+    only: Collection[str] = (),
+    language: Language = ENGLISH,
+    width: float = 2.0 * WIDTH,
+) -> Figure:
     """Return a figure with a panel for each quantity of the log that has a value; written to `path` where given.
+
+    Args:
+        log: to be shown.
+        path: of the picture; its ending says the format.
+        only: quantities to show (empty: all).
+        language: of names and dates, with the time zone of the axis.
+        width: inches.
 
     Raises:
         IgrowError: nothing is there to plot, or the file cannot be written.
     """
     table = log.telemetry
-    names = [name for name in QUANTITIES if name in table and np.isfinite(table[name]).any()]
+    names = [
+        name
+        for name in QUANTITIES
+        if (not only or name in only) and name in table and np.isfinite(table[name]).any()
+    ]  # fmt: skip
     if not names:
         raise IgrowError(f"{log.name}: no quantity has a value to plot")
-    figure = LogFigure(figsize=(9.0, 0.4 + 1.05 * len(names)), layout="constrained")
-    panels = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, name in zip(panels, names, strict=True):
-        block = max(1, len(table) // _MOST_POINTS)
-        whole = len(table) // block * block
-        cells = table[name][:whole].reshape(-1, block)
-        time = table.time[:whole:block]
-        some = np.isfinite(cells).any(axis=1)
-        low = np.where(some, np.min(np.where(np.isfinite(cells), cells, np.inf), axis=1), np.nan)
-        high = np.where(some, np.max(np.where(np.isfinite(cells), cells, -np.inf), axis=1), np.nan)
-        axes.fill_between(time, low, high, color="#3b7dd8", linewidth=0.6, edgecolor="#3b7dd8")
+    figure, places = panels(len(names), 0.4 + 0.95 * len(names), width=width)
+    block = max(1, len(table) // _MOST_POINTS)
+    time = local(table.time[: len(table) // block * block : block], language)
+    for axes, name in zip(places, names, strict=True):
+        low, high = thinned(table[name], block)
+        colour = COLOURS.get(name, COLOURS["weather"])
+        axes.fill_between(time, low, high, color=colour, linewidth=0.8, edgecolor=colour)
         for one in log.screened:
             if one.quantity == name:
-                axes.axvspan(one.start, one.end, color="#d33", alpha=0.4)
-        axes.set_ylabel(QUANTITIES[name].unit, fontsize=7)
-        axes.set_title(name.replace("_", " "), loc="left", fontsize=8, pad=2)
-        axes.tick_params(labelsize=7)
-        axes.grid(alpha=0.3)
-    locator = matplotlib.dates.AutoDateLocator()  # type: ignore[no-untyped-call]
-    panels[-1].xaxis.set_major_locator(locator)
-    formatter = matplotlib.dates.ConciseDateFormatter(locator)  # type: ignore[no-untyped-call]
-    panels[-1].xaxis.set_major_formatter(formatter)
+                first, last = local([one.start, one.end], language)
+                axes.axvspan(first, last, color=COLOURS["aside"], alpha=0.45, linewidth=1.0)
+        unit = language.unit(QUANTITIES[name].unit)
+        name_above(axes, f"{language.name(name)}{f', {unit}' if unit else ''}")
+        few_ticks(axes, 3)
+    date_axis(places[-1], language)
     if path is not None:
         try:
-            figure.savefig(Path(path))
+            figure.savefig(Path(path), facecolor="white")
         except (OSError, ValueError) as error:
             raise IgrowError(f"{path}: the plot cannot be written: {error}") from None
     return figure

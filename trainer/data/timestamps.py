@@ -101,7 +101,7 @@ def _formatted(text: str, form: str) -> datetime.datetime:
 
 def _after_midnight(text: str) -> tuple[str, datetime.timedelta]:
     """Return a text with the hour 24 as 0, and the day that this adds."""
-    changed = re.sub(r"(?<=[\sT])24(?=[:.]?00)", "00", text)
+    changed = re.sub(r"(?<=[\sT])24(?=[:.]?00|$)", "00", text)
     return changed, datetime.timedelta(days=int(changed != text))
 
 

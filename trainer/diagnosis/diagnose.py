@@ -7,7 +7,7 @@ log, model --> knowledge --> design --> compare --> estimate --> refit --+--> co
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -30,8 +30,10 @@ from igrow.trainer.diagnosis.rounds import search_of
 from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.model import FittedModel
+from igrow.trainer.language.names import N_
 
-NOT_CALIBRATED = (
+Report = Callable[[str], None]
+NOT_CALIBRATED = N_(
     "What the model misses of this greenhouse when all is well is not known, so only large causes can be told from a "
     "greenhouse that is another: calibrate it on weeks that are known to be good (igrow-trainer calibrate)."
 )
@@ -45,6 +47,7 @@ def diagnose(
     seed: int = 0,
     rules: DecisionRules = DEFAULT,
     nuisance: NuisanceSubspace | None = None,
+    progress: Report | None = None,
 ) -> Diagnosis:
     """Return the diagnosis of a log.
 
@@ -55,6 +58,7 @@ def diagnose(
         seed: of the random flips and bootstraps.
         rules: every threshold.
         nuisance: what greenhouses show though nothing is missing (None: what came with the trainer).
+        progress: is told what is being done, in lines.
 
     Raises:
         IgrowError: the log is shorter than a week, or lacks outdoor or air temperature.
@@ -66,6 +70,8 @@ def diagnose(
     if log.faults:
         return _data_fault(log, model)
     log.require("a diagnosis", rules.least_days)
+    say = progress or (lambda _line: None)
+    say("completing the log")
     knowledge = knowledge_of(model, site, rules)
     logged, rng = log_days(log, model), np.random.default_rng(seed)
     completed = complete(log, logged, model, knowledge, rules, rng)
@@ -73,10 +79,13 @@ def diagnose(
     off = opened is not None and opened.is_offset(rules)
     hidden = frozenset(without) | (frozenset({"co2_drift"}) if off else frozenset())
     search = search_of(days, site, model, knowledge, hidden, rules, nuisance)
+    say("searching for causes")
     first, last, found = search.run(rng)
+    say("correcting the model")
     result = correct(days, knowledge, found, last.patterns, site.longitude, rules)
     verdict, findings = _verdict(completed, result.kept, last, rules)
     stages = _stages(result, completed, logged)
+    say("predicting unseen days")
     errors = _errors(stages)
     start, end = log.telemetry.time[0], log.telemetry.time[-1]
     runs = {name: day for name, (stage, seen) in stages.items() if (day := seen.run(stage)) is not None}
@@ -100,6 +109,7 @@ def diagnose(
         logged.record.missing,
         notes,
         Evidence(days, knowledge, first, result.estimates, {name: stage for name, (stage, _) in stages.items()}, runs),
+        log,
     )
 
 
@@ -167,5 +177,6 @@ def _errors(stages: Mapping[str, tuple[Stage, LogDays]]) -> Mapping[str, Mapping
 def _data_fault(log: Log, model: FittedModel) -> Diagnosis:
     time, notes = log.telemetry.time, tuple(map(str, log.faults))
     return Diagnosis(
-        log.known_site.name, "data_fault", time[0], time[-1], 0, 0, (), {}, log.screened, model, model, notes=notes
-    )
+        log.known_site.name, "data_fault", time[0], time[-1], 0, 0, (), {}, log.screened, model, model,
+        notes=notes, log=log,
+    )  # fmt: skip

@@ -5,19 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from igrow.core.arrays import Floats, Mask
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator.hybrid.measurement import PREDICTED
 from igrow.trainer.diagnosis.evidence import Evidence
+from igrow.trainer.figure_style import COLOURS, STROKES, date_axis, few_ticks, legend, local, name_above, panels
+from igrow.trainer.language import ENGLISH, Language
 
-COLOURS = {"deployed": "#888888", "recalibrated": "#3b7dd8", "corrected": "#1f9d55"}
-_SCALES = {"air_temperature": 1.0, "air_humidity": 3.0, "air_co2": 50.0}
-"""By which errors of different quantities are divided in one figure."""
 _BINS = 12
 """Of a driver, each with as many samples."""
+_PANEL = 1.15
+"""Inches of each of several panels."""
 
 
 def needed(evidence: Evidence | None) -> Evidence:
@@ -27,7 +28,7 @@ def needed(evidence: Evidence | None) -> Evidence:
     return evidence
 
 
-def worst_day(evidence: Evidence, quantity: str) -> Figure:
+def worst_day(evidence: Evidence, quantity: str, language: Language = ENGLISH) -> Figure:
     """Plot the unseen day with the largest error of the deployed model: measured, and what each stage predicts."""
     if "deployed" not in evidence.runs or quantity not in PREDICTED:
         raise IgrowError(f"there is no unseen day with {quantity} to plot")
@@ -37,66 +38,114 @@ def worst_day(evidence: Evidence, quantity: str) -> Figure:
         raise IgrowError(f"there is no unseen day with {quantity} to plot")
     run = int(np.nanargmax(error))
     hours = (1 + np.arange(len(before.shown[quantity]))) * evidence.log.record.step / 3600.0
-    figure, axes = _axes()
+    figure, (axes,) = panels()
     measured = before.shown[quantity][:, run] - before.errors[quantity][:, run]
-    axes.plot(hours, measured, color="black", linewidth=1.5, label="measured")
+    axes.plot(hours, measured, color=COLOURS["measured"], label=language.name("measured"))
     for stage, runs in evidence.runs.items():
-        axes.plot(hours, runs.shown[quantity][:, run], color=COLOURS[stage], label=stage)
-    axes.set_xlabel("hours ahead")
-    axes.set_ylabel(f"{quantity.replace('_', ' ')}, {QUANTITIES[quantity].unit}")
-    axes.legend(fontsize=8)
+        axes.plot(
+            hours,
+            runs.shown[quantity][:, run],
+            color=COLOURS[stage],
+            linestyle=STROKES[stage],
+            label=language.name(stage),
+        )
+    day = evidence.log.record.time[int(np.argmax(evidence.log.split.day == before.day[run]))]
+    axes.set_xlabel(language.text("hours ahead, {day}", day=language.short_day(day)))
+    axes.set_ylabel(f"{language.name(quantity)}, {language.unit(QUANTITIES[quantity].unit)}")
+    legend(axes)
     return figure
 
 
-def evidence_by_day(evidence: Evidence) -> Figure:
+def evidence_by_day(evidence: Evidence, language: Language = ENGLISH) -> Figure:
     """Plot how the evidence for the first cause adds up from day to day: a bend is a beginning."""
-    figure, axes = _axes()
+    figure, (axes,) = panels()
     gained = np.cumsum(evidence.first.null.day_losses - evidence.first.named.day_losses)
-    axes.plot(np.arange(len(gained)), gained, color=COLOURS["corrected"])
-    axes.set_xlabel("day of the log")
-    axes.set_ylabel("evidence, log-likelihood summed")
+    start = evidence.log.record.time[0]
+    days = start + (np.arange(len(gained)) * 86_400).astype("timedelta64[s]")
+    axes.plot(local(days, language), gained, color=COLOURS["corrected"])
+    axes.set_ylabel(language.text("evidence, log-likelihood summed"))
+    date_axis(axes, language)
     return figure
 
 
-def residual_against_driver(evidence: Evidence, driver: str) -> Figure:
+def residual_by_date(evidence: Evidence, language: Language = ENGLISH) -> Figure:
+    """Plot what is missing from day to day: measured minus predicted, the mean of each day."""
+    line = evidence.first.design.line
+    record = evidence.log.record
+    when = local(record.time[line.runs.starts], language)
+    shown = _shown(line.runs.weight)
+    figure, places = panels(len(shown), 0.5 + _PANEL * len(shown))
+    for axes, balance in zip(places, shown, strict=True):
+        counted = line.runs.weight[balance]
+        mean = _mean(line.errors[balance], counted)
+        quantity = PREDICTED[balance]
+        axes.axhline(0.0, color=COLOURS["ink"], linewidth=0.8)
+        axes.plot(when, mean, color=COLOURS[quantity], marker="o", markersize=2.5)
+        name_above(axes, f"{language.name(quantity)}, {language.unit(_difference(quantity))}")
+        few_ticks(axes)
+    date_axis(places[-1], language)
+    places[-1].set_xlabel(language.text("measured minus predicted, mean of each day"))
+    return figure
+
+
+def residual_against_driver(evidence: Evidence, driver: str, language: Language = ENGLISH) -> Figure:
     """Plot what is missing against a driver, in bins of as many samples each."""
     line = evidence.first.design.line
     if np.ndim(line.drivers.get(driver, 0.0)) == 0:
         raise IgrowError(f"{driver} does not vary in this log: there is nothing to plot against")
     values = np.asarray(line.drivers[driver])[line.runs.samples]
-    figure, axes = _axes()
-    for balance, (quantity, scale) in enumerate(_SCALES.items()):
+    shown = [k for k in _shown(line.runs.weight) if len(_edges(values[line.runs.weight[k]])) > 2]
+    if not shown:
+        raise IgrowError(f"{driver} does not vary in this log: there is nothing to plot against")
+    figure, places = panels(len(shown), 0.5 + _PANEL * len(shown))
+    for axes, balance in zip(places, shown, strict=True):
         counted = line.runs.weight[balance]
-        x, y = values[counted], line.errors[balance][counted] / scale
-        edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, _BINS + 1))) if len(x) else x
-        if len(edges) < 3:
-            continue
+        x, y = values[counted], line.errors[balance][counted]
+        edges = _edges(x)
         middle = 0.5 * (edges[1:] + edges[:-1])
         place = np.clip(np.digitize(x, edges) - 1, 0, len(middle) - 1)
         means = [float(np.mean(y[place == k])) if np.any(place == k) else np.nan for k in range(len(middle))]
-        axes.plot(middle, means, marker="o", markersize=3, label=f"{quantity.replace('_', ' ')} / {scale:g}")
-    axes.set_xlabel(f"{driver.replace('_', ' ')} {QUANTITIES[driver].unit if driver in QUANTITIES else ''}")
-    axes.set_ylabel("measured minus predicted, a day ahead")
-    axes.legend(fontsize=8)
+        quantity = PREDICTED[balance]
+        axes.plot(middle, means, marker="o", markersize=3, color=COLOURS[quantity])
+        axes.axhline(0.0, color=COLOURS["ink"], linewidth=0.8)
+        name_above(axes, f"{language.name(quantity)}, {language.unit(_difference(quantity))}")
+        few_ticks(axes)
+    unit = language.unit(QUANTITIES[driver].unit) if driver in QUANTITIES else ""
+    places[-1].set_xlabel(f"{language.name(driver)}{f', {unit}' if unit else ''}")
     return figure
 
 
-def coefficient_by_regime(regimes: Mapping[str, tuple[float, float, float]]) -> Figure:
+def coefficient_by_regime(
+    regimes: Mapping[str, tuple[float, float, float]], language: Language = ENGLISH, unit: str = ""
+) -> Figure:
     """Plot a coefficient with its interval, (value, low, high), by regime."""
     if not regimes:
         raise IgrowError("this cause has no size by regime: there is nothing to plot")
-    figure, axes = _axes()
+    figure, (axes,) = panels(1, 0.7 + 0.24 * len(regimes))
     for index, (value, low, high) in enumerate(regimes.values()):
         axes.plot([low, high], [index, index], color=COLOURS["recalibrated"], linewidth=3)
-        axes.plot([value], [index], marker="o", color="black")
-    axes.set_yticks(range(len(regimes)), list(regimes))
-    axes.set_xlabel("coefficient")
+        axes.plot([value], [index], marker="o", color=COLOURS["ink"])
+    axes.set_yticks(range(len(regimes)), [language.name(name) for name in regimes])
+    axes.invert_yaxis()
+    axes.set_xlabel(f"{language.text('size')}{f', {language.unit(unit)}' if language.unit(unit) else ''}")
     return figure
 
 
-def _axes() -> tuple[Figure, Axes]:
-    figure = Figure(figsize=(5.6, 3.0), layout="constrained")
-    axes = figure.add_subplot()
-    axes.grid(True)
-    axes.tick_params(labelsize=9)
-    return figure, axes
+def _difference(quantity: str) -> str:
+    return QUANTITIES[quantity].unit.replace("degC", "K")
+
+
+def _shown(weight: Mask) -> list[int]:
+    """Return the balances of which anything counts."""
+    return [balance for balance in range(len(PREDICTED)) if weight[balance].any()]
+
+
+def _mean(values: Floats, counted: Mask) -> Floats:
+    """Return the mean of each row over what counts, NaN without any."""
+    number = counted.sum(axis=1)
+    total = np.where(counted, values, 0.0).sum(axis=1)
+    return np.where(number > 0, total / np.maximum(number, 1), np.nan)
+
+
+def _edges(values: Floats) -> Floats:
+    return np.unique(np.quantile(values, np.linspace(0.0, 1.0, _BINS + 1))) if len(values) else np.empty(0)

@@ -10,10 +10,13 @@ import numpy as np
 
 from igrow.core.quantities import QUANTITIES
 from igrow.trainer.data.screening import Screened
+from igrow.trainer.diagnosis.persistence import misfits
+from igrow.trainer.language import Language, speak
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from igrow.trainer.data.log import Log
     from igrow.trainer.diagnosis.evidence import Evidence
     from igrow.trainer.fit.model import FittedModel
 
@@ -102,6 +105,8 @@ class Diagnosis:
     notes: tuple[str, ...] = ()
     evidence: Evidence | None = None
     """What the verdict rests on; None for a data fault."""
+    log: Log | None = None
+    """What was diagnosed."""
 
     @property
     def exit_code(self) -> int:
@@ -138,6 +143,10 @@ class Diagnosis:
             if day:
                 stages = ", ".join(f"{stage} {value:.3g}" for stage, value in day.items())
                 lines.append(f"  {quantity}, 24 h ahead on unseen days: {stages}")
+        for one in misfits(self, "deployed" if self.verdict == "nothing" else "corrected"):
+            lines.append(
+                f"  the model does not fit {one.quantity}: yesterday's readings are off by {one.persistence:.3g}"
+            )
         return "\n".join(lines)
 
     def plot_errors(self, quantity: str = "air_temperature") -> Figure:
@@ -148,27 +157,38 @@ class Diagnosis:
         """
         from igrow.trainer.diagnosis import plots  # noqa: PLC0415  (matplotlib is slow to import)
 
-        return plots.worst_day(plots.needed(self.evidence), quantity)
+        return plots.worst_day(plots.needed(self.evidence), quantity, self._english)
 
     def plot_evidence(self) -> Figure:
         """Return a figure of how the evidence adds up from day to day; raises as `plot_errors` does."""
         from igrow.trainer.diagnosis import plots  # noqa: PLC0415
 
-        return plots.evidence_by_day(plots.needed(self.evidence))
+        return plots.evidence_by_day(plots.needed(self.evidence), self._english)
+
+    def plot_days(self) -> Figure:
+        """Return a figure of what is missing from day to day; raises as `plot_errors` does."""
+        from igrow.trainer.diagnosis import plots  # noqa: PLC0415
+
+        return plots.residual_by_date(plots.needed(self.evidence), self._english)
 
     def plot_residual(self, driver: str) -> Figure:
         """Return a figure of what is missing against one of the model's drivers; raises as `plot_errors` does."""
         from igrow.trainer.diagnosis import plots  # noqa: PLC0415
 
-        return plots.residual_against_driver(plots.needed(self.evidence), driver)
+        return plots.residual_against_driver(plots.needed(self.evidence), driver, self._english)
 
     def plot_regimes(self, finding: Finding) -> Figure:
         """Return a figure of a finding's coefficient by regime; raises as `plot_errors` does."""
         from igrow.trainer.diagnosis import plots  # noqa: PLC0415
 
         return plots.coefficient_by_regime(
-            {name: (one.value, one.low, one.high) for name, one in finding.regimes.items()}
+            {name: (one.value, one.low, one.high) for name, one in finding.regimes.items()}, self._english
         )
+
+    @property
+    def _english(self) -> Language:
+        """By the clock of the greenhouse."""
+        return speak("en", self.model.site.time_zone)
 
     def to_json(self) -> dict[str, Any]:
         """Return the document of `diagnosis.json`."""

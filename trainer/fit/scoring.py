@@ -51,9 +51,7 @@ def score_bundle(
         IgrowError: the log cannot be used, or has no unseen days.
     """
     say = progress or (lambda _line: None)
-    given, log = log, unseen(log, bundle)
-    for note in log.notes[len(given.notes) :]:
-        say(f"note: {note}")
+    log = unseen(log, bundle)
     log.require("an evaluation", days=2.0)
     site = log.known_site
     if bundle.manifest.variant == "network":

@@ -2,121 +2,135 @@
 
 from __future__ import annotations
 
-import io
 import json
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-import numpy as np
 from jinja2 import Environment, PackageLoader, select_autoescape
 
 from igrow.core.effects import EFFECTS
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import QUANTITIES
-from igrow.trainer.diagnosis.result import STAGES, Diagnosis, Finding, plain
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from igrow.trainer.diagnosis.result import STAGES, Diagnosis, Finding
+from igrow.trainer.figure_style import COLOURS, DARK
+from igrow.trainer.language import Language, speak
+from igrow.trainer.report import figures, sentences
+from igrow.trainer.report.worth import worth
 
 MOVED = 0.05
 """Relative change from which on a recalibrated parameter is shown."""
-_VERDICTS = {
-    "nothing": "Nothing is missing that is large enough to matter: the model fits this greenhouse.",
-    "named": "The model lacked something, and it has a name.",
-    "ambiguous": "The model lacks something; more than one cause would explain it.",
-    "unexplained": "Something real goes on that no known cause explains.",
-    "data_fault": "The log cannot be diagnosed as it stands: the data are at fault, not the greenhouse.",
-}
-_HORIZONS = {"1_step": "1 step", "24_h": "24 h", "7_d": "7 days"}
+MOST_STRETCHES = 60
+"""Stretches set aside that are listed one by one."""
+_HORIZONS = ("1_step", "24_h", "7_d")
 
 
-def write_diagnosis(folder: Path, result: Diagnosis) -> None:
+@dataclass(frozen=True)
+class Cause:
+    """A finding as the page tells it."""
+
+    finding: Finding
+    title: str
+    sentence: str
+    rivals: list[str]
+    checks: list[str]
+    costs: list[str]
+
+
+@dataclass(frozen=True)
+class ErrorRow:
+    """One line of the table of errors."""
+
+    quantity: str
+    ahead: str
+    cells: list[tuple[str, bool]]
+    """Error of each stage, and whether it is the best of them."""
+    unit: str
+
+
+def write_diagnosis(folder: Path, result: Diagnosis, language: str = "en") -> None:
     """Write ``diagnosis.json`` and ``report.html`` into a folder, which is made where it is not there.
 
     Raises:
-        IgrowError: the folder cannot be written.
+        IgrowError: the folder cannot be written, or the language is not known.
     """
+    page = render_report(result, language)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         text = json.dumps(result.to_json(), indent=2, allow_nan=False) + "\n"
         (folder / "diagnosis.json").write_text(text, encoding="utf-8")
-        (folder / "report.html").write_text(render_report(result), encoding="utf-8")
+        (folder / "report.html").write_text(page, encoding="utf-8")
     except OSError as error:
         raise IgrowError(f"{folder}: cannot be written: {error.strerror}") from None
 
 
-def render_report(result: Diagnosis) -> str:
-    """Return the page's HTML."""
-    environment = Environment(loader=PackageLoader("igrow.trainer.report"), autoescape=select_autoescape())
+def render_report(result: Diagnosis, language: str = "en") -> str:
+    """Return the page's HTML in a language (`igrow.trainer.language.LANGUAGES`), by the greenhouse's clock.
+
+    Raises:
+        IgrowError: the language is not known.
+    """
+    site = result.model.site if result.log is None else result.log.known_site
+    spoken = speak(language, site.time_zone)
+    environment = Environment(
+        loader=PackageLoader("igrow.trainer.report"),
+        autoescape=select_autoescape(),
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["map_name"] = lambda names, spoken: [spoken.name(name) for name in names]
     before, after = result.model.posterior.values, result.corrected.posterior.values
-    moved = [
-        (name, value, after[name])
-        for name, value in before.items()
-        if name in after and abs(after[name] - value) > MOVED * abs(value)
-    ]
+    faults = () if result.log is None or result.verdict != "data_fault" else result.log.faults
     return environment.get_template("page.html").render(
+        _=spoken.text,
+        language=spoken,
         diagnosis=result,
-        verdict=_VERDICTS[result.verdict],
-        gains=_gains(result),
+        time_zone=site.time_zone,
+        verdict=sentences.verdict(result, spoken),
+        causes=[_cause(result, one, spoken) for one in result.findings],
+        faults=[sentences.fault(one, spoken) for one in faults],
+        gains=list(sentences.gains(result, spoken)),
+        warnings=list(sentences.warnings(result, spoken)),
+        notes=[] if faults else list(sentences.notes(result, spoken)),
+        set_aside=list(sentences.set_aside(result, spoken)),
+        overview=figures.overview(result, spoken),
+        pictures=figures.evidence(result, spoken),
+        stages=[spoken.name(stage) for stage in STAGES],
+        errors=list(error_rows(result, spoken)),
         effects=EFFECTS,
-        quantities=QUANTITIES,
-        horizons=list(_HORIZONS.items()),
-        stages=STAGES,
-        pictures=list(_pictures(result)),
-        moved=moved,
-        day=lambda time: np.datetime_as_string(time, unit="m").replace("T", " "),
+        moved=[
+            (name, spoken.number(value, 4), spoken.number(after[name], 4))
+            for name, value in before.items()
+            if name in after and abs(after[name] - value) > MOVED * abs(value)
+        ],
+        most=MOST_STRETCHES,
+        colours=COLOURS,
+        dark=DARK,
     )
 
 
-def _pictures(result: Diagnosis) -> Iterator[tuple[str, str]]:
-    """Yield title and SVG of every figure that the result has."""
-    wanted: list[tuple[str, Callable[[], Figure]]] = [
-        (f"The worst unseen day, {quantity.replace('_', ' ')}", partial(result.plot_errors, quantity))
-        for quantity in result.errors
-    ]
-    if any(one.effect in EFFECTS for one in result.findings):
-        wanted.append(("When the evidence came", result.plot_evidence))
-    for finding in result.findings:
-        cause = finding.effect.replace("_", " ")
-        wanted.append((f"What is missing, against what drives {cause}", partial(_against_driver, result, finding)))
-        wanted.append((f"The coefficient of {cause} by regime", partial(result.plot_regimes, finding)))
-    for title, draw in wanted:
-        try:
-            yield title, _svg(draw())
-        except IgrowError:
-            continue  # The log has nothing to show there.
+def _cause(result: Diagnosis, finding: Finding, language: Language) -> Cause:
+    known = finding.effect in EFFECTS
+    title = language.text(EFFECTS[finding.effect].title) if known else language.name(finding.effect)
+    site = result.model.site if result.log is None else result.log.known_site
+    return Cause(
+        finding,
+        f"{title[0].upper()}{title[1:]}",
+        sentences.cause(finding, language),
+        sentences.rivals(finding, language),
+        sentences.checks(finding, language),
+        sentences.costs(worth(result, finding), site.greenhouse.floor_area, language),
+    )
 
 
-def _against_driver(result: Diagnosis, finding: Finding) -> Figure:
-    """Return the figure against the first of a finding's drivers that varies."""
-    for driver in finding.drivers:
-        try:
-            return result.plot_residual(driver)
-        except IgrowError:
-            continue
-    raise IgrowError(f"nothing that drives {finding.effect} varies in this log")
-
-
-def _gains(result: Diagnosis) -> list[str]:
-    """Return the sentences on the error a day ahead, for the grower."""
-    sentences = []
-    for quantity, horizons in result.errors.items():
-        day = horizons.get("24_h", {})
-        if {"deployed", "corrected"} <= day.keys():
-            unit = QUANTITIES[quantity].unit.replace("degC", "K")
-            name = quantity.removeprefix("air_").replace("co2", "CO2")
-            before, after = (f"{plain(day[stage])} {unit}" for stage in ("deployed", "corrected"))
-            sentences.append(f"Predicted {name} was off by {before} a day ahead; now {after}.")
-    return sentences
-
-
-def _svg(figure: Figure) -> str:
-    from matplotlib import rc_context  # noqa: PLC0415  (slow to import)
-
-    buffer = io.StringIO()
-    with rc_context({"svg.fonttype": "none", "svg.hashsalt": "igrow"}):
-        figure.savefig(buffer, format="svg", metadata={"Date": None})
-    text = buffer.getvalue()
-    return text[text.index("<svg") :]
+def error_rows(result: Diagnosis, language: Language) -> Iterator[ErrorRow]:
+    """Yield the table of errors; the best of a row is the smallest, told apart to the digits that are shown."""
+    for quantity, table in result.errors.items():
+        for horizon in _HORIZONS:
+            if horizon not in table:
+                continue
+            shown = [float(f"{table[horizon][stage]:.3g}") for stage in STAGES]
+            best = min(shown)
+            cells = [(language.number(value, 3), value == best and max(shown) > best) for value in shown]
+            unit = language.unit(QUANTITIES[quantity].unit.replace("degC", "K"))
+            yield ErrorRow(language.name(quantity), language.name(horizon), cells, unit)

@@ -25,6 +25,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="the reading is behind in every change, no balance answers",
     separating_test="breathe on the sensor, or clean its filter and fan",
+    title="a temperature sensor that answers late",
     sentence="the temperature sensor answers late",
     source="sensor practice",
     memory=lagged(lambda _xp, drivers: drivers["air_temperature"], "time_constant", 60.0),

@@ -22,6 +22,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="the reading is off from one moment on, no balance answers",
     separating_test="hold a calibrated hand sensor beside it",
+    title="a temperature sensor that is off",
     sentence="the temperature sensor reads {value} K too much",
     source="sensor practice",
     measured=("air_temperature",),

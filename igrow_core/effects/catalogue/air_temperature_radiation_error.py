@@ -22,6 +22,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="the reading follows the light at once, no balance answers",
     separating_test="shade and ventilate the sensor box for a sunny hour",
+    title="a temperature sensor that the sun warms",
     sentence="the sun warms the temperature sensor: it reads {value} K too much for each 100 W/m2",
     source="sensor practice",
     measured=("air_temperature",),

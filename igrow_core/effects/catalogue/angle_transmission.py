@@ -26,6 +26,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="light is missing in the morning, the evening and in winter alike",
     separating_test="compare the light below the cover at noon and at 20 degrees of sun height",
+    title="less light from a low sun",
     sentence="a low sun gives less light than expected: {value} less at the horizon",
     source="Bot (1983), thesis Wageningen: angular transmission of covers",
 )

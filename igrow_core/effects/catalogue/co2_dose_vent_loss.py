@@ -23,6 +23,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="CO2 is missing while it is dosed with the vents open",
     separating_test="stop dosing for an hour with the vents open, and compare",
+    title="dosed CO2 that escapes through open vents",
     sentence="dosed CO2 escapes through open vents before it mixes: {value} of it at fully open vents",
     source="short circuit of the flow, mass balance",
 )

@@ -22,6 +22,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="the reading runs away slowly, no balance answers",
     separating_test="hold a calibrated hand sensor beside it, twice, a week apart",
+    title="a CO2 sensor that drifts",
     sentence="the CO2 sensor drifts: {value} ppm more each 30 days",
     source="sensor practice",
     measured=("air_co2",),

@@ -22,6 +22,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="the reading is off from one moment on, no balance answers",
     separating_test="hold a calibrated hand sensor beside it",
+    title="a CO2 sensor that is off",
     sentence="the CO2 sensor reads {value} ppm too much",
     source="sensor practice",
     measured=("air_co2",),

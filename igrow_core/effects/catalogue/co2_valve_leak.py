@@ -22,6 +22,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="CO2 stays high on nights with the dosing off",
     separating_test="close the hand valve of the CO2 line for a night",
+    title="a CO2 valve that leaks",
     sentence="CO2 leaks in all the time: about {value} g/m2 per hour",
     source="mass balance",
 )

@@ -22,6 +22,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="a slow trend in the heat of the sun only",
     separating_test="wash one bay and compare the light below it",
+    title="a cover that loses light",
     sentence="the cover loses light: {value} of it in 100 days",
     source="general practice: dirt and ageing of covers",
 )

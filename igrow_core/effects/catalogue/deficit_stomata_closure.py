@@ -35,6 +35,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="vapour is missing on hot dry noons only",
     separating_test="fog or shade for an hour at a dry noon and compare",
+    title="a crop that closes its stomata in dry air",
     sentence="the crop closes its stomata in dry air: {value} of its transpiration for each kPa too much",
     source="Stanghellini (1987), thesis Wageningen: resistance against vapour deficit",
 )

@@ -26,6 +26,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="heat comes in while the heating is off, day and night",
     separating_test="feel the pipe behind the closed valve; close the hand valve for a night",
+    title="a heating valve that leaks",
     sentence="a closed heating valve lets hot water through: about {value} W/m2 while the heating is off",
     source="general practice: valve authority and leakage, EN 60534-4",
 )

@@ -22,6 +22,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="the reading runs away slowly, no balance answers",
     separating_test="hold a calibrated hand sensor beside it, twice, a week apart",
+    title="a humidity sensor that drifts",
     sentence="the humidity sensor drifts: {value} % more each 30 days",
     source="sensor practice",
     measured=("air_humidity",),

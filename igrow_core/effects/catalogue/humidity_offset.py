@@ -22,6 +22,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="the reading is off from one moment on, no balance answers",
     separating_test="hold a calibrated hand sensor beside it",
+    title="a humidity sensor that is off",
     sentence="the humidity sensor reads {value} % too much",
     source="sensor practice",
     measured=("air_humidity",),

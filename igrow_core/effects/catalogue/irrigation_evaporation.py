@@ -27,6 +27,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="a pulse of vapour after each irrigation that decays within an hour or two",
     separating_test="skip one irrigation turn on a dull day",
+    title="irrigation water that evaporates from the floor",
     sentence="irrigation water evaporates from the floor: {value} of it",
     source="mass balance of wet surfaces",
     memory=lagged(lambda _xp, drivers: drivers["irrigation"], "time_constant", 60.0),

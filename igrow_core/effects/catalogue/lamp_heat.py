@@ -31,6 +31,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="a square wave of heat with the lamps",
     separating_test="flash the lamps off schedule for an hour at night",
+    title="lamps that heat the air more or less than thought",
     sentence="the lamps heat the air differently than expected: {value} of their power more",
     source="Katzin et al. (2020), Biosystems Engineering 194: energy balance of lamps",
     resembles=("lamp_heat_share",),

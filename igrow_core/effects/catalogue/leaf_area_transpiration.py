@@ -36,6 +36,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="transpiration steps on the days of deleafing",
     separating_test="compare the day before and after deleafing",
+    title="transpiration that follows the leaf area more",
     sentence="transpiration follows the leaf area more than expected ({value})",
     source="Stanghellini (1987), thesis Wageningen: transpiration per leaf area",
 )

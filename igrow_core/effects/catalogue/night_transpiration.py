@@ -35,6 +35,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="vapour appears in the dark only, with the deficit and the leaf area",
     separating_test="compare two dark nights of different humidity; switch the lamps on for an hour",
+    title="a crop that evaporates more at night",
     sentence="the crop evaporates more at night than expected: {value} g/m2 of leaf per hour and kPa",
     source="Caird et al. (2007), Plant Physiol. 143: night-time transpiration",
     resembles=("transpiration_night_share",),

@@ -22,6 +22,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="the uptake of CO2 falls slowly, in the light only",
     separating_test="measure the photosynthesis of a leaf",
+    title="a crop that assimilates less from week to week",
     sentence="the crop assimilates less from week to week: {value} less in 100 days",
     source="general practice: ageing and disease of a canopy",
 )

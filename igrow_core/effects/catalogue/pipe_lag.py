@@ -25,6 +25,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="too little heat after the pipe warms and too much after it cools, nothing in between",
     separating_test="raise the minimum pipe temperature by 10 K for an hour and back",
+    title="pipes that heat with a delay",
     sentence="the pipes heat with a delay: {value} W/m2 for each kelvin comes late",
     source="De Zwart (1996), thesis Wageningen, ch. 3: dynamics of the heating pipes",
     memory=lagged(lambda _xp, drivers: drivers["rail_pipe_excess"], "time_constant", 60.0),

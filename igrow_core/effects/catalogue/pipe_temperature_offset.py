@@ -24,6 +24,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="the heat of a warm pipe is off by a constant, whatever its temperature",
     separating_test="hold a contact thermometer to the pipe",
+    title="pipe temperature sensors that are off",
     sentence="the pipe temperature sensors read {value} K too much",
     source="sensor practice",
     measured=("rail_pipe_temperature", "grow_pipe_temperature"),

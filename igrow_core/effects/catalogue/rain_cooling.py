@@ -22,6 +22,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="heat is lost while it rains: rare and sharp",
     separating_test="compare the first hour of rain with the hour before",
+    title="rain that cools the greenhouse",
     sentence="rain cools the greenhouse by about {value} W/m2",
     source="energy balance of a wet cover",
 )

@@ -42,6 +42,7 @@ EFFECT = Effect(
         "heat and vapour are lost on nights under the screen, in proportion to the temperature difference, CO2 is not"
     ),
     separating_test="open and close the screen for half an hour on two nights alike; look at the edges of the screen",
+    title="warm air that passes the closed screen",
     sentence=(
         "the closed screen lets warm air through: about {value} W/m2 more for each kelvin of difference to outside"
     ),

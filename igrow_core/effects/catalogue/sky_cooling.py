@@ -25,6 +25,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="heat is lost on clear nights, not on overcast ones, less under a screen",
     separating_test="compare a clear with an overcast night of the same outdoor temperature and wind",
+    title="more heat lost to a clear sky",
     sentence=(
         "clear nights cost more heat than expected: about {value} W/m2 for each kelvin that the sky is "
         "colder than the air outside"

@@ -25,6 +25,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="after a change of temperature heat flows the other way for three to six days",
     separating_test="hold the heating setpoint 2 K lower for one night and follow the heat use of the next three",
+    title="heat that the soil stores for days",
     sentence="the soil stores heat for days: about {value} W/m2 for each kelvin between soil and air",
     source="Katzin et al. (2020), GreenLight: soil layers under the floor",
     memory=lagged(lambda _xp, drivers: drivers["air_temperature"], "time_constant", 86_400.0),

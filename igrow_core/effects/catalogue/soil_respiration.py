@@ -25,6 +25,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="CO2 rises at night with the temperature of the soil",
     separating_test="a cup over the substrate and a CO2 sensor",
+    title="CO2 from the soil",
     sentence="the soil gives off CO2: about {value} g/m2 per hour at 20 degC",
     source="Lloyd and Taylor (1994), Funct. Ecol. 8; Q10 of 2",
     memory=lagged(lambda _xp, drivers: drivers["air_temperature"], "time_constant", 3600.0),

@@ -33,6 +33,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="open vents exchange more air on windless days when it is much warmer inside",
     separating_test="open the vents to 10 % in a calm hour and compare with a windy hour",
+    title="open vents that exchange more air in calm weather",
     sentence="open vents exchange more air on calm days than expected ({value} m/s per root kelvin)",
     source="Boulard and Baille (1995), J. Agric. Eng. Res. 61: stack effect",
     resembles=("vent_stack",),

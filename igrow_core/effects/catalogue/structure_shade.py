@@ -27,6 +27,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="light is missing at a fixed hour of clear days",
     separating_test="look at the shadow at that hour; hold a light meter below the cover there",
+    title="a shadow at a fixed hour",
     sentence="something shades the greenhouse at a fixed hour: {value} of the light is missing then",
     source="geometry of direct light",
 )

@@ -40,6 +40,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="hysteresis: after each reversal the exchange stays what it was for a while",
     separating_test="move the vents from 10 to 20 % and back in steps of 2 % in steady weather",
+    title="vents that answer late when they turn back",
     sentence="the vents answer late when they turn back (share {value})",
     source="general practice: play of rack-and-pinion vent drives",
     memory=Memory(_start, _advance),

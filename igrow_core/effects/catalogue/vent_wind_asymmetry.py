@@ -34,6 +34,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="ventilation is more from one side and less from the other, vents open",
     separating_test="compare hours of equal wind speed from two opposite directions with the vents at the same opening",
+    title="vents that exchange more air in wind from one side",
     sentence="the vents exchange more air when the wind comes from one side (strength {value})",
     source="De Jong (1990), thesis Wageningen: window aspect and wind direction",
 )

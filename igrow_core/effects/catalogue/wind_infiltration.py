@@ -26,6 +26,7 @@ EFFECT = Effect(
     contribution=_contribution,
     signature="heat, vapour and CO2 leave together with the wind while the vents are shut",
     separating_test="compare a calm with a windy night, vents shut, CO2 dosing off",
+    title="air that the wind presses in through gaps",
     sentence="more air leaks in when the wind blows: about {value} air changes per hour more for each m/s of wind",
     source="Vanthoor (2011), electronic appendix: leakage proportional to the wind speed",
     resembles=("leakage_wind",),

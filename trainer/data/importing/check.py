@@ -15,11 +15,13 @@ from igrow.trainer.data.importing.proposal import Proposal
 from igrow.trainer.data.importing.zone import fixed
 from igrow.trainer.data.mapping import ColumnMapping, ExportMapping
 from igrow.trainer.data.plausibility import find_faults
-from igrow.trainer.data.plausibility.sunlight import CLOCK
+from igrow.trainer.data.plausibility.sunlight import CLOCK, noon_is_late
 from igrow.trainer.data.rows import Merged
 
 _ROUNDS = 4
 """A remedy may uncover the next fault: a sum that is in another unit as well."""
+_CLEARLY = 0.3
+"""Hours by which a zone's noon must be nearer than that of a likelier zone."""
 
 
 @dataclass(frozen=True)
@@ -61,30 +63,37 @@ def _on_another_clock(
     wrong = [fault for fault in faults if fault.kind in CLOCK]
     if not wrong:
         return None
+    best: tuple[float, ExportMapping] | None = None
     for zone in _candidates(site, export.read_table(proposal.table, mapping)):
         if zone == mapping.time.time_zone:
             continue
         moved = replace(mapping, time=replace(mapping.time, time_zone=zone))
         merged = export.read_table(proposal.table, moved)
-        if not any(fault.kind in CLOCK for fault in find_faults(merged.telemetry, site)):
-            mended.append(f"times are {zone}: {wrong[0].sentence} where they are taken for {mapping.time.time_zone}")
-            return moved
-    return None
+        if any(fault.kind in CLOCK for fault in find_faults(merged.telemetry, site)):
+            continue
+        late = abs(noon_is_late(merged.telemetry, site))
+        if best is None or late < best[0] - _CLEARLY:
+            best = late, moved
+    if best is None:
+        return None
+    before, after = mapping.time.time_zone, best[1].time.time_zone
+    mended.append(f"times are {after}: {wrong[0].sentence} where they are taken for {before}")
+    return best[1]
 
 
 def _candidates(site: Site, merged: Merged) -> list[str]:
     """Return the zones that the times of a site's log may be in."""
     time = merged.telemetry.time[:1]
-    zones = [site.time_zone, "UTC"]
+    zones = [site.time_zone]
     if len(time):
         # Standard time all the year, as many climate computers keep it.
         january = np.array(
             [f"{str(time[0])[:4]}-01-15T12:00:00", f"{str(time[0])[:4]}-07-15T12:00:00"], "datetime64[s]"
         )
         offsets = (to_local(january, site.time_zone) - january).astype(np.int64)
-        zones += [fixed(int(offset) // 3600) for offset in offsets if offset % 3600 == 0]
+        zones += [fixed(int(offset) // 3600) for offset in sorted(offsets) if offset % 3600 == 0]
     solar = round(site.longitude / 15.0)
-    return list(dict.fromkeys([*zones, fixed(solar)]))
+    return list(dict.fromkeys([*zones, "UTC", fixed(solar)]))
 
 
 def _remedied(mapping: ExportMapping, faults: Iterable[DataFault], mended: list[str]) -> ExportMapping | None:

@@ -11,7 +11,7 @@ from igrow.core.quantities import QUANTITIES
 from igrow.core.site import Site
 from igrow.core.yaml_schema import nearest
 from igrow.trainer.data import vocabulary
-from igrow.trainer.data.export import ExportTable, as_table, chosen_rows
+from igrow.trainer.data.export import ExportTable, as_table, chosen_rows, readings
 from igrow.trainer.data.importing import columns as names
 from igrow.trainer.data.importing.layout import Layout, find_layout
 from igrow.trainer.data.importing.question import Answers, Question
@@ -78,6 +78,8 @@ def propose(path: Path, site: Site | None = None, answers: Answers | None = None
     if time is None:
         raise IgrowError(f"{path}: no column is a time; it has {', '.join(table.columns)}")
     time = _ordered(time, answers, draft)
+    table, told = readings(table, time.column, time.time_of_day)
+    draft.notes += told
     long = _long(table, time, layout)
     only: dict[str, str] = {}
     if long is None:

@@ -91,13 +91,23 @@ def _clock_column(columns: dict[str, Sequence[str]], names: Sequence[str], date:
     clocks = [
         name
         for name in names
-        if name != date and (texts := _sample(columns[name])) and all(_CLOCK.fullmatch(text) for text in texts[:50])
+        if name != date and (texts := _sample(columns[name])) and (_is_clock(texts) or _is_hour(name, texts))
     ]
     return min(
         clocks,
         key=lambda name: (-_named(name, "time_of_day"), abs(names.index(name) - names.index(date))),
         default=None,
     )
+
+
+def _is_clock(texts: Sequence[str]) -> bool:
+    return all(_CLOCK.fullmatch(text) for text in texts[:50])
+
+
+def _is_hour(name: str, texts: Sequence[str]) -> bool:
+    """Tell whether a column counts the hours of the day, from 0 or from 1."""
+    whole = all(re.fullmatch(r"\d{1,2}", text) and int(text) <= 24 for text in texts[:50])
+    return whole and len(set(texts)) in (23, 24, 25) and bool(_named(name, "time_of_day"))
 
 
 def _forms(texts: Sequence[str]) -> list[str]:
@@ -194,7 +204,9 @@ def _midnight(texts: Sequence[str], form: str) -> bool:
 def _best(column: str, clock: str | None, forms: Sequence[str], texts: Sequence[str]) -> TimeForm:
     """Return the form under which the rows follow each other most evenly."""
     evenness = {form: _evenness(texts, form) for form in forms}
-    ranked = sorted(forms, key=lambda form: -evenness[form])
+    best = max(evenness.values())
+    # Nobody writes a year before the day: what is ISO 8601 is meant so, even where another form is a little more even.
+    ranked = sorted(forms, key=lambda form: (form != ISO or evenness[ISO] < best - 0.01, -evenness[form]))
     rivals = tuple(form for form in ranked[1:] if evenness[form] > evenness[ranked[0]] - 0.01)
     return TimeForm(column, clock, ranked[0], rivals if ranked[0] != ISO else ())
 

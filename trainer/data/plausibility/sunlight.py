@@ -92,6 +92,14 @@ def against_the_sun(telemetry: Telemetry, site: Site) -> list[DataFault]:
     return [unit] if unit is not None else []
 
 
+def noon_is_late(telemetry: Telemetry, site: Site) -> float:
+    """Return the hours by which noon comes late by a log's clock; inf where its radiation tells nothing."""
+    if "global_radiation" not in telemetry:
+        return float("inf")
+    daylight = _daylight(telemetry.time, telemetry["global_radiation"], site)
+    return daylight.offset() if len(daylight.day) else float("inf")
+
+
 def _daylight(time: Times, values: Floats, site: Site) -> _Daylight:
     """Sum the radiation of the days of which nine tenths were read."""
     step = own_step(time)

@@ -25,6 +25,8 @@ from igrow.trainer.research.paper.compartments import Compartment, read_2019
 from igrow.trainer.research.paper.harvests import PREDICTORS
 
 CHAMPION = "Automatoes"
+PUBLISHED = {"Wageningen's simulator": 349.0, "incremental": 507.0, "baseline": 571.0}
+"""Distances of the paper; its own two simulators were driven by the champion's settings, which are not published."""
 
 
 def predicted_profit(champion: Compartment, others: Sequence[Compartment], harvested: Floats, prices: Prices) -> Floats:
@@ -67,7 +69,7 @@ def distances(folder: Path, books: Path, prices: Prices | None = None) -> tuple[
 
 
 def run(folder: Path, books: Path, out: Path, report: Callable[[str], None] = print) -> dict[str, float]:
-    """Print the distances; write figure3.json and figure3.png to `out`. Returns the distance of each predictor."""
+    """Print the distances; write figure3.json and figure3.svg to `out`. Returns the distance of each predictor."""
     measured, curves = distances(folder, books)
     result = {name: float(np.abs(curve - measured.measured).sum()) for name, curve in curves.items()}
     report("| predictor | sum of absolute daily differences, EUR m-2 | net profit at the end, EUR m-2 |")
@@ -75,31 +77,38 @@ def run(folder: Path, books: Path, out: Path, report: Callable[[str], None] = pr
     for name, curve in curves.items():
         report(f"| {name} | {result[name]:.0f} | {curve[-1]:.2f} |")
     report(f"| measured | | {measured.measured[-1]:.2f} |")
+    for name, distance in PUBLISHED.items():
+        report(f"| as published: {name} | {distance:.0f} | |")
     out.mkdir(parents=True, exist_ok=True)
     (out / "figure3.json").write_text(json.dumps(result, indent=1))
-    plot(out / "figure3.png", measured, curves)
+    plot(out / "figure3.svg", measured, curves)
     return result
 
 
 def plot(path: Path, measured: Champion, curves: dict[str, Floats]) -> None:
-    """Draw measured and predicted net profit over the season."""
-    import matplotlib.figure  # noqa: PLC0415, only this function draws
+    """Draw measured and predicted net profit over the season, and below how their distance adds up from day to day."""
+    from igrow.trainer.figure_style import COLOURS, date_axis, name_above, panels  # noqa: PLC0415, only this draws
+    from igrow.trainer.language import ENGLISH  # noqa: PLC0415
 
-    figure = matplotlib.figure.Figure(figsize=(8, 5), layout="constrained")
-    axes = figure.subplots()
-    axes.plot(measured.day, measured.measured, "k", linewidth=2, label="measured")
-    for name, curve in curves.items():
-        axes.plot(measured.day, curve, label=name)
-    axes.set_ylabel("cumulative net profit, EUR m-2")
-    axes.legend(fontsize=8)
-    figure.savefig(path, dpi=120)
+    figure, (profit, distance) = panels(2, 6.4, width=6.0)
+    profit.plot(measured.day, measured.measured, color=COLOURS["measured"], linewidth=2.2, label="measured")
+    for position, (name, curve) in enumerate(curves.items()):
+        stroke = ("-", "--", ":", "-.")[position % 4]
+        profit.plot(measured.day, curve, stroke, color=f"C{position}", label=name)
+        adding = np.cumsum(np.abs(curve - measured.measured))
+        distance.plot(measured.day, adding, stroke, color=f"C{position}")
+    name_above(profit, "cumulative net profit, EUR/m²")
+    name_above(distance, "sum of absolute daily differences, EUR/m²")
+    profit.legend(fontsize=8, frameon=False)
+    date_axis(distance, ENGLISH)
+    figure.savefig(path, facecolor="white")
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Add the arguments of `reproduce figure3`."""
     parser.add_argument("--agc2019", type=Path, required=True, help="folder of the second challenge")
     parser.add_argument("--books", type=Path, required=True, help="folder with the champion's workbook")
-    parser.add_argument("--out", type=Path, required=True, help="folder for figure3.json and figure3.png")
+    parser.add_argument("--out", type=Path, required=True, help="folder for figure3.json and figure3.svg")
 
 
 def run_command(arguments: Namespace) -> None:

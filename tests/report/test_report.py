@@ -1,0 +1,183 @@
+"""What the report says: the best is what is best, money, rivals, checks, what does not fit, what cannot be judged."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from igrow.core.effects import EFFECTS
+from igrow.core.errors import IgrowError
+from igrow.core.quantities import QUANTITIES
+from igrow.trainer.data import Log
+from igrow.trainer.diagnosis import Diagnosis
+from igrow.trainer.diagnosis.persistence import misfits, persistence_errors
+from igrow.trainer.diagnosis.result import Interval
+from igrow.trainer.language import LANGUAGES, speak
+from igrow.trainer.language.units import written
+from igrow.trainer.report import render_report, sentences, write_diagnosis
+from igrow.trainer.report.page import error_rows
+from igrow.trainer.report.worth import worth
+
+
+def with_errors(result: Diagnosis, quantity: str, **stages: float) -> Diagnosis:
+    return replace(result, errors={**result.errors, quantity: {"24_h": stages}})
+
+
+def row_of(page: str, quantity: str) -> list[str]:
+    """Return the classes of a row's three cells of errors."""
+    row = re.search(rf'<th scope="row">{quantity}</th><td>24 hours</td>(.*?)</tr>', page)
+    assert row is not None
+    return ["best" if 'class="best"' in cell else "" for cell in re.findall(r"<td[^>]*>", row[1])[:3]]
+
+
+def best_of(result: Diagnosis) -> list[bool]:
+    """Return which of the three errors of the air temperature is marked."""
+    return [best for _, best in next(error_rows(result, speak("en"))).cells]
+
+
+def test_the_best_column_is_the_one_that_is_best(leak: Diagnosis, page: str) -> None:
+    assert row_of(page, "air temperature") == ["", "", "best"]
+    worse = with_errors(leak, "air_temperature", deployed=0.3, recalibrated=0.2, corrected=0.4)
+    assert best_of(worse) == [False, True, False]
+    same = with_errors(leak, "air_temperature", deployed=0.2, recalibrated=0.2, corrected=0.2)
+    assert best_of(same) == [False, False, False]
+
+
+def test_where_correction_makes_it_worse_it_is_said(leak: Diagnosis) -> None:
+    said = list(
+        sentences.gains(with_errors(leak, "air_co2", deployed=20.0, recalibrated=19.0, corrected=31.0), speak("en"))
+    )
+    assert "CO2: correction makes predictions a day ahead worse: off by 31 ppm, before by 20 ppm." in said
+    half = with_errors(leak, "air_co2", deployed=20.0, recalibrated=15.0, corrected=18.0)
+    said = list(sentences.gains(half, speak("en")))
+    assert "The recalibrated model alone would be better there: off by 15 ppm." in said
+
+
+@pytest.mark.parametrize("verdict", ["nothing", "named", "ambiguous", "unexplained"])
+def test_no_verdict_says_that_a_model_fits_where_its_errors_say_that_it_does_not(leak: Diagnosis, verdict: str) -> None:
+    good = replace(leak, verdict=verdict)
+    bad = with_errors(good, "air_humidity", deployed=35.0, recalibrated=35.0, corrected=35.0)
+    assert [one.quantity for one in misfits(bad)] == ["air_humidity"]
+    assert "does not fit" in sentences.verdict(bad, speak("en")) or "none makes it fit" in sentences.verdict(
+        bad, speak("en")
+    )
+    told = list(sentences.warnings(bad, speak("en")))
+    assert any("The model does not fit air humidity: a day ahead it is off by 35 %" in one for one in told)
+    assert "does not fit air_humidity" in bad.summary()
+
+
+def test_yesterdays_readings_are_taken_on_unseen_days_alone(leak: Diagnosis) -> None:
+    assert leak.evidence is not None
+    record, split = leak.evidence.log.record, leak.evidence.log.split
+    air, day = record.measured["air_temperature"], round(86_400 / record.step)
+    rows = [row for row in range(day, len(record)) if not split.fit_rows[row]]
+    by_hand = np.nanmean([abs(air[row] - air[row - day]) for row in rows])
+    assert persistence_errors(leak)["air_temperature"] == pytest.approx(by_hand)
+
+
+def test_a_leak_costs_what_the_outdoor_air_that_comes_in_must_be_heated(leak: Diagnosis) -> None:
+    (finding,) = leak.findings
+    found = worth(leak, finding)
+    assert found is not None
+    assert leak.evidence is not None
+    record = leak.evidence.log.record
+    size, exponent = (finding.parameters[name].value for name in ("air_changes", "exponent"))
+    exchange = size * record.inputs["wind_speed"] ** exponent * record.inputs["mean_height"] / 3600.0
+    difference = record.measured["air_temperature"] - record.inputs["outdoor_temperature"]
+    all_day = 7.0 * 86_400.0 * float(np.nanmean(exchange * 1.2 * 1006.0 * difference)) / 1e6
+    # Not all of it is bought: by day the sun heats.
+    assert 0.4 * all_day < found.heat < all_day
+    assert found.co2 > 0.0
+    assert found.money == pytest.approx(0.0083 * found.heat + 0.08 * found.co2)
+    half = replace(finding, parameters={"air_changes": Interval(1.0, 0.5, 1.5, "h-1")})
+    assert worth(leak, half).spread == (0.5, 1.5)  # type: ignore[union-attr]
+
+
+def test_rivals_are_sentences_and_each_has_its_check(leak: Diagnosis) -> None:
+    rivals = ("wind_infiltration", "vent_backlash", "screen_gap")
+    page = render_report(replace(leak, findings=(replace(leak.findings[0], confounded=rivals),)))
+    for name in rivals[1:]:
+        assert f"It may as well be {EFFECTS[name].title}:" in page
+    for name in rivals:
+        assert f"{EFFECTS[name].separating_test[1:]}." in page
+    assert "vent_backlash" not in page
+
+
+def test_an_actuator_that_the_log_lacks_is_told_in_every_language(leak: Diagnosis) -> None:
+    share = {"share": Interval(0.9, 0.8, 1.0, "1")}
+    lamps = replace(
+        leak.findings[0], effect="lamp_power", kind="actuator", parameters=share, confounded=("lamp_power",)
+    )
+    assert worth(leak, lamps) is None
+    assert sentences.cause(lamps, speak("en")).startswith("The log lacks this: lamp power.")
+    assert "lampvermogen" in sentences.cause(lamps, speak("nl"))
+    assert sentences.checks(lamps, speak("nl")) == ["Laat dit in het logboek schrijven: lampvermogen."]
+    assert "Lamp power" in render_report(replace(leak, findings=(lamps,)))
+
+
+def test_co2_that_cannot_be_judged_is_said_to_be_so(leak: Diagnosis, undosed: Log) -> None:
+    errors = {name: table for name, table in leak.errors.items() if name != "air_co2"}
+    said = list(sentences.warnings(replace(leak, log=undosed, errors=errors, missing=("co2_dosing",)), speak("en")))
+    assert said == ["CO2 cannot be judged: the log does not tell how much CO2 was dosed."]
+    without = replace(leak, log=undosed.without("air_co2"), errors=errors)
+    assert list(sentences.warnings(without, speak("en"))) == ["CO2 cannot be judged: the log does not have it."]
+
+
+def test_times_are_those_of_the_greenhouse(page: str) -> None:
+    # The log begins at 2020-02-01 00:00 UTC.
+    assert "Log from 1 Feb 2020 01:00" in page
+    assert "times of Europe/Amsterdam" in page
+
+
+def test_the_log_is_shown_with_what_was_set_aside(page: str) -> None:
+    assert "air humidity: stuck, 1 ×, 14.8 h in all." in page
+    assert 'aria-label="The log; what was set aside is red"' in page
+    assert "var(--aside)" in page
+
+
+def test_a_fault_of_the_data_has_its_page_too(stuck: Diagnosis) -> None:
+    page = render_report(stuck, "de")
+    assert "Ein Sensor, der gebraucht wird, arbeitet nicht: Lufttemperatur." in page
+    assert "does not work" in page
+    assert page.count("<svg") == 1
+
+
+def test_figures_share_one_style_and_turn_dark_with_the_page(page: str) -> None:
+    drawn = re.findall(r"<svg.*?</svg>", page, flags=re.DOTALL)
+    assert len(drawn) >= 7
+    for one in drawn:
+        assert not re.findall(r"(?:fill|stroke): ?#", one)
+        assert "DejaVu" not in one
+        assert "<image" not in one
+    ids = re.findall(r' id="([^"]+)"', "".join(drawn))
+    assert not [name for name in ids if re.fullmatch(r"[a-z0-9]+_\d+", name)]
+
+
+@pytest.mark.parametrize("code", LANGUAGES[1:])
+def test_a_page_in_another_language_has_no_english_text_of_its_own(leak: Diagnosis, code: str) -> None:
+    page = render_report(leak, code)
+    assert f'<html lang="{code}">' in page
+    words = re.sub(
+        r"<style>.*?</style>|<(\w+)[^>]* lang=\"en\">.*?</\1>|<code>.*?</code>|<[^>]+>", " ", page, flags=re.DOTALL
+    )
+    for english in (" the ", " of ", " with ", " air ", " and ", "greenhouse", "temperature", "February"):
+        assert english not in words
+
+
+def test_numbers_and_units_are_written_as_people_do(page: str) -> None:
+    assert speak("de").number(1234.5) == "1.200"
+    assert speak("nl").amount(0.0426, "kg m-2") == "0,043 kg/m²"
+    assert written("W m-2 K-1") == "W/(m² K)"
+    assert written("h-1 (m s-1)-1") == "1/(h (m/s))"
+    units = {one.unit for one in QUANTITIES.values()} | {p.unit for one in EFFECTS.values() for p in one.parameters}
+    assert not [unit for unit in units if re.search(r"-\d|deg|umol", written(unit))]
+    assert "m-2" not in re.sub(r'<\w+ [^>]*lang="en">.*?<', "", page)
+
+
+def test_an_unknown_language_is_refused_before_anything_is_written(leak: Diagnosis, tmp_path) -> None:
+    with pytest.raises(IgrowError, match="one of en, nl, de, es, zh"):
+        write_diagnosis(tmp_path / "out", leak, "fr")
+    assert not (tmp_path / "out").exists()

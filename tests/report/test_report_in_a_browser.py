@@ -1,0 +1,51 @@
+"""The report in a real browser: on a phone and a desk, by light and in the dark, for everybody."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Browser, sync_playwright
+
+from igrow.trainer.diagnosis import Diagnosis
+from igrow.trainer.report import render_report
+
+CHROMIUM = shutil.which("chromium")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    if CHROMIUM is None:
+        pytest.skip("chromium is not installed; tests/page/install-browser.sh does it")
+    with sync_playwright() as run:
+        one = run.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield one
+        one.close()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [390, 1280])
+def test_a_report_reads_well(
+    browser: Browser, leak: Diagnosis, stuck: Diagnosis, tmp_path: Path, width: int, scheme: Any
+) -> None:
+    for name, result, code in (("leak", leak, "nl"), ("stuck", stuck, "en")):
+        (tmp_path / f"{name}.html").write_text(render_report(result, code), encoding="utf-8")
+        page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
+        asked: list[str] = []
+        page.on("request", lambda request, asked=asked: asked.append(request.url))
+        page.goto(f"file://{tmp_path / name}.html")
+        assert len(asked) == 1, "a report fetches nothing"
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        smallest = page.evaluate(
+            "Math.min(...[...document.querySelectorAll('svg text')].map(one =>"
+            " parseFloat(getComputedStyle(one).fontSize) * one.ownerSVGElement.getBoundingClientRect().width"
+            " / one.ownerSVGElement.viewBox.baseVal.width))"
+        )
+        assert smallest > 9.0
+        found = Axe().run(page)
+        assert found.violations_count == 0, found.generate_report()
+        page.close()

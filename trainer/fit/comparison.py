@@ -1,0 +1,110 @@
+"""Simulators side by side on a log that none of them has seen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from igrow.core.bundle import Bundle, read_bundle
+from igrow.core.effects import EFFECTS
+from igrow.core.quantities import QUANTITIES
+from igrow.trainer.data import Log
+from igrow.trainer.diagnosis.knowledge import activate, active_term
+from igrow.trainer.exporting import read_model
+from igrow.trainer.fit.evaluation import Evaluation, evaluate
+from igrow.trainer.fit.model import FittedModel
+from igrow.trainer.fit.scoring import BY_SETPOINTS, score_bundle, unseen
+
+HORIZONS = ("1_h", "24_h")
+PERSISTENCE = "persistence"
+Simulator = FittedModel | Bundle | str | Path
+
+
+@dataclass(frozen=True, repr=False)
+class Comparison:
+    """Mean absolute errors of several simulators on one log, beside persistence."""
+
+    log: str
+    scores: Mapping[str, Evaluation]
+    """By the simulator's name."""
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return a row for each simulator, quantity and horizon: mean absolute error with its 90 % interval."""
+        return [
+            {
+                "simulator": name,
+                "quantity": quantity,
+                "horizon": horizon,
+                "mae": one.mae,
+                "mae_low": one.mae_low,
+                "mae_high": one.mae_high,
+                PERSISTENCE: one.persistence,
+                "unit": QUANTITIES[quantity].unit,
+            }
+            for name, evaluation in self.scores.items()
+            for quantity, horizons in evaluation.items()
+            for horizon, one in horizons.items()
+        ]
+
+    def __repr__(self) -> str:
+        names = list(self.scores)
+        width = max(14, *(len(name) + 2 for name in names))
+        columns = "".join(f"{name:>{width}}" for name in names)
+        lines = [f"{'mean absolute error':20}{'ahead':>7}{PERSISTENCE:>14}{columns}"]
+        found = {(row["quantity"], row["horizon"], row["simulator"]): row for row in self.rows()}
+        for quantity, horizon in dict.fromkeys((key[0], key[1]) for key in found):
+            cells = [found.get((quantity, horizon, name)) for name in names]
+            naive = next(cell[PERSISTENCE] for cell in cells if cell is not None)
+            texts = "".join(f"{'-' if cell is None else format(cell['mae'], '.3g'):>{width}}" for cell in cells)
+            lines.append(f"{quantity:20}{horizon:>7}{naive:14.3g}{texts}  {QUANTITIES[quantity].unit}")
+        return "\n".join(lines)
+
+    def to_pandas(self) -> Any:
+        """Return `rows` as a `pandas.DataFrame`."""
+        import pandas as pd  # noqa: PLC0415  (slow to import)
+
+        return pd.DataFrame(self.rows())
+
+
+def compare(
+    simulators: Mapping[str, Simulator] | Sequence[Simulator], log: Log, horizons: Sequence[str] = HORIZONS
+) -> Comparison:
+    """Return the errors of several simulators on a log.
+
+        compare([model, result.corrected, "bundle/"], later)
+        compare({"before": model, "after": result.corrected}, later)
+
+    Args:
+        simulators: models, bundles or folders of bundles, with names where they are a mapping.
+        log: of the greenhouse; those of its days that a bundle was calibrated on are left out for that bundle.
+        horizons: of `igrow.trainer.fit.evaluation.HORIZONS`.
+
+    Raises:
+        IgrowError: a bundle cannot be read, or the log cannot be used.
+    """
+    given = simulators.items() if isinstance(simulators, Mapping) else _named(simulators)
+    return Comparison(log.name, {name: _scores(one, log, horizons) for name, one in given})
+
+
+def _named(simulators: Sequence[Simulator]) -> Iterable[tuple[str, Simulator]]:
+    for number, one in enumerate(simulators, 1):
+        if isinstance(one, FittedModel):
+            yield f"{number} {one.calibrated_on or 'described'}", one
+        else:
+            yield f"{number} {one.label if isinstance(one, Bundle) else Path(one).name}", one
+
+
+def _scores(simulator: Simulator, log: Log, horizons: Sequence[str]) -> Evaluation:
+    """Return the errors driven by what the actuators did; of the network variant, by the setpoints that it knows."""
+    if not isinstance(simulator, FittedModel):
+        bundle = simulator if isinstance(simulator, Bundle) else read_bundle(Path(simulator))
+        if bundle.manifest.variant == "network":
+            return score_bundle(log, bundle, horizons)[BY_SETPOINTS]
+        return _scores(read_model(bundle, log.known_site), unseen(log, bundle), horizons)
+    model = simulator
+    alignment = log.best_shift(model.posterior.values) if model.alignment is None else model.alignment
+    record = log.record(alignment)
+    terms = [active_term(effect) for effect in model.effects if effect.name in EFFECTS]
+    return evaluate(record, model.posterior.values, activate(record, terms), horizons)

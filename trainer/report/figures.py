@@ -1,0 +1,82 @@
+"""The figures of the report, each with its title, as SVG in the colours of the page."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+
+from matplotlib.figure import Figure
+
+from igrow.core.effects import EFFECTS
+from igrow.core.errors import IgrowError
+from igrow.trainer.data.plot import plot_log
+from igrow.trainer.diagnosis import plots
+from igrow.trainer.diagnosis.result import Diagnosis, Finding
+from igrow.trainer.figure_style import WIDTH, svg
+from igrow.trainer.language import Language
+
+OVERVIEW = ("air_temperature", "air_humidity", "air_co2", "outdoor_temperature", "global_radiation")
+"""What the overview of a log shows."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One figure of the page."""
+
+    title: str
+    svg: str
+
+
+def overview(result: Diagnosis, language: Language) -> list[Picture]:
+    """Return the log at a glance, with what was set aside; empty where there is nothing to show."""
+    if result.log is None:
+        return []
+    draw = partial(plot_log, result.log, only=OVERVIEW, language=language, width=WIDTH)
+    return list(_drawn([(language.text("The log; what was set aside is red"), draw)]))
+
+
+def evidence(result: Diagnosis, language: Language) -> list[Picture]:
+    """Return every figure that a diagnosis has."""
+    if result.evidence is None:
+        return []
+    seen = result.evidence
+    wanted: list[tuple[str, Callable[[], Figure]]] = [
+        (language.text("What is missing, from day to day"), partial(plots.residual_by_date, seen, language))
+    ]
+    for finding in result.findings:
+        title = language.text("What is missing, against {driver}")
+        wanted += [
+            (title.format(driver=language.name(driver)), partial(plots.residual_against_driver, seen, driver, language))
+            for driver in _drivers(finding)
+        ][:1]
+    for quantity in result.errors:
+        title = language.text("The worst unseen day: {quantity}", quantity=language.name(quantity))
+        wanted.append((title, partial(plots.worst_day, seen, quantity, language)))
+    if any(one.effect in EFFECTS for one in result.findings):
+        wanted.append((language.text("When the evidence came"), partial(plots.evidence_by_day, seen, language)))
+    for finding in result.findings:
+        if finding.effect in EFFECTS and finding.regimes:
+            regimes = {name: (one.value, one.low, one.high) for name, one in finding.regimes.items()}
+            unit = EFFECTS[finding.effect].amplitude.unit
+            title = language.text("The size in parts of the log: {cause}")
+            cause = language.text(EFFECTS[finding.effect].title)
+            wanted.append((title.format(cause=cause), partial(plots.coefficient_by_regime, regimes, language, unit)))
+    return list(_drawn(wanted))
+
+
+def _drivers(finding: Finding) -> list[str]:
+    """Return a finding's drivers; the air itself drives a sensor's fault, and says nothing."""
+    outside = [name for name in finding.drivers if not name.startswith("air_")]
+    return outside or list(finding.drivers)
+
+
+def _drawn(wanted: list[tuple[str, Callable[[], Figure]]]) -> Iterator[Picture]:
+    for title, draw in wanted:
+        try:
+            drawn = svg(draw(), on_page=True)
+        except IgrowError:
+            continue  # The log has nothing to show there.
+        label = f'<svg role="img" aria-label="{html.escape(title)}"'
+        yield Picture(title, drawn.replace("<svg", label, 1))

@@ -1,0 +1,271 @@
+"""What a diagnosis says to a grower, sentence by sentence, in any language."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from babel.dates import get_day_names
+
+from igrow.core.effects import EFFECTS
+from igrow.core.quantities import QUANTITIES
+from igrow.core.simulator.hybrid.measurement import PREDICTED
+from igrow.trainer.data.fault import DataFault
+from igrow.trainer.diagnosis.persistence import misfits
+from igrow.trainer.diagnosis.result import DISCREPANCY, STAGES, Diagnosis, Finding
+from igrow.trainer.language import Language
+from igrow.trainer.language.names import N_
+from igrow.trainer.report.worth import Worth
+
+_VERDICTS: Mapping[str, str] = {
+    "nothing": N_("Nothing is missing that is large enough to matter: the model fits this greenhouse."),
+    "named": N_("The model lacked something, and it has a name."),
+    "ambiguous": N_("The model lacks something; more than one cause would explain it."),
+    "unexplained": N_("Something real goes on that no known cause explains."),
+    "data_fault": N_("The log cannot be diagnosed as it stands: the data are at fault, not the greenhouse."),
+}
+_NO_FIT: Mapping[str, str] = {
+    "nothing": N_("No known cause was found, and yet the model does not fit this greenhouse."),
+    "named": N_("The model lacked something that has a name, but even with it the model does not fit all of the log."),
+    "ambiguous": N_("The model lacks something; more than one cause would explain it, and none makes it fit all."),
+    "unexplained": N_(
+        "Something real goes on that no known cause explains, and the model does not fit this greenhouse."
+    ),
+}
+_FAULTS: Mapping[str, str] = {
+    "sensor": N_("A sensor that is needed does not work: {quantity}."),
+    "kelvin": N_("Readings are in kelvin: {quantity}."),
+    "fahrenheit": N_("Readings are in degrees Fahrenheit: {quantity}."),
+    "tenths": N_("Readings are in tenths of a degree: {quantity}."),
+    "no_temperature": N_("What is taken for a temperature is none: {quantity}."),
+    "fraction": N_("Readings are fractions from 0 to 1 instead of per cent: {quantity}."),
+    "percent": N_("Readings are in per cent: {quantity}."),
+    "absolute_humidity": N_("What is taken for relative humidity is another humidity: {quantity}."),
+    "kilometres_per_hour": N_("Readings are in kilometres per hour: {quantity}."),
+    "radiation_unit": N_("The radiation is in another unit than W/m²."),
+    "radiation_sum": N_("The radiation is a running sum."),
+    "running_sum": N_("Readings are a running sum: {quantity}."),
+    "no_daylight": N_("The radiation does not follow the sun."),
+    "clock": N_("The clock of the log disagrees with the sun."),
+    "local_time": N_("The times are local ones without their time zone."),
+    "repeated_times": N_("The same times stand in the log more than once."),
+    "shuffled_rows": N_("The times do not belong to the readings."),
+    "sparse": N_("There are too few readings for any model."),
+    "swapped_columns": N_("Two columns stand in each other's place: {quantity}."),
+    "screen_reversed": N_("A screen's 100 % means open, not closed: {quantity}."),
+}
+_MORE, _LESS = N_("{channel}: more, {when}"), N_("{channel}: less, {when}")
+_WHEN: Mapping[str, str] = {
+    "on working days": N_("on working days"),
+    "working days": N_("on working days"),
+    "cold weather": N_("in cold weather"),
+    "dry weather": N_("in dry weather"),
+    "outdoor temperature": N_("with the outdoor temperature"),
+    "wind speed": N_("with the wind"),
+    "global radiation": N_("with the sun"),
+    "rain": N_("with the rain"),
+    "until rain has fallen": N_("until rain has fallen"),
+    "lamp power on": N_("while the lamps burn"),
+    "lamp on": N_("while the lamps burn"),
+    "irrigation on": N_("while irrigation runs"),
+    "an hour after lamp power": N_("an hour after the lamps"),
+    "an hour after lamp on": N_("an hour after the lamps"),
+    "an hour after irrigation": N_("an hour after irrigation"),
+    "an hour after irrigation on": N_("an hour after irrigation"),
+    "from day to day": N_("more from day to day"),
+    "all the time": N_("all the time"),
+}
+_HOURS = re.compile(r"(?:(?P<before>.+), )?(?P<first>\d\d) to (?P<last>\d\d) h(?: (?P<after>on .+))?")
+_WEEKDAYS = ("Monday", "Tuesday", "Wednesday", "Thursday", "Friday", "Saturday", "Sunday")
+_LEAST = {"heat": 0.05, "co2": 0.001, "lamp_light": 0.02}
+"""MJ, kg and kWh per m2 and week from which on they are told."""
+
+
+def verdict(result: Diagnosis, language: Language) -> str:
+    """Return the first sentence; it never says that a model fits where its own errors say that it does not."""
+    kind = result.verdict
+    wrong = kind in _NO_FIT and misfits(result, "deployed" if kind == "nothing" else "corrected")
+    told = _NO_FIT[kind] if wrong else _VERDICTS[kind]
+    return language.text(told)
+
+
+def cause(finding: Finding, language: Language) -> str:
+    """Return what a finding says, with its size and its beginning."""
+    if finding.effect == DISCREPANCY:
+        parts = [when(name, one.value, language) for name, one in finding.parameters.items()]
+        return language.text("Something that the model does not know changes these: {parts}.", parts="; ".join(parts))
+    if finding.effect not in EFFECTS:
+        text = N_(
+            "The log lacks this: {quantity}. What the climate computer's rules make of it explains much of the error."
+        )
+        return language.text(text, quantity=language.name(finding.effect))
+    effect = EFFECTS[finding.effect]
+    size = finding.parameters[effect.amplitude.name]
+    told = language.text(effect.sentence, value=language.number(size.value), unit=language.unit(size.unit))
+    if finding.onset is not None:
+        return language.text("Since {day}: {told}.", day=language.day(finding.onset.time), told=told)
+    return language.text("{told}.", told=f"{told[0].upper()}{told[1:]}")
+
+
+def when(pattern: str, amount: float, language: Language) -> str:
+    """Return what changes, and when, of a pattern ("air_exchange: 07 to 16 h on working days")."""
+    channel, _, course = pattern.partition(": ")
+    return language.text(_MORE if amount > 0 else _LESS, channel=language.name(channel), when=_course(course, language))
+
+
+def _course(course: str, language: Language) -> str:
+    found = _HOURS.fullmatch(course)
+    if found is None:
+        day = course.removeprefix("on ").removesuffix("s")
+        if day in _WEEKDAYS:
+            name = get_day_names("wide", locale=language.locale)[_WEEKDAYS.index(day)]
+            return language.text("on {weekday}", weekday=name)
+        return language.text(_WHEN[course]) if course in _WHEN else course
+    hours = language.text("{first} to {last} h", first=found["first"], last=found["last"])
+    parts = [_course(found["before"], language)] if found["before"] else []
+    parts.append(hours)
+    parts += [_course(found["after"], language)] if found["after"] else []
+    return language.listed(parts)
+
+
+def rivals(finding: Finding, language: Language) -> list[str]:
+    """Return a sentence for each cause that is confounded with a finding in this log."""
+    text = N_("It may as well be {cause}: in this log they cannot be told apart.")
+    others = [EFFECTS[name].title for name in finding.confounded if name != finding.effect and name in EFFECTS]
+    return [language.text(text, cause=language.text(title)) for title in others]
+
+
+def checks(finding: Finding, language: Language) -> list[str]:
+    """Return what to check in the greenhouse tomorrow, the cheapest test of each cause that may be it."""
+    if finding.kind == "actuator":
+        return [language.text("Have it written into the log: {quantity}.", quantity=language.name(finding.effect))]
+    tests = [EFFECTS[name].separating_test for name in (finding.effect, *finding.confounded) if name in EFFECTS]
+    if not tests:
+        tests = [N_("look at what happens in the greenhouse at these times and in this weather, and write it down")]
+    told = (language.text(one) for one in dict.fromkeys(tests))
+    return [f"{one[0].upper()}{one[1:]}." if language.code != "zh" else f"{one}。" for one in told]
+
+
+def costs(one: Worth | None, area: float, language: Language) -> list[str]:
+    """Return what a cause takes or saves in a week."""
+    told: list[str] = []
+    if one is None:
+        return told
+    number = language.number
+    if abs(one.heat) >= _LEAST["heat"]:
+        text = (
+            N_("It takes {heat} MJ of heat per m² and week ({kwh} kWh).")
+            if one.heat > 0
+            else N_("It saves {heat} MJ of heat per m² and week ({kwh} kWh).")
+        )
+        size = abs(one.heat)
+        told.append(language.text(text, heat=number(size), kwh=number(size / 3.6)))
+    if abs(one.co2) >= _LEAST["co2"]:
+        text = (
+            N_("It takes {co2} g of CO2 per m² and week.")
+            if one.co2 > 0
+            else N_("It saves {co2} g of CO2 per m² and week.")
+        )
+        size = 1000.0 * abs(one.co2)
+        told.append(language.text(text, co2=number(size)))
+    if abs(one.lamp_light) >= _LEAST["lamp_light"]:
+        text = N_("The light that is lost would cost the lamps {kwh} kWh per m² and week.")
+        told.append(language.text(text, kwh=number(one.lamp_light)))
+    if not told:
+        return [language.text("It takes no heat and no CO2 worth counting; it makes predictions and plans wrong.")]
+    text = (
+        N_("In money, by the prices of the site: {money} EUR per m² and week, {all} EUR for the whole greenhouse.")
+        if one.money >= 0
+        else N_("In money, by the prices of the site: {money} EUR saved per m² and week, {all} EUR for the greenhouse.")
+    )
+    told.append(language.text(text, money=number(abs(one.money)), all=number(abs(one.money) * area)))
+    if one.spread is not None:
+        low, high = map(number, one.spread)
+        told.append(language.text("It may be {low} to {high} times as much (90 % interval).", low=low, high=high))
+    return told
+
+
+def gains(result: Diagnosis, language: Language) -> Iterator[str]:
+    """Say what correction does to the error a day ahead, and where it makes it worse."""
+    for quantity, horizons in result.errors.items():
+        day = horizons.get("24_h", {})
+        if not {"deployed", "corrected"} <= day.keys():
+            continue
+        unit = QUANTITIES[quantity].unit.replace("degC", "K")
+        before, after = (language.amount(day[stage], unit, 3) for stage in ("deployed", "corrected"))
+        text = (
+            N_("{quantity}: predictions a day ahead were off by {before}; now by {after}.")
+            if day["corrected"] <= day["deployed"]
+            else N_("{quantity}: correction makes predictions a day ahead worse: off by {after}, before by {before}.")
+        )
+        name = language.name(quantity)
+        yield language.text(text, quantity=f"{name[0].upper()}{name[1:]}", before=before, after=after)
+        best = min(day, key=lambda stage: (day[stage], STAGES.index(stage)))
+        if best == "recalibrated" and day[best] < day["corrected"] <= day["deployed"] and result.findings:
+            yield language.text(
+                "The recalibrated model alone would be better there: off by {best}.",
+                best=language.amount(day[best], unit, 3),
+            )
+
+
+def warnings(result: Diagnosis, language: Language) -> Iterator[str]:
+    """Say which quantities the model predicts no better than yesterday's readings, and what could not be judged."""
+    for one in misfits(result, "deployed" if result.verdict == "nothing" else "corrected"):
+        unit = QUANTITIES[one.quantity].unit.replace("degC", "K")
+        yield language.text(
+            "The model does not fit {quantity}: a day ahead it is off by {error}, yesterday's readings by {yesterday}.",
+            quantity=language.name(one.quantity),
+            error=language.amount(one.error, unit, 3),
+            yesterday=language.amount(one.persistence, unit, 3),
+        )
+    yield from _unjudged(result, language)
+
+
+def _unjudged(result: Diagnosis, language: Language) -> Iterator[str]:
+    log = result.log
+    if log is None or result.verdict == "data_fault":
+        return
+    dosing = log.known_site.greenhouse.co2_dosing_capacity > 0.0
+    for quantity in PREDICTED:
+        if quantity in result.errors:
+            continue
+        name = language.name(quantity)
+        if any(one.quantity == quantity for one in log.screened) and not np.isfinite(log.telemetry[quantity]).any():
+            yield language.text("{quantity} cannot be judged: its readings were set aside.", quantity=name)
+        elif quantity not in log.telemetry or not np.isfinite(log.telemetry[quantity]).any():
+            yield language.text("{quantity} cannot be judged: the log does not have it.", quantity=name)
+        elif quantity == "air_co2" and dosing and "co2_dosing" in result.missing:
+            yield language.text("CO2 cannot be judged: the log does not tell how much CO2 was dosed.")
+        else:
+            yield language.text("{quantity} cannot be judged: no unseen day of it is whole.", quantity=name)
+
+
+def fault(one: DataFault, language: Language) -> tuple[str, str]:
+    """Return what a fault of the data is in this language, and what was seen and how to mend it, in English."""
+    quantity = language.listed([language.name(name) for name in one.quantity.split(", ")])
+    known = _FAULTS.get(one.kind)
+    return ("" if known is None else language.text(known, quantity=quantity)), str(one)
+
+
+def set_aside(result: Diagnosis, language: Language) -> Iterator[str]:
+    """Say what was set aside, a sentence for each quantity and reason."""
+    groups: dict[tuple[str, str], list[float]] = {}
+    for one in result.screened:
+        hours = (one.end - one.start).astype("timedelta64[s]").astype(np.float64) / 3600.0
+        groups.setdefault((one.quantity, one.reason), []).append(float(hours))
+    for (quantity, reason), stretches in groups.items():
+        yield language.text(
+            "{quantity}: {reason}, {count} ×, {hours} h in all.",
+            quantity=language.name(quantity),
+            count=len(stretches),
+            hours=language.number(max(sum(stretches), 0.1), 3),
+            reason=language.name(reason),
+        )
+
+
+def notes(result: Diagnosis, language: Language) -> Iterator[tuple[str, str]]:
+    """Yield the notes of a diagnosis with the language that each is in: one with figures has no translation."""
+    for note in result.notes:
+        told = language.text(note)
+        yield f"{told[0].upper()}{told[1:]}", language.code if told != note else "en"
