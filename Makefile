@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test page-pictures notebooks lint format soak bench bench-diagnosis results bundle wheel translations api clean
+.PHONY: help demo test page-pictures notebooks lint format soak bench bench-diagnosis results bundle wheel deb translations api clean
 
 help: ## List the targets.
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-16s %s\n", $$1, $$2}'
@@ -54,13 +54,19 @@ results: $(STAMP) ## Write the tables of docs/results that are quick to make (th
 bundle: $(STAMP) ## Rebuild the default bundle in igrow_core/default_bundle.
 	$(BIN)/igrow-trainer bundle --out igrow_core/default_bundle
 
-wheel: $(STAMP) ## Build the wheel into dist, and try the gateway's commands from it in an empty environment.
+wheel: $(STAMP) ## Build source and wheel into dist, check them, and try the gateway's commands in an empty environment.
 	rm -rf dist build
-	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist .
+	$(BIN)/pip install --quiet --disable-pip-version-check build
+	$(BIN)/python -m build --outdir dist .
+	$(BIN)/twine check --strict dist/*
 	$(PYTHON) -m venv --clear dist/venv
 	dist/venv/bin/pip install --quiet --disable-pip-version-check "$$(ls dist/*.whl)[edge]"
 	dist/venv/bin/igrow-edge --version
 	dist/venv/bin/igrow-edge check-config config/daemon.yaml
+
+deb: ## Build the gateway's Debian package into dist, and try it in a throw-away root (on Debian, as root).
+	sh systemd/build-deb.sh dist
+	sh systemd/try-deb.sh dist/igrow-edge_*.deb
 
 translations: $(STAMP) ## Add new texts to the trainer's languages, and tell which are untranslated.
 	$(BIN)/python -m igrow.trainer.language.messages
