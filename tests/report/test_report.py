@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -57,7 +58,7 @@ def test_where_correction_makes_it_worse_it_is_said(leak: Diagnosis) -> None:
 
 
 @pytest.mark.parametrize("verdict", ["nothing", "named", "ambiguous", "unexplained"])
-def test_no_verdict_says_that_a_model_fits_where_its_errors_say_that_it_does_not(leak: Diagnosis, verdict: str) -> None:
+def test_no_verdict_says_that_a_model_fits_where_its_errors_say_that_it_does_not(leak: Diagnosis, verdict: Any) -> None:
     good = replace(leak, verdict=verdict)
     bad = with_errors(good, "air_humidity", deployed=35.0, recalibrated=35.0, corrected=35.0)
     assert [one.quantity for one in misfits(bad)] == ["air_humidity"]

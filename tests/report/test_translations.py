@@ -37,7 +37,9 @@ def test_no_message_is_untranslated(code: str, texts: list[str]) -> None:
 def test_a_translation_has_the_same_places_as_its_text(code: str) -> None:
     for one in catalogue(code):
         if one.id:
-            assert sorted(re.findall(r"\{\w+\}", one.id)) == sorted(re.findall(r"\{\w+\}", str(one.string))), one.id
+            assert sorted(re.findall(r"\{\w+\}", str(one.id))) == sorted(re.findall(r"\{\w+\}", str(one.string))), (
+                one.id
+            )
 
 
 def test_everything_that_a_report_may_name_has_a_text(texts: list[str]) -> None:

@@ -189,10 +189,7 @@ def test_the_pilots_table_is_computed_again_with_its_spreads_and_tests(data_fold
     harvest, profit = lines["yield"], lines["net profit"]
     assert harvest.change == pytest.approx(10.15, abs=0.005)
     # The paper prints a tenth of these, and of each line the p-value of another test.
-    assert (harvest.control_spread, harvest.experiment_spread) == (
-        pytest.approx(533.2, abs=0.1),
-        pytest.approx(454.2, abs=0.1),
-    )
+    assert (harvest.control_spread, harvest.experiment_spread) == pytest.approx((533.2, 454.2), abs=0.1)
     assert (harvest.p_one_sample, harvest.p_student, harvest.p_welch) == pytest.approx((7.7e-3, 0.063, 0.245), rel=0.02)
     assert (profit.control, profit.experiment) == pytest.approx((1498.56, 2887.70), abs=0.01)
     assert profit.p_student == pytest.approx(2.8e-4, rel=0.02)
