@@ -1,0 +1,46 @@
+"""What an import loads: nothing that takes seconds before it is used."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+HEAVY = {"torch", "matplotlib", "pandas", "scipy", "onnx", "onnxruntime", "pyarrow", "ndonnx", "sklearn", "ray"}
+
+
+def loaded_by(code: str) -> list[str]:
+    """Return the modules that a fresh interpreter has after some code, of which it had none before."""
+    program = f"import json, sys\n{code}\nprint(json.dumps(sorted(sys.modules)))"
+    told = subprocess.run([sys.executable, "-c", program], capture_output=True, check=True, text=True)
+    return list(json.loads(told.stdout))
+
+
+HELP = """from igrow.trainer.cli import main
+try:
+    main(["--help"])
+except SystemExit:
+    pass"""
+
+
+@pytest.mark.parametrize(
+    ("code", "most"),
+    [("import igrow.trainer", 250), ("from igrow.trainer import read_log, __version__", 600), (HELP, 400)],
+)
+def test_an_import_loads_nothing_heavy(code: str, most: int) -> None:
+    quiet = f"import contextlib, io\nwith contextlib.redirect_stdout(io.StringIO()):\n    exec({code!r})"
+    found = loaded_by(quiet)
+    assert HEAVY & {name.split(".")[0] for name in found} == set()
+    assert len(found) < most
+
+
+def test_the_interface_of_a_notebook_is_whole() -> None:
+    import igrow.trainer
+
+    for name in igrow.trainer.__all__:
+        assert getattr(igrow.trainer, name) is not None
+    assert {"read_log", "calibrate", "compare", "diagnose", "export", "publish", "__version__"} <= set(
+        dir(igrow.trainer)
+    )
