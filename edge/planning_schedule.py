@@ -19,6 +19,8 @@ from igrow.edge.sources.recipe import Recipe, recipe_course
 
 ESSENTIAL = ("air_temperature", "air_humidity", "air_co2")
 """Where a plan starts from. While one that the plant measures cannot be believed, no new plan is made."""
+FIRST_PLAN_WAITS = "the first plan needs a day of log"
+"""How the problem begins that is none: planning waits for its log."""
 LEAST_HISTORY = 24 * 3600.0
 """Seconds of log that a plan needs: its weather is that of the last days."""
 RETRY = 900.0
@@ -109,7 +111,7 @@ class PlanningSchedule:
             if name in image.values and usable_for_planning(image.values[name]) is None:
                 return f"no new plan while {name} is {image.values[name].quality.value}"
         missing = self._young_until - image.monotonic
-        return f"the first plan needs a day of log: {missing / 3600:.0f} h more" if missing > 0 else ""
+        return f"{FIRST_PLAN_WAITS}: {missing / 3600:.0f} h more" if missing > 0 else ""
 
     def _prepare(
         self, monotonic: float, now: float, start: float, bundle: ActiveBundle, seed: int

@@ -46,7 +46,7 @@ inside '
     sleep 6
     /opt/igrow/venv/bin/python -c "
 from urllib.request import urlopen
-assert b\"recipe decides\" in urlopen(\"http://localhost:8421/\").read()
+assert b\"recipe decides\" in urlopen(\"http://127.0.0.1:8421/\").read()
 print(\"the page answers\")" || { cat page.log; status=1; }
     wait $daemon || true
     kill $plc

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 from datetime import tzinfo
 from typing import Any
 
-from igrow.core.quantities import CLIMATE, QUANTITIES, SETPOINTS, WEATHER
+from igrow.core.quantities import CLIMATE, WEATHER
 from igrow.core.site import Site
 from igrow.edge.notifications.acknowledged import Acknowledgement
 from igrow.edge.page import words
-from igrow.edge.page.plan import next_change
 from igrow.edge.page.state import Heard
-from igrow.edge.sources.override import RECIPE, Lease
+from igrow.edge.planning_schedule import FIRST_PLAN_WAITS
 
 HEADLINES = {
     "override": "You decide",
@@ -65,27 +64,6 @@ class Card:
     verdict: str
 
 
-@dataclass(frozen=True)
-class Setpoint:
-    """One setpoint: where it stands, who decides on it, what comes."""
-
-    name: str
-    title: str
-    shown: str
-    wanted: str
-    """What is asked for, where the PLC does not show it yet."""
-    decider: str
-    why: str
-    next: str
-    lease: str
-    """Until when somebody has taken it; empty where nobody has."""
-    low: str
-    high: str
-    step: str
-    unit: str
-    value: str
-
-
 def headline(heard: Heard) -> Headline:
     """Return what matters most. Red while the plant, or the daemon, is not heard."""
     state = heard.state
@@ -101,9 +79,22 @@ def headline(heard: Heard) -> Headline:
     worst = sorted((alarm["level"] for alarm in state["alarms"]), key=LEVELS.index)
     if worst and worst[0] == "critical":
         return Headline("bad", "✕", "Go and look now", "An alarm is critical.")
-    if "warning" in worst or state["problems"] or not state["clock_ok"]:
+    if "warning" in worst or problems(state):
         return Headline("warn", "!", "Running, with something to look at", "")
     return Headline("good", "✓", "All is well", "")
+
+
+def problems(state: Mapping[str, Any]) -> list[str]:
+    """Return what does not work as it should beside the alarms; a plan that only waits for its log is none."""
+    found = [words.sentence(problem) for problem in state["problems"] if not problem.startswith(FIRST_PLAN_WAITS)]
+    clock = "The date cannot be trusted: plans and updates wait until it can."
+    return found if state["clock_ok"] else [*found, clock]
+
+
+def waiting(state: Mapping[str, Any]) -> str:
+    """Return what the first plan waits for; empty where it does not."""
+    waits = [problem for problem in state["problems"] if problem.startswith(FIRST_PLAN_WAITS)]
+    return words.sentence(waits[0]) if waits else ""
 
 
 def decides(state: Mapping[str, Any], now: float, zone: tzinfo) -> tuple[str, str]:
@@ -185,60 +176,6 @@ def _air(measured: float, wanted: float | None, site: Site) -> tuple[str, str]:
 def _standing(state: Mapping[str, Any], setpoint: str) -> float | None:
     shown = state["setpoints"].get(setpoint, {}).get("shown")
     return None if shown is None else float(shown)
-
-
-def setpoints(
-    state: Mapping[str, Any], leases: Mapping[str, Lease], site: Site, now: float, zone: tzinfo
-) -> list[Setpoint]:
-    """Return the setpoints that sources decide on."""
-    found = []
-    for name, one in state["setpoints"].items():
-        if name not in SETPOINTS:
-            continue
-        limits, factor = getattr(site.limits, name), words.scale(name)
-        asked, shown = one["requested"], one["shown"]
-        away = asked is not None and shown is not None and words.number(name, asked) != words.number(name, shown)
-        reason = reason_of(one["source"], words.in_local_time(one["why"], now, zone))
-        if one["held_until"] is not None:
-            left = words.lasting(one["held_until"] - state["monotonic"])
-            reason = f"changed by hand at the PLC, respected for {left} more"
-        found.append(
-            Setpoint(
-                name, words.title(name), words.shown(name, shown),
-                f"on its way to {words.shown(name, asked)}" if away else "",
-                words.DECIDERS.get(one["source"], one["source"]), reason,
-                next_change(state["plan"], name, now, zone) if one["source"] in ("plan", "last_plan") else "",
-                lease_words(leases.get(name), now, zone),
-                f"{limits.low * factor:g}", f"{limits.high * factor:g}",
-                "5" if factor > 1 else "10" if QUANTITIES[name].unit == "ppm" else "0.1",
-                words.unit(name), "" if shown is None else words.number(name, shown),
-            )
-        )  # fmt: skip
-    return found
-
-
-def reason_of(source: str, why: str) -> str:
-    """Return what a source says of itself, without what "The plan", "Your recipe" or "You" beside it says already."""
-    if source == "override" or why == "the recipe":
-        return ""
-    for known in ("the plan ", "the last valid plan, ", "the recipe, "):
-        why = why.removeprefix(known)
-    return why
-
-
-def lease_words(lease: Lease | None, now: float, zone: tzinfo) -> str:
-    """Return who has taken something until when; nothing where the lease is over."""
-    if lease is None or (lease.until is not None and lease.until <= now):
-        return ""
-    end = (
-        f"for {words.lasting(lease.seconds)}" if lease.until is None else f"until {words.when(lease.until, now, zone)}"
-    )
-    return f"{end}, by {lease.by}" if lease.by else end
-
-
-def recipe_lease(leases: Mapping[str, Lease], now: float, zone: tzinfo) -> str:
-    """Return until when the grower wants the recipe, and who said so; nothing where plans may rule."""
-    return lease_words(leases.get(RECIPE), now, zone)
 
 
 @dataclass(frozen=True)

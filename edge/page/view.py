@@ -14,7 +14,7 @@ from igrow.core.quantities import QUANTITIES
 from igrow.core.telemetry import Telemetry, from_rows
 from igrow.edge.configuration import Configuration
 from igrow.edge.notifications.acknowledged import Acknowledgement
-from igrow.edge.page import money, now, panels, plan, svg, words
+from igrow.edge.page import money, now, panels, plan, setpoints, svg, words
 from igrow.edge.page.actions import HOURS
 from igrow.edge.page.history import SPANS, Course
 from igrow.edge.page.state import Heard
@@ -76,12 +76,12 @@ def _present(known: Known, state: Mapping[str, Any], zone: tzinfo) -> dict[str, 
     return {
         "who": "" if unheard else who,
         "why": why,
-        "recipe_until": now.recipe_lease(known.leases, time, zone),
+        "recipe_until": setpoints.recipe_lease(known.leases, time, zone),
         "alarms": now.alarms(state, known.acknowledged, time, zone),
-        "problems": [words.sentence(problem) for problem in state["problems"]]
-        + ([] if state["clock_ok"] else ["The date cannot be trusted: plans and updates wait until it can."]),
+        "problems": now.problems(state),
+        "waiting": now.waiting(state),
         "cards": cards,
-        "setpoints": now.setpoints(state, known.leases, site, time, zone),
+        "setpoints": setpoints.setpoints(state, known.leases, site, time, zone),
         "ends": [(hours, f"{hours} h, until {words.when(time + 3600 * hours, time, zone)}") for hours in HOURS],
         "held": matters,
         "routine": routine,

@@ -11,7 +11,7 @@ import pytest
 from igrow.core.site import load_site
 from igrow.edge.configuration import load_configuration
 from igrow.edge.notifications.acknowledged import Acknowledgement
-from igrow.edge.page import money, now, words
+from igrow.edge.page import money, now, setpoints, words
 from igrow.edge.page.history import Course
 from igrow.edge.page.plan import Block, blocks, limit_words, next_change
 from igrow.edge.page.state import Heard
@@ -81,6 +81,7 @@ def test_names_of_points_are_said_as_words():
         (Heard(state(alarms=[], clock_ok=False)), "warn", "Running, with something to look at"),
         (Heard(state(alarms=[alarm("interlock rain", "x", "notice")])), "good", "All is well"),
         (Heard(state(alarms=[])), "good", "All is well"),
+        (Heard(state(alarms=[], problems=["the first plan needs a day of log: 4 h more"])), "good", "All is well"),
     ],
 )
 def test_the_headline_is_the_worst_that_is(heard, tone, said):
@@ -135,12 +136,26 @@ def test_routine_ramps_are_apart_from_what_matters():
 
 def test_a_setpoint_says_who_has_taken_it_and_until_when(site):
     leases = {"heating_setpoint": Lease(18.0, 7200.0, NOW + 3600.0, by="Anna (page)")}
-    found = {one.name: one for one in now.setpoints(state(), leases, site, NOW, ZONE)}
+    found = {one.name: one for one in setpoints.setpoints(state(), leases, site, NOW, ZONE)}
     assert found["heating_setpoint"].lease == "until 17:00, by Anna (page)"
     assert found["co2_setpoint"].wanted == "on its way to 900 ppm"
     assert found["lamp_on"].next == "0 % from 17:00"
     over = {"heating_setpoint": Lease(18.0, 7200.0, NOW - 1.0)}
-    assert now.setpoints(state(), over, site, NOW, ZONE)[0].lease == ""
+    assert setpoints.setpoints(state(), over, site, NOW, ZONE)[0].lease == ""
+
+
+def test_a_plan_that_waits_for_its_log_is_no_problem_and_is_told():
+    said = state(problems=["the first plan needs a day of log: 4 h more", "the disk is full"])
+    assert now.problems(said) == ["The disk is full."]
+    assert now.waiting(said) == "The first plan needs a day of log: 4 h more."
+    assert now.waiting(state()) == ""
+
+
+def test_a_setpoint_that_a_hand_at_the_plc_has_set_says_so(site):
+    said = state()
+    said["setpoints"]["lamp_on"]["held_until"] = said["monotonic"] + 5400.0
+    found = {one.name: one for one in setpoints.setpoints(said, {}, site, NOW, ZONE)}
+    assert (found["lamp_on"].decider, found["lamp_on"].why) == ("A hand at the PLC", "respected for 2 h more")
 
 
 def test_what_the_plan_asks_for_next():

@@ -11,6 +11,8 @@
   };
 
   const renewed = (part, fresh) => {
+    // What is as it was is left alone, so that a screen reader says only what is new.
+    if (part.innerHTML === fresh.innerHTML && part.className === fresh.className) return;
     for (const open of part.querySelectorAll("details[open]")) {
       const same = open.id && fresh.querySelector("#" + CSS.escape(open.id));
       if (same) same.open = true;
