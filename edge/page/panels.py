@@ -132,7 +132,8 @@ def ahead(plan: Mapping[str, Any], name: str, now: float, *, at_end: bool) -> tu
     step = plan["step_seconds"]
     time = plan["start"] + step * (np.arange(len(value)) + float(at_end))
     if at_end:
-        return time[time > now], value[time > now]
+        told = (time > now) & np.isfinite(value)
+        return time[told], value[told]
     still = time + step > now
     return np.maximum(time[still], now), value[still]
 

@@ -42,6 +42,24 @@ class Block:
     """The crop's limits that stand in the way within it, in words."""
 
 
+def sound(plan: Mapping[str, Any] | None) -> dict[str, Any] | None:
+    """Return a plan as it can be told: without an explanation that holds no numbers; None for setpoints that are none.
+
+    What is not finite comes as None in the daemon's JSON.
+    """
+    if plan is None or any(value is None for course in plan["setpoints"].values() for value in course):
+        return None
+    explained = plan.get("explanation")
+    return {**plan, "explanation": explained if explained and _whole(explained) else None}
+
+
+def _whole(plain: object) -> bool:
+    """Tell whether all of it is there."""
+    if isinstance(plain, Mapping):
+        return all(_whole(one) for one in plain.values())
+    return all(_whole(one) for one in plain) if isinstance(plain, list) else plain is not None
+
+
 def change_of(plain: Mapping[str, Any]) -> Change:
     """Return a change as the daemon's JSON holds it."""
     gain = Amount(plain["gain"]["mean"], plain["gain"]["deviation"])

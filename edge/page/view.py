@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import tzinfo
@@ -21,7 +22,8 @@ from igrow.edge.page.state import Heard
 from igrow.edge.sources.override import Lease
 from igrow.edge.sources.recipe import recipe_course
 
-DAY = 86_400.0
+_log = logging.getLogger("igrow.edge.page")
+NOTHING_PLANNED: Mapping[str, Any] = {"panels": [], "area": "", "spent": [], "plan": None}
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,17 @@ def compose(known: Known) -> dict[str, Any]:
         "log_problem": known.log_problem,
         "state": state is not None,
     }
-    return shown if state is None else shown | _present(known, state, zone) | _planned(known, state, zone)
+    if state is None:
+        return shown
+    state = {**state, "plan": plan.sound(state["plan"])}
+    present = _present(known, state, zone)
+    try:
+        return shown | present | _planned(known, state, zone)
+    except Exception:
+        # A fault of ours in what a plan says must not keep alarms and measurements from being seen.
+        _log.exception("the plan cannot be shown")
+        problem = "Course and plan cannot be shown, by a fault of the page; the journal says more."
+        return shown | present | NOTHING_PLANNED | {"log_problem": problem}
 
 
 def _present(known: Known, state: Mapping[str, Any], zone: tzinfo) -> dict[str, Any]:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
 from itertools import pairwise
+from typing import Any
 from zoneinfo import ZoneInfo
 
 import numpy as np
@@ -13,6 +16,7 @@ from igrow.edge.configuration import load_configuration
 from igrow.edge.notifications.acknowledged import Acknowledgement
 from igrow.edge.page import money, now, setpoints, words
 from igrow.edge.page.history import Course
+from igrow.edge.page.pages import render
 from igrow.edge.page.plan import Block, blocks, limit_words, next_change
 from igrow.edge.page.state import Heard
 from igrow.edge.page.view import Known, as_log, compose
@@ -260,3 +264,43 @@ def test_a_page_is_composed_of_any_state(tmp_path):
     bare = state(plan=None, values={}, setpoints={}, clamps=[], bundle={}, time=None, clock_ok=False)
     for heard in (Heard(None, "silent"), Heard(bare), Heard(state()), Heard(state(), "silent", 90.0)):
         assert compose(Known(configuration, heard, NOW))["headline"].text
+
+
+def leaves(plain: object, path: tuple = ()) -> Iterator[tuple]:
+    """Where the numbers of a plain structure stand."""
+    if isinstance(plain, dict | list):
+        for key, one in plain.items() if isinstance(plain, dict) else enumerate(plain):
+            yield from leaves(one, (*path, key))
+    elif isinstance(plain, float):
+        yield path
+
+
+def rendered(configuration, said) -> str:
+    shown = compose(Known(configuration, Heard(said), NOW))
+    return render("page.html", {**shown, "session": None, "said": "", "said_well": True}).body.decode()
+
+
+def test_a_number_that_is_none_anywhere_in_the_state_keeps_no_page_from_being_made(tmp_path, caplog):
+    configuration = load_configuration(write_house(tmp_path))
+    certain = {("plan", "start"), ("plan", "step_seconds"), ("plan", "valid_until"), ("monotonic",)}
+    places = [path for path in leaves(state()) if path not in certain]
+    assert len(places) > 150
+    for path in places[:: max(1, len(places) // 60)]:
+        said = state()
+        there: Any = said
+        for key in path[:-1]:
+            there = there[key]
+        there[path[-1]] = None
+        page = rendered(configuration, said)
+        assert "The plan decides" in page, path
+        assert "nan" not in re.sub(r"<[^>]*>", "", page), path
+    assert "cannot be shown" not in caplog.text
+
+
+def test_a_fault_in_telling_the_plan_leaves_alarms_and_measurements_to_be_seen(tmp_path, monkeypatch):
+    configuration = load_configuration(write_house(tmp_path))
+    monkeypatch.setattr("igrow.edge.page.plan.blocks", lambda *_: 1 / 0)
+    page = rendered(configuration, state())
+    assert "cannot be shown" in page
+    assert "Wind speed is frozen" in page
+    assert "21.3" in page
