@@ -70,7 +70,7 @@ def compose(known: Known) -> dict[str, Any]:
         # A fault of ours in what a plan says must not keep alarms and measurements from being seen.
         _log.exception("the plan cannot be shown")
         problem = "Course and plan cannot be shown, by a fault of the page; the journal says more."
-        return shown | present | NOTHING_PLANNED | {"log_problem": problem}
+        return shown | present | dict(NOTHING_PLANNED) | {"log_problem": problem}
 
 
 def _present(known: Known, state: Mapping[str, Any], zone: tzinfo) -> dict[str, Any]:
