@@ -98,7 +98,7 @@ RESULTS = {
     ),
     "season-plans": Result(
         "A plan a day through a short season",
-        ("benchmarks.season_plans",),
+        ("benchmarks.season_plans", "--days", "40", "--houses", "3", "--generations", "24"),
         "With the season's marginal values, and with an average price instead; the same greenhouses for all.",
         "greenhouses and weather 700; searches 0 and on",
         long=True,

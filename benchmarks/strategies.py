@@ -4,7 +4,8 @@
 
 Every strategy leads the same greenhouses (each differs from the described one, as one house from the next) under the
 same weather, in winter and in spring. None of them has seen greenhouse or weather; all of them plan with the bundle's
-simulator, which is not the greenhouse. For each the table tells what the simulator expected of the coming hours
+simulator, which is not the greenhouse. "One day alone" is the genetic algorithm that does not look at the day after the
+one that it chooses. For each the table tells what the simulator expected of the coming hours
 whenever setpoints were chosen, and what the greenhouse then obtained, by the same rules of value
 (`igrow.core.planner.objective`). The spread is over greenhouses and seasons, of the gain over the recipe.
 """
@@ -202,8 +203,8 @@ def _past(weather: Telemetry, now: np.datetime64) -> Telemetry:
     return weather.select(now - 3 * DAY, now)
 
 
-def genetic(site: Site) -> Strategy:
-    """Return the elitist genetic algorithm on the bundle's simulator, as the daemon runs it."""
+def genetic(site: Site, ahead: int = HORIZON) -> Strategy:
+    """Return the elitist genetic algorithm on the bundle's simulator, which looks so many hours ahead."""
 
     def choose(now: Situation) -> Values:
         state = PlanningState(
@@ -214,7 +215,8 @@ def genetic(site: Site) -> Strategy:
             memory=now.memory,
         )
         rng = np.random.default_rng(now.seed)
-        return optimise(now.simulator, site, state, now.forecast, now.recipe, rng).setpoints
+        found = optimise(now.simulator, site, state, now.forecast[:ahead], now.recipe[:ahead], rng)
+        return np.concatenate([found.setpoints, now.recipe[ahead:]])
 
     return choose
 
@@ -296,6 +298,7 @@ def main() -> int:
     parser.add_argument("--every", type=int, default=24, help="hours between choices (K1)")
     parser.add_argument("--forecast", choices=("persistence", "true"), default="persistence", help="weather ahead")
     parser.add_argument("--uncorrected", action="store_true", help="do not correct plans by what the last days used")
+    parser.add_argument("--starts", nargs="+", default=STARTS, metavar="DATE", help=f"of {', '.join(STARTS)}")
     parser.add_argument("--only", nargs="+", help="strategies to run beside the recipe")
     parser.add_argument("--json", type=Path, help="file for the tables")
     given = parser.parse_args()
@@ -305,6 +308,7 @@ def main() -> int:
         "recipe": lambda now: now.recipe,
         "best of 500 fixed days": best_template(site, simulator),
         "genetic algorithm": genetic(site),
+        "one day alone": genetic(site, 24),
     }
     for text in given.policy:
         name, _, path = text.partition("=")
@@ -315,6 +319,8 @@ def main() -> int:
     found: dict[str, list[Book]] = {name: [] for name in strategies}
     result: dict[str, object] = {}
     for number, start in enumerate(STARTS):
+        if not start.startswith(tuple(given.starts)):
+            continue
         begin = np.datetime64(start) - SETTLING * DAY
         days, copies = SETTLING + given.days, len(strategies)
         scenario = Scenario(begin, days, given.houses, seed=FIRST_SEED + number, copies=copies)
