@@ -153,7 +153,7 @@ class Plan:
     binding: Mapping[str, tuple[tuple[str, ...], ...]] = field(default_factory=dict)
     """By setpoint and step: the crop's limits that kept it from what the search asked for, (steps,)."""
     explanation: Explanation | None = None
-    """What the plan is expected to bring over all that was searched, and what each change is for."""
+    """What the plan is expected to bring over its horizon, and what each change is for."""
     season: tuple[str, ...] = ()
     """What the season says of the plan's day, in sentences; empty where the bundle carries none."""
 

@@ -90,7 +90,8 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
     steps = round(horizon / request.step_seconds)
     hour_of_step = [int(step * request.step_seconds) // HOUR for step in range(steps)]
     outcome = result.outcome
-    expected_profit, recipe_profit = result.profits(hour_of_step[-1] + 1)
+    own = hour_of_step[-1] + 1
+    expected_profit, recipe_profit = result.profits(own)
     binding = _by_step(result.binding, hour_of_step)
     return Plan(
         created=request.time,
@@ -117,7 +118,7 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
             )
         },
         binding=binding,
-        explanation=explain(expected, state, forecast, result),
+        explanation=explain(expected, state, forecast, result, own),
         season=() if season is None or worth is None else tuple(told(season, worth, state.time)),
     )
 

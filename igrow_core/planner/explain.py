@@ -90,16 +90,19 @@ def explain(
     state: PlanningState,
     forecast: Values,
     result: PlanResult,
+    horizon: int | None = None,
 ) -> Explanation:
     """Return why a plan is as it is; the arguments are those of `optimise`, and what it returned.
 
     A change is taken back alone, so that changes which need each other (lamps and their CO2) do not add up to the
-    whole.
+    whole. Of a search that looked beyond the plan's own `horizon` (h), the money is that of its hours; a change that
+    begins within them is told with all that it does until the search's end.
     """
+    horizon = horizon or len(result.setpoints)
     recipe, template = result.recipe, result.template
     objective = result.objective
     applied = np.array([state.applied.get(name, np.nan) for name in SETPOINTS])
-    stretches = list(_stretches(template, result.setpoints, recipe))
+    stretches = [one for one in _stretches(template, result.setpoints, recipe) if one[1][0] < horizon]
     back = np.repeat(result.setpoints[None], len(stretches) + 1, axis=0)
     for row, (column, hours) in enumerate(stretches, start=1):
         back[row, hours, column] = recipe[hours, column]
@@ -123,11 +126,10 @@ def explain(
             )
         )
     changes.sort(key=lambda change: -abs(change.gain.mean))
-    gain = result.valuation.profit[:, 0] - result.recipe_valuation.profit[:, 0]
-    return Explanation(
-        _amounts(result.valuation.balance), _amounts(result.recipe_valuation.balance), _amount(gain),
-        tuple(changes[:MOST]),
-    )  # fmt: skip
+    own = objective.first(horizon)
+    planned, followed = (own.value(one.first(horizon)).balance for one in (result.outcome, result.recipe_outcome))
+    gain = planned.net_profit[:, 0] - followed.net_profit[:, 0]
+    return Explanation(_amounts(planned), _amounts(followed), _amount(gain), tuple(changes[:MOST]))
 
 
 def _stretches(template: Template, plan: Setpoints, recipe: Setpoints) -> Iterator[tuple[int, NDArray[np.int64]]]:

@@ -30,6 +30,17 @@ def test_the_balance_is_that_of_plan_and_recipe(planned) -> None:
     assert told.gain.interval[0] < told.gain.mean < told.gain.interval[1]
 
 
+def test_of_a_search_that_looked_further_only_the_plan_s_own_hours_are_told(planned, state, weather) -> None:
+    """The day after the plan was searched too, since what it bears hangs on the plan; it is another plan's."""
+    simulator, result, whole = planned
+    told = explain(simulator, state, weather, result, 24)
+    assert (told.plan["profit"].mean, told.recipe["profit"].mean) == pytest.approx(result.profits(24))
+    assert told.plan["profit"].mean != pytest.approx(whole.plan["profit"].mean)
+    end = float(state.time.astype("datetime64[s]").astype(np.int64)) + 86_400.0
+    assert told.changes
+    assert all(change.start < end for change in told.changes)
+
+
 def test_each_change_is_told_with_what_it_earns_and_costs(planned) -> None:
     _, _, told = planned
     assert told.changes
@@ -47,7 +58,7 @@ def test_each_change_is_told_with_what_it_earns_and_costs(planned) -> None:
 
 def test_a_plan_that_is_the_recipe_has_no_changes(site, state, weather, planned) -> None:
     simulator, result, _ = planned
-    same = replace(result, setpoints=result.recipe, valuation=result.recipe_valuation)
+    same = replace(result, setpoints=result.recipe, outcome=result.recipe_outcome)
     told = explain(simulator, state, weather, same)
     assert told.changes == ()
     assert told.gain.mean == 0.0
