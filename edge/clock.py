@@ -19,6 +19,11 @@ EARLIEST_PLAUSIBLE = datetime(2026, 1, 1, tzinfo=UTC).timestamp()
 LATEST_PLAUSIBLE = datetime(2100, 1, 1, tzinfo=UTC).timestamp()
 JUMP_SECONDS = 120.0
 """A difference between the two clocks that grows by more than this at once is a jump, not drift."""
+UNEVEN_READINGS = 3
+"""Readings in a row, between each of which the date runs at less than half or more than twice the pace of time, after
+which the clock counts as one that does not run: a step of a time service is one such reading, a slew none."""
+PACE_SECONDS = 1.0
+"""Between two looks at the pace, at the least: two clocks are never read in the very same instant."""
 SETTLE_SECONDS = 60.0
 """After a jump the clock must run evenly for this long before it is trusted again."""
 MOST_AHEAD = 400 * 86_400.0
@@ -74,6 +79,9 @@ class TrustedTime:
         self._settle = settle
         self._synchronised = synchronised
         self._offset: float | None = None
+        self._paced: tuple[float, float] | None = None
+        """When the pace was last looked at, and the offset then."""
+        self._uneven = 0
         self._jumped_at = float("-inf")
         self._witness: float | None = None
         self.known: float | None = None
@@ -106,11 +114,25 @@ class TrustedTime:
         elif self._offset is None and self.known is not None and wall < self.known - JUMP_SECONDS:
             self._jumped_at = monotonic
         self._offset = offset
+        self._watch_pace(monotonic, offset)
+
+    def _watch_pace(self, monotonic: float, offset: float) -> None:
+        """Notice a date that stands still, or runs at a pace of its own."""
+        before, self._paced = self._paced, self._paced or (monotonic, offset)
+        if before is None or monotonic - before[0] < PACE_SECONDS:
+            return
+        pace = 1.0 + (offset - before[1]) / (monotonic - before[0])
+        self._paced = monotonic, offset
+        self._uneven = 0 if 0.5 <= pace <= 2.0 else self._uneven + 1
+        if self._uneven >= UNEVEN_READINGS:
+            self._jumped_at = monotonic
 
     def _doubts(self, monotonic: float, wall: float) -> str:
         if not self._earliest <= wall < LATEST_PLAUSIBLE:
             return f"the clock shows {_date(wall)}, so it was never set"
         if monotonic - self._jumped_at < self._settle:
+            if self._uneven >= UNEVEN_READINGS:
+                return f"the clock does not run evenly; it shows {_date(wall)}"
             return f"the clock has jumped, to {_date(wall)}"
         if self.known is None or wall - self.known <= MOST_AHEAD or self._synchronised():
             return ""

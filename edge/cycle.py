@@ -10,10 +10,10 @@ import asyncio
 import math
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Protocol
 
+from igrow.edge.bus.errors import RefusedError
 from igrow.edge.clock import Clock
+from igrow.edge.cycle_result import CycleResult, ReadablePlc
 from igrow.edge.guard import (
     GuardedWriter,
     GuardRules,
@@ -31,7 +31,6 @@ from igrow.edge.guard.memory import note, recall
 from igrow.edge.guard.writer import HEARTBEAT
 from igrow.edge.image import Image, Quality
 from igrow.edge.journal import Journal
-from igrow.edge.ports import SetpointStatus
 from igrow.edge.sensors import ImageBuilder, RawReading
 from igrow.edge.setpoint_statuses import setpoint_statuses
 from igrow.edge.sources import Decision, Source, decide
@@ -40,25 +39,6 @@ from igrow.edge.stopping import LOOK_SECONDS, STOP_SECONDS, StopReport, furthest
 MANUAL = "plc_manual"
 ASKED_AT_STOP = (MANUAL, "plc_fallback", HEARTBEAT)
 """What has to be known beside the setpoints themselves before a stop moves them."""
-
-
-class ReadablePlc(Protocol):
-    """What the cycle needs of a PLC; writing is the guard's affair."""
-
-    async def read(self, names: Collection[str] | None = None) -> Mapping[str, RawReading]:
-        """Read the named points, or all that are due; each reading carries its own error."""
-
-
-@dataclass(frozen=True, slots=True)
-class CycleResult:
-    """What one cycle did."""
-
-    image: Image
-    decision: Decision
-    verdict: Verdict
-    setpoints: Mapping[str, SetpointStatus]
-    seconds: float
-    """Wall-clock length of the cycle."""
 
 
 class ControlCycle:
@@ -188,20 +168,20 @@ class ControlCycle:
         # Whoever operates the PLC by hand is not to be surprised, however seldom the switch is read otherwise.
         if names is None and (more := {*self._look_at, *self._builder.names((MANUAL,))} - readings.keys()):
             readings = {**readings, **await self._plc.read(sorted(more))}
-        image = self._image(readings)
-        if names is None and (unseen := set(self.readback.unseen(image)) - readings.keys()):
-            image = self._image(await self._plc.read(sorted(unseen)))
+        image = self._image(readings, patient=names is None)
+        if names is None and (unseen := self.readback.unseen(image) - readings.keys()):
+            image = self._image(await self._plc.read(sorted(unseen)), patient=True)
         self._look_whether_by_hand(image)
         return image
 
-    def _image(self, readings: Mapping[str, RawReading]) -> Image:
+    def _image(self, readings: Mapping[str, RawReading], *, patient: bool = False) -> Image:
         """Make the image of these readings, and look what it shows of our writes and of others' hands."""
         image = self._builder.build(readings, self._clock.monotonic(), self._clock.true_time())
         self._seen |= image.link_ok and bool(readings)
         self._journal.begin(image)
         beat = image.value_of(HEARTBEAT)
         lost = self._writer.heartbeat_was_lost(beat.value if beat.age <= 0.0 else None)
-        findings = self.readback.observe(image, restarted=lost)
+        findings = self.readback.observe(image, restarted=lost, patient=patient)
         self._journal.findings(findings, self._respect_hand)
         moved, stood = moved_and_stood(findings, briefly=LONGEST_RAMP)
         self.state = go_on(begin_again(self.state, moved), stood)
@@ -252,10 +232,10 @@ class ControlCycle:
         """Forget what certainly never left."""
         for outcome in outcomes:
             if not outcome.may_have_arrived:
-                self._never_sent(outcome.write, before)
+                self._never_sent(outcome.write, before, refused=isinstance(outcome.error, RefusedError))
 
-    def _never_sent(self, write: Write, before: GuardState) -> None:
-        self.readback.not_sent(write)
+    def _never_sent(self, write: Write, before: GuardState, *, refused: bool = False) -> None:
+        self.readback.not_sent(write, refused=refused)
         self.state = never_sent(self.state, before, write.point)
 
     def _hands(self, now: float) -> tuple[dict[str, float], dict[str, Request]]:
@@ -270,6 +250,7 @@ class ControlCycle:
                     f"back to {hand.value:g}, set by hand at the PLC and respected for {hand.seconds / 60:.0f} min more"
                 )
                 restored[name] = Request(hand.value, "hand", why, at_once=True)
+        held |= dict.fromkeys(self.readback.in_question, 0.0)
         if now < self.unknown_until:
             held |= {name: self.unknown_until - now for name in self._rules.points if name not in held}
         return held, restored
@@ -283,10 +264,10 @@ class ControlCycle:
                 # Nothing may be remembered as written, and no ramp may run on unseen.
                 self.state = never_sent(self.state, before, name)
         for write in writes:
-            value = image.value_of(write.point)
             if not image.reaches(write.point):
                 continue
-            if not write.urgent and value.age > 0.0 and value.quality is not Quality.MISSING:
+            unseen = image.value_of(write.point).age > 0.0 and not self.readback.cannot_be_read(write.point, image)
+            if not write.urgent and unseen:
                 self._look_at.add(write.point)
                 self.state = postponed(self.state, before, write.point)
             else:

@@ -17,7 +17,7 @@ from igrow.core.errors import IgrowError
 from igrow.edge.alarm_levels import Level
 from igrow.edge.carrying_over import carry_over, log_to_remember, remember
 from igrow.edge.configuration import Configuration, load_configuration
-from igrow.edge.cycle import CycleResult
+from igrow.edge.cycle_result import CycleResult
 from igrow.edge.earlier import Earlier
 from igrow.edge.hand_off import PATIENCE, HandOff, LateError, settled
 from igrow.edge.image import Quality

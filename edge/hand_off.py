@@ -47,6 +47,12 @@ async def settled(future: Future[T], timeout: float) -> None:  # noqa: ASYNC109 
         await asyncio.wait_for(done.wait(), timeout)
 
 
+def _heard(future: asyncio.Future[T]) -> None:
+    """Whoever awaited the work may have gone: then nobody is to be told of an exception that nobody retrieved."""
+    if not future.cancelled():
+        future.exception()
+
+
 class HandOff:
     """A thread for work of one kind, done in the order in which it was handed over."""
 
@@ -122,8 +128,10 @@ class HandOff:
         if self.waiting:
             raise LateError(f"{self.name}: an earlier attempt hangs")
         future = self.post(work)
+        awaited = asyncio.wrap_future(future)
+        awaited.add_done_callback(_heard)
         try:
-            return await asyncio.shield(asyncio.wrap_future(future))
+            return await asyncio.shield(awaited)
         except asyncio.CancelledError:
             future.add_done_callback(lambda done: undo(done.result()) if done.exception() is None else None)
             raise
@@ -140,7 +148,7 @@ class HandOff:
         if not self._is_late(self._late_after):
             return ""
         with self._filled:
-            late = self._monotonic() - (self._present or self._monotonic())
+            late = 0.0 if self._present is None else self._monotonic() - self._present
             waiting = len(self._queue)
         lost = f", {self.refused} could not wait" if self.refused else ""
         return f"{self.name}: no answer for {late:.0f} s from a disk or a share; {waiting} pieces of work wait{lost}"

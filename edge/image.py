@@ -44,6 +44,11 @@ class Value:
     believed: float | None = None
     """While in doubt, the last value that was believed."""
 
+    @property
+    def says_yes(self) -> bool:
+        """A flag that is set, beyond doubt."""
+        return self.quality is Quality.GOOD and self.value is not None and self.value >= 0.5
+
 
 MISSING = Value(None, Quality.MISSING, float("inf"), "never read")
 

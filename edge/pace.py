@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping
 from typing import Protocol
 
 from igrow.edge.clock import PlcClock
-from igrow.edge.cycle import ReadablePlc
+from igrow.edge.cycle_result import ReadablePlc
 from igrow.edge.sensors import RawReading
 
 PATIENCE = 2.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from igrow.edge.cycle import CycleResult
+from igrow.edge.cycle_result import CycleResult
 from igrow.edge.journal import Journal
 from igrow.edge.ports import Snapshot
 from igrow.edge.wiring import Control, Services

@@ -194,7 +194,7 @@ def build_control(
     register_map = configuration.register_map
     interval = file.cycle.interval.total_seconds()
     respect_hand = file.cycle.respect_hand.total_seconds()
-    plc = plc or RegisterPlc(register_map)
+    plc = plc or RegisterPlc(register_map, others_asked=True)
     readable: RegisterPlc | FollowedPlant = plc
     pace: Pace
     if file.cycle.clock is ClockSource.SYSTEM:

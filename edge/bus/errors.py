@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from igrow.core.errors import IgrowError
 
+MAY_BE_DONE = (5, 11)
+"""Exceptions that leave open what becomes of a write: it takes longer, or the unit behind a gateway was silent."""
+
 
 class BusError(IgrowError):
     """Any failure to read or write. `sent` tells whether a write may nevertheless have been done."""
@@ -53,11 +56,12 @@ class OldAnswerError(BusError):
 
 
 class RefusedError(BusError):
-    """The unit answered with an exception: it understood, and did not do it."""
+    """The unit answered with an exception: it understood, and did not do it, or (`sent`) does not say so."""
 
     def __init__(self, message: str, code: int) -> None:
         super().__init__(message)
         self.code = code
+        self.sent = code in MAY_BE_DONE
 
 
 class AddressRefusedError(RefusedError):

@@ -47,11 +47,15 @@ class ModbusBus:
         rest_step: float = 2.0,
         first_wait: float = 0.5,
         quiet: float = QUIET,
+        others_asked: bool = False,
     ) -> None:
-        """`unit_gaps`: seconds of rest after each request, by device id. To be made inside an event loop."""
+        """`unit_gaps`: seconds of rest after each request, by device id. To be made inside an event loop.
+
+        `others_asked`: answers to another process' requests may still come on a serial line.
+        """
         self.settings = settings
         self.health = HealthBook(monotonic, rest_step)
-        self._link = PymodbusLink(settings, self._line_lost, quiet)
+        self._link = PymodbusLink(settings, self._line_lost, quiet, others_asked=others_asked)
         self._supervisor = ConnectSupervisor(self._link, settings.name, monotonic=monotonic, first_wait=first_wait)
         self._slot = RequestSlot(longest_queue)
         self._pacer = Pacer(monotonic, settings.gap, unit_gaps or {})
@@ -102,12 +106,13 @@ class ModbusBus:
             raise UnitRestingError(f"{request}: an older answer that looks the same may come for {seconds:.0f} s more")
         assert asked is not None
         try:
-            return (await self._link.read(asked))[: request.count]
+            skipped = request.address - asked.address
+            return (await self._link.read(asked))[skipped:][: request.count]
         except (OldAnswerError, AddressRefusedError) as error:
-            if owed is None or asked is request or error.code not in BEYOND_THE_END:
+            if owed is None or asked == request or error.code not in BEYOND_THE_END:
                 raise
             owed.refused(asked, request)
-            raise OldAnswerError(f"{request}: it cannot be read with a register more", error.code) from None
+            raise OldAnswerError(f"{request}: it cannot be read with the registers beside it", error.code) from None
 
     def _line_lost(self) -> None:
         self._supervisor.lost()

@@ -47,10 +47,10 @@ class Plc(Protocol):
         ...
 
 
-def make_bus(settings: BusSettings, devices: Iterable[Device]) -> ModbusBus:
+def make_bus(settings: BusSettings, devices: Iterable[Device], *, others_asked: bool = False) -> ModbusBus:
     """Make the bus for one entry of a register map. To be called inside an event loop."""
     gaps = {device.device_id: device.gap for device in devices if device.bus == settings.name}
-    return ModbusBus(settings, gaps)
+    return ModbusBus(settings, gaps, others_asked=others_asked)
 
 
 class RegisterPlc:
@@ -62,13 +62,18 @@ class RegisterPlc:
         *,
         monotonic: Callable[[], float] = time.monotonic,
         buses: Mapping[str, Bus] | None = None,
+        others_asked: bool = False,
     ) -> None:
-        """`buses` by name replaces the real ones (tests). Made inside an event loop; connects after `start`."""
+        """`buses` by name replaces the real ones (tests). Made inside an event loop; connects after `start`.
+
+        `others_asked`: a process before this one may have asked; its late answers must pass for none of ours.
+        """
         devices = register_map.devices
         self.register_map = register_map
         self._monotonic = monotonic
         self.buses: Mapping[str, Bus] = buses or {
-            name: make_bus(settings, devices.values()) for name, settings in register_map.buses.items()
+            name: make_bus(settings, devices.values(), others_asked=others_asked)
+            for name, settings in register_map.buses.items()
         }
         self._readers = {name: BlockReader(bus, devices, monotonic) for name, bus in self.buses.items()}
         self._bus_of = {name: devices[point.device].bus for name, point in register_map.points.items()}

@@ -1,4 +1,5 @@
-"""The one file of the bus that knows pymodbus (3.16.1, pinned: it does not follow semantic versioning).
+"""What the bus needs of pymodbus (3.16.1, pinned: it does not follow semantic versioning); no other file but
+`serial_port` knows it.
 
 pymodbus gives the request and answer classes, the framers with their check sum, and the serial port. Its
 transaction manager is replaced, because of what it was measured to do (see `answer_check`), because it lets a
@@ -22,7 +23,6 @@ from pymodbus.pdu.register_message import (
     WriteMultipleRegistersRequest,
     WriteSingleRegisterRequest,
 )
-from pymodbus.transport.serialtransport import SerialTransport
 
 from igrow.edge.bus.answer_check import (
     MisfitError,
@@ -31,6 +31,7 @@ from igrow.edge.bus.answer_check import (
     find_rtu_answer,
     first_tcp_frame,
     only_whole_frames,
+    sound_frames,
 )
 from igrow.edge.bus.errors import (
     BadAnswerError,
@@ -44,8 +45,9 @@ from igrow.edge.bus.errors import (
 from igrow.edge.bus.opening import open_socket, why_not_open, words
 from igrow.edge.bus.owed import OwedAnswers
 from igrow.edge.bus.protocol import ReadRequest, WriteRequest
+from igrow.edge.bus.serial_port import drop, open_serial_port
 from igrow.edge.hand_off import HandOff, LateError
-from igrow.edge.registers.model import BusSettings, Function, Parity, Transport
+from igrow.edge.registers.model import BusSettings, Function, Transport
 
 _READS: dict[Function, type[ModbusPDU]] = {
     Function.COIL: ReadCoilsRequest,
@@ -60,40 +62,16 @@ into pieces some 10 to 20 ms apart."""
 
 LONGEST_NOISE = 1024
 """Bytes without an answer among them after which a line is given up for this request."""
-LONGEST_FRAME = 256
-"""Bytes of the longest RTU frame."""
-
-
-_PARITY = {Parity.NONE: "N", Parity.EVEN: "E", Parity.ODD: "O"}
-
-
-async def open_serial_port(
-    protocol: asyncio.Protocol, port: str, baudrate: int, parity: Parity, stop_bits: int, aside: HandOff
-) -> None:
-    """Connect a protocol to a serial port, 8 data bits; a driver that hangs in it holds nobody.
-
-    Raises OSError where the port is absent or taken, LateError while an earlier attempt hangs.
-    """
-    loop = asyncio.get_running_loop()
-    transport = await aside.run(
-        lambda: SerialTransport(loop, protocol, port, baudrate, 8, _PARITY[parity], stop_bits, 0),
-        undo=lambda late: late.sync_serial.close(),
-    )
-    loop.call_soon(transport.setup)
-
-
-def _drop(transport: asyncio.Transport) -> None:
-    """Close a line at once: what was not sent yet is thrown away, as closing a serial port would wait for it."""
-    if isinstance(transport, SerialTransport) and transport.sync_serial:
-        transport.sync_serial.reset_output_buffer()
-    transport.close()
+LONGEST_FRAME = 256  # bytes, RTU
 
 
 class PymodbusLink(asyncio.Protocol):
     """One connection: opened, used for one exchange at a time, closed, opened again."""
 
-    def __init__(self, settings: BusSettings, on_lost: Callable[[], None], quiet: float = QUIET) -> None:
-        """`on_lost` is called whenever an open line breaks, whoever broke it."""
+    def __init__(
+        self, settings: BusSettings, on_lost: Callable[[], None], quiet: float = QUIET, *, others_asked: bool = False
+    ) -> None:
+        """`on_lost` is called whenever an open line breaks, whoever broke it; `others_asked`: see `owed`."""
         self._settings = settings
         self._on_lost = on_lost
         self._quiet = quiet
@@ -113,8 +91,12 @@ class PymodbusLink(asyncio.Protocol):
         self._opened = asyncio.Event()
         self._aside = HandOff(f"bus {settings.name}")
         self._loop = asyncio.get_running_loop()
-        self.owed = OwedAnswers(self._loop.time, settings.timeout, _check_sum) if self._rtu else None
+        self.owed: OwedAnswers | None = None
         """What the line may still say to requests that were given up; None where answers are numbered."""
+        if self._rtu:
+            self.owed = OwedAnswers(self._loop.time, settings.timeout, _check_sum, others_asked=others_asked)
+        self._answered_badly = False
+        """What came was an answer, and to this very request, though no good one: nothing more will come."""
 
     @property
     def connected(self) -> bool:
@@ -142,7 +124,7 @@ class PymodbusLink(asyncio.Protocol):
         self._received = b""
         if transport is not None:
             self._fail(ConnectionLostError(f"bus {self._settings.name}: the line was closed"))
-            _drop(transport)
+            drop(transport)
             self._on_lost()
 
     async def read(self, request: ReadRequest) -> tuple[int, ...]:
@@ -187,6 +169,7 @@ class PymodbusLink(asyncio.Protocol):
             pdu.transaction_id = self._transaction
         self._request = self._framer.buildFrame(pdu)
         self._what = what
+        self._answered_badly = False
         self._waiter = waiter = self._loop.create_future()
         transport.write(self._request)
         self._timer = self._loop.call_later(self._settings.timeout, self._time_out)
@@ -214,12 +197,12 @@ class PymodbusLink(asyncio.Protocol):
         try:
             answer = waiter.result()
         except BusError as error:
-            if self.owed is not None:
+            if self.owed is not None and not self._answered_badly:
                 self.owed.give_up(self._request[:-2])
             raise type(error)(f"{what}: {error}") from None
         if answer[0] & 0x80:
-            if self.owed is not None and self.owed.owes_any(self._request[0], self._request[1]):
-                self.owed.give_up(self._request[:-2])
+            if self.owed is not None and self.owed.may_be_older(self._request[:-2]):
+                self.owed.give_up(self._request[:-2], refusal_came=True)
                 raise OldAnswerError(f"{what}: a refusal that may be for an older request", answer[1])
             raise refusal(str(what), answer[1])
         decoded = self._decoder.decode(answer)
@@ -279,7 +262,13 @@ class PymodbusLink(asyncio.Protocol):
         if len(self._received) > LONGEST_NOISE:
             self._received = b""
             raise MisfitError("the line does not stop talking")
-        answer = find_rtu_answer(self._request[:-2], self._received, _check_sum)
+        request = self._request[:-2]
+        try:
+            answer = find_rtu_answer(request, self._received, _check_sum)
+        except MisfitError:
+            alone = len(list(sound_frames(self._received, _check_sum))) == 1
+            self._answered_badly = alone and owed.owes_nothing_like(request)
+            raise
         if answer is not None:
             waiter.set_result(answer)
 

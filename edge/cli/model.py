@@ -1,37 +1,62 @@
-"""`igrow-edge model`: the bundles of this gateway, and the step of adoption that each has come to."""
+"""`igrow-edge model`: the bundles of this gateway, the step of adoption of each, and the operator's word on them."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
 
 from igrow.core.bundle import BundleError, read_bundle
-from igrow.edge.cli.common import DEFAULT_CONFIGURATION, configuration_of
+from igrow.edge.cli.common import add_configuration, configuration_of
 from igrow.edge.updates.state import UpdateState, load_state
+from igrow.edge.updates.wishes import Wishes, pin, read_wishes, take_back, unpin
 
-EXAMPLE = "igrow-edge model list"
+EXAMPLE = "igrow-edge model pin /etc/igrow/daemon.yaml"
+
+_ACTIONS = {
+    "list": "show the bundles and what became of them",
+    "pin": "keep the bundle in force: no update replaces it, until `unpin`",
+    "unpin": "let updates replace the bundle in force again",
+    "back": "go back to the earlier bundle; the one in force is never tried again",
+}
+_DONE: dict[str, Callable[[Path, UpdateState], Wishes]] = {
+    "pin": pin,
+    "unpin": lambda folder, _: unpin(folder),
+    "back": take_back,
+}
+_SAID = {
+    "pin": "{active} is pinned: no update replaces it",
+    "unpin": "{active} is not pinned: the next update may replace it, after its shadow run",
+    "back": "{previous} takes the place of {active} as soon as the daemon runs its next cycles",
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's actions."""
     actions = parser.add_subparsers(title="actions", dest="action", metavar="ACTION", required=True)
-    show = actions.add_parser("list", help="show the bundles and what became of them")
-    show.add_argument("configuration", type=Path, nargs="?", default=DEFAULT_CONFIGURATION, help="the daemon's file")
+    for name, meaning in _ACTIONS.items():
+        add_configuration(actions.add_parser(name, help=meaning, description=meaning.capitalize() + "."))
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print a line for each bundle."""
+    """Print a line for each bundle, or leave a wish for the daemon, which sees it while it runs or when it starts."""
     folder = configuration_of(options).state_folder / "updates"
-    for line in describe(load_state(folder / "state.json"), folder / "bundles"):
-        print(line)
+    state = load_state(folder / "state.json")
+    if options.action == "list":
+        for line in describe(state, folder / "bundles", read_wishes(folder)):
+            print(line)
+        return 0
+    _DONE[options.action](folder, state)
+    print(_SAID[options.action].format(active=state.active or "no bundle", previous=state.previous))
     return 0
 
 
-def describe(state: UpdateState, shelf: Path) -> list[str]:
+def describe(state: UpdateState, shelf: Path, wishes: Wishes | None = None) -> list[str]:
     """Return a line for each bundle: its step, identity, label, and what was said of it."""
+    wishes = wishes or Wishes()
     lines = []
     steps = (
-        (state.active, "in force, on probation" if state.watch_since is not None else "in force"),
+        (state.active, _step_of_active(state, wishes)),
         (state.candidate, "in the shadow"),
         (state.previous, "previous"),
     )
@@ -46,3 +71,11 @@ def describe(state: UpdateState, shelf: Path) -> list[str]:
         lines.append(f"{step:<22}  {identity}  {said}")
     lines += [f"{'refused':<22}  {identity}  {reason}" for identity, reason in state.rejected.items()]
     return lines or ["no bundle: the grower's recipe rules"]
+
+
+def _step_of_active(state: UpdateState, wishes: Wishes) -> str:
+    if wishes.taken_back == state.active and state.previous is not None:
+        return "in force, to go back"
+    if wishes.pinned == state.active:
+        return "in force, pinned"
+    return "in force, on probation" if state.watch_since is not None else "in force"

@@ -78,9 +78,10 @@ def guard(
     """Decide what to write now.
 
     `shown` is what stands in the PLC as far as we know (None: unknown); `held` maps points that somebody changed
-    by hand to the seconds that this is still respected. With `stopping` every point that a source decides goes to
-    its safe value at once, without slew, dead band or interval, as the PLC's own fallback would do it; a hand keeps
-    its point, and an interlock gives back what it took. With `manual` nothing is written at all.
+    by hand to the seconds that this is still respected (0: it is not known yet whether it was a hand). With
+    `stopping` every point that a source decides goes to its safe value at once, without slew, dead band or interval,
+    as the PLC's own fallback would do it; a hand keeps its point, and an interlock gives back what it took. With
+    `manual` nothing is written at all.
     """
     now = image.monotonic
     forces, engaged = evaluate(rules.interlocks, image, state.engaged)
@@ -136,6 +137,8 @@ def _for_the_crop(
 
 
 def _standstill(name: str, held: Mapping[str, float], doubts: Mapping[str, str]) -> Standstill | None:
+    if name in held and held[name] <= 0.0:
+        return Standstill("doubt", "it has changed at the PLC, and it is not known yet by whom")
     if name in held:
         return Standstill("hand", f"changed by hand at the PLC, respected for {held[name] / 60:.0f} min more")
     if name in doubts:

@@ -6,7 +6,7 @@ All times in it are the monotonic seconds of the process that noted them; `recal
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import TypeGuard, overload
 
 from igrow.edge.guard.point_memory import PointMemory, Sent
@@ -50,7 +50,8 @@ def _note_point(memory: PointMemory, state: PointState) -> Entry:
     entry = {
         "stands": memory.stands,
         "answers": memory.answers,
-        "sent": [[sent.value, sent.at, sent.source, sent.urgent] for sent in memory.sent],
+        "sent": _note_sent(memory.sent),
+        "late": _note_sent(memory.late),
         "hand": memory.hand,
         "held_until": None if memory.hand is None else memory.held_until,
         "ceiling": memory.ceiling,
@@ -74,12 +75,21 @@ def _recall_point(memory: PointMemory, entry: Entry, later: float, *, agree: boo
         return
     memory.stands, memory.answers = _number(entry, "stands"), _number(entry, "answers")
     memory.limited_until = _number(entry, "limited_until", math.inf) + later
-    sent = entry.get("sent")
-    for row in sent if isinstance(sent, list) else ():
+    memory.sent, memory.late = _recall_sent(entry.get("sent"), later), _recall_sent(entry.get("late"), later)
+
+
+def _note_sent(sent: Sequence[Sent]) -> list[list[object]]:
+    return [[one.value, one.at, one.source, one.urgent] for one in sent]
+
+
+def _recall_sent(rows: object, later: float) -> list[Sent]:
+    sent = []
+    for row in rows if isinstance(rows, list) else ():
         if isinstance(row, list) and len(row) == 4:
             value, at, source, urgent = row
             if _is_number(value) and _is_number(at):
-                memory.sent.append(Sent(float(value), float(at) + later, str(source), bool(urgent)))
+                sent.append(Sent(float(value), float(at) + later, str(source), bool(urgent)))
+    return sent
 
 
 def _says_something(value: object) -> bool:

@@ -41,6 +41,8 @@ class PointMemory:
     """Writes that something else came after before they showed: the PLC may still apply them."""
     moved_at: float = -math.inf
     """When the PLC last moved towards what was sent."""
+    applied_last: float | None = None
+    """What it moved to, where that was an earlier write of ours and no step of its own."""
     overdue: bool = False
     """What was sent did not show in time; a reading may still show it."""
     hand: float | None = None
@@ -56,6 +58,8 @@ class PointMemory:
     looked_at: float = -math.inf
     heard_at: float | None = None
     """When the unit last answered."""
+    answering_since: float | None = None
+    """When the unit was heard again after its last silence; None while it is silent."""
     absence: float = 0.0
     """The longest time since the last look that the unit was not heard, or heard no heartbeat."""
     was_silent: bool = False
@@ -79,6 +83,11 @@ class PointMemory:
         """Tell whether the PLC itself shows a value."""
         return self.stands is not None and matches(rule, self.stands, value)
 
+    def settle(self, rule: PointRule, target: float | None) -> None:
+        """Forget what was wrong with a write that is not wanted any more, or that the point shows by now."""
+        if self.problem and (target is None or self.shows(rule, target)):
+            self.problem = None
+
     @property
     def waits_since(self) -> float:
         """Since when the newest write, or the PLC's way to it, has made no progress."""
@@ -91,6 +100,12 @@ class PointMemory:
         self.sent = [*self.sent, Sent(write.value, now, write.source, write.urgent)][-MOST_SENT:]
         self.overdue = False
 
+    def taken_back(self, *, refused: bool) -> None:
+        """The newest write never left, or was refused: some devices do what they refuse."""
+        newest = self.sent.pop()
+        if refused:
+            self.late = [*self.late, newest][-MOST_SENT:]
+
     def is_new(self, value: Value, now: float) -> bool:
         """Tell whether an image's value is a reading that was not judged yet, taken after the newest write."""
         if value.value is None or value.in_doubt or value.quality in (Quality.MISSING, Quality.STALE):
@@ -100,13 +115,14 @@ class PointMemory:
 
     def move_to(self, shown: float, now: float) -> None:
         """The PLC is on its way to what was sent."""
-        self.stands, self.answers, self.moved_at = shown, None, now
+        self.stands, self.answers, self.moved_at, self.applied_last = shown, None, now, None
 
     def applied(self, sent: Sent, shown: float, now: float) -> None:
         """The PLC shows an earlier write of ours, and later ones may follow."""
         self.sent = [other for other in self.sent if other.at > sent.at]
         self.late = [other for other in self.late if other.at > sent.at]
         self.move_to(shown, now)
+        self.applied_last = shown
 
     def settled(self, rule: PointRule, shown: float | None, answers: float) -> None:
         """The PLC shows what it makes of our newest write."""
@@ -125,11 +141,15 @@ class PointMemory:
         self._close()
 
     def is_limited(self, rule: PointRule, written: float) -> bool:
-        """Tell whether the PLC stands still short of what was written, as if it had a limit of its own there."""
+        """Tell whether the PLC stands still short of what was written, as if it had a limit of its own there.
+
+        Outside our limits nothing is left standing, whatever keeps it there.
+        """
         stands = self.stands
-        if stands is None:
+        if stands is None or not rule.low <= stands <= rule.high:
             return False
-        return self.moved_at > -math.inf or self.is_known_limit(rule, written, stands)
+        stopped_short = self.moved_at > -math.inf and stands != self.applied_last
+        return stopped_short or self.is_known_limit(rule, written, stands)
 
     def is_known_limit(self, rule: PointRule, written: float, shown: float) -> bool:
         """Tell whether the device answers a write with a limit that is known of it."""
@@ -151,9 +171,13 @@ class PointMemory:
         self.was_silent |= not answers
         if answers:
             self.heard_at = now
+            self.answering_since = now if self.answering_since is None else self.answering_since
+        else:
+            self.answering_since = None
 
-    def forget_absence(self) -> None:
-        """The point was looked at."""
+    def was_looked_at(self, at: float) -> None:
+        """A reading of the point, taken then, was judged."""
+        self.looked_at = at
         self.absence, self.was_silent, self.fell_back, self.restarted = 0.0, False, False, False
 
     def grow_old(self, now: float) -> None:

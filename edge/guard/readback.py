@@ -16,15 +16,16 @@ Whether a PLC could be heard is judged for each unit by itself.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 
 from igrow.edge.guard.answers import matches, on_the_way, rounds
+from igrow.edge.guard.evidence import HEARTBEAT, Questions, cannot_be_read, disturbed
 from igrow.edge.guard.findings import Finding, Hand, Outcome, Problem
 from igrow.edge.guard.point_memory import PointMemory
 from igrow.edge.guard.power_up import Look, by_unit, started_anew
 from igrow.edge.guard.rules import PointRule
 from igrow.edge.guard.state import Write
-from igrow.edge.image import Image, Quality, Value
+from igrow.edge.image import Image, Quality
 
 SILENCE = 30.0
 """Seconds without a word after which a PLC may have fallen back: three cycles of ten seconds."""
@@ -53,14 +54,15 @@ class Readback:
         self._units = units or {}
         self.points = {name: PointMemory() for name in rules}
         self._beat_at: float | None = None
+        self._questions = Questions(rules, self._units, confirm_within)
 
     def wrote(self, write: Write, now: float) -> None:
         """Remember a write that is about to leave; a later reading must show it."""
         self.points[write.point].sent_now(write, now)
 
-    def not_sent(self, write: Write) -> None:
-        """Forget the newest write to a point, which certainly never left."""
-        self.points[write.point].sent.pop()
+    def not_sent(self, write: Write, *, refused: bool = False) -> None:
+        """Forget the newest write to a point, which never left; one that was refused may show all the same."""
+        self.points[write.point].taken_back(refused=refused)
 
     def beat(self, now: float) -> None:
         """Remember that the heartbeat went out."""
@@ -91,13 +93,18 @@ class Readback:
         memory = self.points[point]
         return bool(memory.sent) and not memory.overdue
 
-    def unseen(self, image: Image) -> list[str]:
-        """Return the points to be read now, although they may not be due: something has happened to their PLC.
+    def unseen(self, image: Image) -> set[str]:
+        """Return the points to be read now, although they may not be due: something has happened to their PLC."""
+        return disturbed(self.points, image).union(*self._questions.wanted.values())
 
-        Otherwise a hand that comes after it could not be told from it.
-        """
-        disturbed = [name for name, memory in self.points.items() if memory.was_disturbed and image.reaches(name)]
-        return [name for name in disturbed if image.value_of(name).quality is not Quality.MISSING]
+    def cannot_be_read(self, name: str, image: Image) -> bool:
+        """Tell whether no reading of a point is to be waited for."""
+        return cannot_be_read(name, self.points[name], image, self._confirm_within)
+
+    @property
+    def in_question(self) -> Collection[str]:
+        """The points that have changed, nobody knows yet by whom; they are to be left alone."""
+        return self._questions.wanted
 
     def settle(self, targets: Mapping[str, float | None]) -> Mapping[str, Problem | None]:
         """Return what is wrong with our writes by point, leaving out what is no longer wanted otherwise.
@@ -105,15 +112,13 @@ class Readback:
         `targets` is where the guard wants each point by now; None where it wants nothing.
         """
         for name, memory in self.points.items():
-            target = targets.get(name)
-            if memory.problem and (target is None or memory.shows(self._rules[name], target)):
-                memory.problem = None
+            memory.settle(self._rules[name], targets.get(name))
         return {name: memory.problem for name, memory in self.points.items()}
 
-    def observe(self, image: Image, *, restarted: bool = False) -> list[Finding]:
-        """Compare an image with what was written; call once in each cycle, before deciding.
+    def observe(self, image: Image, *, restarted: bool = False, patient: bool = False) -> list[Finding]:
+        """Compare an image with what was written, before deciding; call again where `unseen` was read.
 
-        `restarted`: the heartbeat's register was cleared, so the unit that holds it has started anew.
+        `restarted`: the heartbeat's register was cleared. Who is `patient` waits until the rest of a unit is read.
         """
         now = image.monotonic
         for memory in self.points.values():
@@ -124,27 +129,29 @@ class Readback:
         for name, memory in self.points.items():
             value = image.value_of(name)
             if not memory.is_new(value, now):
-                findings.extend(self._unread(name, value, image))
+                findings.extend(self._unread(name, image))
                 continue
             assert value.value is not None
             found = self._ours(name, value.value, image)
             since, unapplied = now - value.age - memory.looked_at, found is not None and self.pending(name)
             looks[name] = Look(value.value, found is None, since, memory.was_silent, unapplied)
             findings.extend(found or ())
-            memory.looked_at = now - value.age
+        self._questions.ask({name for name, look in looks.items() if look.changed and patient}, image)
+        looks = {name: look for name, look in looks.items() if name not in self.in_question}
         findings.extend(self._explain(looks, image))
         for name in looks:
-            self.points[name].forget_absence()
+            self.points[name].was_looked_at(now - image.value_of(name).age)
         findings.extend(self._ended(now))
         return findings
 
     def _listen(self, image: Image, restarted: bool) -> None:
         """Note how long each point's unit could not be heard, or could not hear us."""
-        now, fallback = image.monotonic, _is_set(image.value_of("plc_fallback"))
+        now, fallback = image.monotonic, image.value_of("plc_fallback").says_yes
+        beat_at = -math.inf if self._beat_at is None and HEARTBEAT in image.values else self._beat_at
         for name, memory in self.points.items():
-            memory.hear(now, answers=image.reaches(name), beat_at=self._beat_at)
+            memory.hear(now, answers=image.reaches(name), beat_at=beat_at)
             memory.fell_back |= fallback
-            memory.restarted |= restarted and self._same_unit(name, "heartbeat")
+            memory.restarted |= restarted and self._same_unit(name, HEARTBEAT)
 
     def _same_unit(self, name: str, other: str) -> bool:
         return self._units.get(name, "") == self._units.get(other, "")
@@ -154,8 +161,6 @@ class Readback:
             if memory.hand is not None and memory.held_until <= now:
                 memory.hand = None
                 yield Finding(name, Outcome.HAND_ENDED, None, memory.stands)
-
-    # what is ours
 
     def _ours(self, name: str, shown: float, image: Image) -> list[Finding] | None:
         """Return the findings where a reading shows what stood there or what we wrote; None where it does not."""
@@ -222,19 +227,17 @@ class Readback:
         memory.problem = Problem(text, minor=limited)
         return [Finding(name, Outcome.UNCONFIRMED, newest.value, shown, newest.source, text)]
 
-    def _unread(self, name: str, value: Value, image: Image) -> list[Finding]:
+    def _unread(self, name: str, image: Image) -> list[Finding]:
         """Judge a write to a point that cannot be read, although its unit answers; no reading will ever confirm it."""
         memory = self.points[name]
         late = memory.sent and image.monotonic - memory.sent[-1].at > self._confirm_within
-        if not late or value.quality is not Quality.MISSING or not image.reaches(name):
+        if not late or not self.cannot_be_read(name, image):
             return []
         newest = memory.sent[-1]
         text = f"{newest.value:g} was written to {name}, which cannot be read back: nobody sees whether it was taken"
         memory.settled(self._rules[name], memory.stands, newest.value)
         memory.problem = Problem(text, minor=True)
         return [Finding(name, Outcome.UNCONFIRMED, newest.value, None, newest.source, text)]
-
-    # what is not
 
     def _explain(self, looks: Mapping[str, Look], image: Image) -> Iterator[Finding]:
         """Say who changed what is not ours, and agree with it."""
@@ -275,7 +278,7 @@ class Readback:
         flag, own = image.value_of("plc_fallback"), self._same_unit(name, "plc_fallback")
         safe = matches(rule, shown, rule.safe)
         if memory.fell_back:
-            return safe or (own and _is_set(flag))
+            return safe or (own and flag.says_yes)
         if own and flag.quality is Quality.GOOD and flag.age <= image.value_of(name).age:
             return False  # the PLC itself says that it did not
         return safe and memory.absence > self._silence
@@ -292,7 +295,3 @@ class Readback:
             if rule.same(shown, sent[-1].value) and (swapped or outside):
                 return f"{name} shows {shown:g}, which was written to {other}: is the register map right?"
         return ""
-
-
-def _is_set(value: Value) -> bool:
-    return value.quality is Quality.GOOD and value.value is not None and value.value >= 0.5

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from igrow.core.errors import IgrowError
-from igrow.edge.bus.errors import BusError
+from igrow.edge.bus.errors import BusError, RefusedError
 from igrow.edge.guard.state import Write
 
 HEARTBEAT = "heartbeat"
@@ -75,7 +75,7 @@ class GuardedWriter:
         try:
             await self._plc.write(HEARTBEAT, float(self._beat))
         except BusError as error:
-            if error.sent:
+            if error.sent or isinstance(error, RefusedError):  # some devices do what they refuse
                 self._unsure.append(self._beat)
             return error
         self._sure = self._beat

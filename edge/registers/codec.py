@@ -24,6 +24,10 @@ REGISTER_TYPES = tuple(_FORMATS)
 """The data types that fill whole registers."""
 
 
+_LEAST_NORMAL = {DataType.FLOAT32: 2.0**-126, DataType.FLOAT64: 2.0**-1022}
+"""The smallest positive numbers of full precision (IEEE 754-2019, table 3.5)."""
+
+
 class NotEncodableError(IgrowError):
     """The value does not fit the register: nothing was sent, and sending it again would not help."""
 
@@ -59,7 +63,9 @@ def decode(point: Point, content: Sequence[int]) -> float | None:
     """Return a point's value in its unit, or None where the device says that it has none.
 
     `content` is what the device answered for the point's addresses: registers, or bits as 0 and 1.
-    A floating-point register that holds no finite number counts as "no value".
+    A floating-point register that holds no finite number counts as "no value", and so does one that holds a number too
+    small to be normal: no sensor measures that, but most round numbers look so when a device has changed the order of
+    its words.
     """
     if point.type is DataType.BOOL:
         raw: int | float = int(content[0] != 0)
@@ -67,7 +73,7 @@ def decode(point: Point, content: Sequence[int]) -> float | None:
         raw = (content[0] >> point.bit) & 1
     else:
         raw = decode_raw(content, point.type, point.order)
-        if raw == point.no_value or not math.isfinite(raw):
+        if raw == point.no_value or not math.isfinite(raw) or 0.0 < abs(raw) < _LEAST_NORMAL.get(point.type, 0.0):
             return None
     return raw * point.scale + point.offset
 
@@ -85,7 +91,9 @@ def encode(point: Point, value: float) -> tuple[int, ...]:
         if round(raw) not in (0, 1) or point.type is DataType.BIT:
             raise NotEncodableError(f"{point.name}: {value:g} does not fit one bit that can be written alone")
         return (round(raw),)
-    number: int | float = raw if point.type in (DataType.FLOAT32, DataType.FLOAT64) else round(raw)
+    number: int | float = raw if point.type in _LEAST_NORMAL else round(raw)
+    if abs(number) < _LEAST_NORMAL.get(point.type, 0.0):
+        number = 0.0  # what is smaller would read as "no value"
     if number == point.no_value:
         raise NotEncodableError(f"{point.name}: {value:g} would read as 'no value'")
     try:

@@ -146,6 +146,13 @@ class Bundles:
             state.last_verdict = f"{bundle.label} adopted: {reason}"
         self._tidy()
 
+    def settle(self, identity: str) -> None:
+        """Let a bundle rule without probation, and no other one wait for its place."""
+        with self.lock:
+            if self.state.active == identity:
+                self.state.candidate, self.state.watch_since = None, None
+        self._tidy()
+
     def go_back(self) -> None:
         """Put the predecessor into force again."""
         with self.lock:

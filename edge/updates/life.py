@@ -13,6 +13,7 @@ from igrow.edge.updates.rules import Graphs, UpdateRules
 from igrow.edge.updates.shadow import Comparison, Predictor
 from igrow.edge.updates.signed_source import Fetched, RefusedError, SignedSource, UpdateError
 from igrow.edge.updates.telling import Teller, Verdict
+from igrow.edge.updates.wishes import Wishes
 
 HOUR = 3600.0
 FIRST_LOOK = 25 * HOUR
@@ -46,6 +47,7 @@ class BundleLife:
         self._log_folder = log_folder
         self._teller = teller
         self._rules = rules
+        self.wishes = Wishes()
         self._next_check = self._next_errors = self._next_watch = 0.0
         self.last_refusal = ""
 
@@ -60,9 +62,12 @@ class BundleLife:
     def is_due(self, time: float) -> bool:
         """Tell whether there is work at this time (plant's clock, seconds since 1970 UTC)."""
         state = self._bundles.state
-        if state.attempt is not None or self._shadow_is_over(time) or self._look_is_due(time):
+        if state.attempt is not None or self._is_to_go_back() or (self.is_pinned and self._has_plans()):
             return True
-        if state.candidate is None and state.watch_since is None and self._source and time >= self._next_check:
+        if self._shadow_is_over(time) or self._look_is_due(time):
+            return True
+        waits = state.candidate is None and state.watch_since is None and not self.is_pinned
+        if waits and self._source and time >= self._next_check:
             return True
         return state.active is not None and time >= self._next_errors
 
@@ -72,7 +77,11 @@ class BundleLife:
         try:
             if state.attempt is not None:
                 self._reject_what_went_down(time, state.attempt)
-            if state.candidate is not None:
+            if self._is_to_go_back():
+                self._take_back(time)
+            if self.is_pinned:
+                self._bundles.settle(self.wishes.pinned or "")
+            elif state.candidate is not None:
                 if self._shadow_is_over(time):
                     self._judge_shadow(time)
             elif state.watch_since is not None:
@@ -86,6 +95,25 @@ class BundleLife:
                 self._compute_live_error(time)
         finally:
             self._bundles.save()
+
+    @property
+    def is_pinned(self) -> bool:
+        """The operator wants the bundle in force to stay."""
+        return self.wishes.pinned is not None and self.wishes.pinned == self._bundles.state.active
+
+    def _has_plans(self) -> bool:
+        """Tell whether another bundle waits to rule, or the one in force is on probation."""
+        return self._bundles.state.candidate is not None or self._bundles.state.watch_since is not None
+
+    def _is_to_go_back(self) -> bool:
+        """Tell whether the operator wants the earlier bundle; a wish that was fulfilled is over."""
+        state = self._bundles.state
+        return self.wishes.taken_back is not None and self.wishes.taken_back == state.active and bool(state.previous)
+
+    def _take_back(self, time: float) -> None:
+        active = self._bundles.active
+        if active is not None:
+            self._go_back(time, active, "taken back by the operator", None, {})
 
     def _shadow_is_over(self, time: float) -> bool:
         state = self._bundles.state

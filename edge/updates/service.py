@@ -18,6 +18,7 @@ from igrow.edge.updates.shadow import Predictor
 from igrow.edge.updates.shelf import Shelf
 from igrow.edge.updates.signed_source import SignedSource, UpdateError
 from igrow.edge.updates.telling import Teller
+from igrow.edge.updates.wishes import Wishes, read_wishes
 from igrow.edge.updates.worsening import Worsening, find_worsening, worsening_sentence
 
 LATE_AFTER = 1800.0
@@ -59,6 +60,10 @@ class BundleUpdates:
         self._aside = HandOff("updates", late_after=LATE_AFTER)
         self._looked_at: tuple[str, float] | None = None
         self._found: tuple[Worsening, ...] = ()
+        self._folder = folder
+        # The look at the operator's wishes must not wait behind a share that holds the updates.
+        self._wishes = HandOff("the operator's wishes")
+        self._look: Future[Wishes] | None = None
         self._begun = False
         self._begin_again = 0.0
         self._task: Future[None] | None = self._aside.post(self._begin)
@@ -88,6 +93,7 @@ class BundleUpdates:
             self._teller.event(time, "update_failed", {"reason": reason})
             self._begin_again = 0.0 if time is None else time + RETRY
         self._task = None
+        self._hear_wishes()
         if time is None:
             return
         self._life.keep_up(time)
@@ -97,6 +103,14 @@ class BundleUpdates:
                 self._task = self._aside.post(self._begin)
         elif self._life.is_due(time):
             self._task = self._aside.post(lambda: self._work(time))
+
+    def _hear_wishes(self) -> None:
+        """Take over what the operator asked for, when it has been read, and look again."""
+        if self._look is not None and self._look.done():
+            self._life.wishes, self._look = self._look.result(), None
+        if self._look is None:
+            with contextlib.suppress(LateError):
+                self._look = self._wishes.post(lambda: read_wishes(self._folder))
 
     async def wait(self, timeout: float) -> None:  # noqa: ASYNC109  # the signature is igrow.edge.ports.UpdateService's
         """Return when not busy, or after `timeout` seconds of wall clock."""
@@ -114,6 +128,7 @@ class BundleUpdates:
                 "created": active.manifest.created.isoformat() if active else None,
                 "variant": active.manifest.variant if active else None,
                 "effects": [effect.name for effect in active.manifest.effects] if active else [],
+                "pinned": self._life.is_pinned,
                 "previous": state.previous,
                 "candidate": candidate.label if candidate else None,
                 "shadow_until": state.candidate_since + HOUR * self._rules.shadow_hours if candidate else None,

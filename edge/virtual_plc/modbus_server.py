@@ -12,7 +12,7 @@ import struct
 from collections.abc import Mapping, Sequence
 from typing import Protocol, cast
 
-from igrow.edge.bus.pymodbus_link import open_serial_port
+from igrow.edge.bus.serial_port import open_serial_port
 from igrow.edge.hand_off import HandOff
 from igrow.edge.registers.model import Function, Parity
 from igrow.edge.virtual_plc.memory import AnswerWithExceptionError

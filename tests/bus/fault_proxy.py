@@ -98,6 +98,8 @@ class FaultProxy:
         """What was done, answer by answer."""
         self.slow = 0.0
         """Seconds that each answer takes, one after the other."""
+        self.refuses_truly = False
+        """A write that is answered with an exception was not done; else the exception takes the place of its echo."""
         self.storm = 0
         """How many of the next connections are hung up on at once."""
         self.old_answers: list[Frame] = []
@@ -176,6 +178,9 @@ class _Front(asyncio.Protocol):
                 return
             fault = self.proxy.next_fault()
             if fault is Fault.NO_REQUEST:
+                continue
+            if fault is Fault.EXCEPTION and self.proxy.refuses_truly and frame.pdu[0] in (5, 6, 15, 16):
+                self.send(self.spoil(frame, fault).to_bytes())
                 continue
             raw = frame.to_bytes()
             if fault is Fault.GARBLED_REQUEST:

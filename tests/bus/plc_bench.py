@@ -9,8 +9,10 @@ from typing import Any
 
 from igrow.edge.bus.modbus_bus import ModbusBus
 from igrow.edge.bus.plc import RegisterPlc
+from igrow.edge.clock import SystemClock, TrustedTime
 from igrow.edge.cycle import ControlCycle
 from igrow.edge.guard import GuardedWriter, GuardRules, PointRule, Readback
+from igrow.edge.image import Image
 from igrow.edge.journal import Journal
 from igrow.edge.registers.codec import decode
 from igrow.edge.registers.loading import parse_register_map
@@ -96,23 +98,25 @@ class RecordingUnit(DeviceMemory):
                     self.set_value(name, self.makes[name](value))
 
 
-class LoopClock:
-    """The simulated loop's time, with a date that may be wrong."""
-
-    doubt = ""
+class LoopClock(SystemClock):
+    """The simulated loop's time, with a date that may be wrong by `ahead` seconds."""
 
     def __init__(self) -> None:
-        self.monotonic = asyncio.get_running_loop().time
-        self.ahead: float | None = 0.0
+        self.ahead = 0.0
+        self.loop = asyncio.get_running_loop()
+        trusted = TrustedTime(synchronised=lambda: False)
+        super().__init__(self.loop.time, lambda: 1.8e9 + self.loop.time() + self.ahead, trusted)
 
-    def true_time(self) -> float | None:
-        return None if self.ahead is None else 1.8e9 + self.monotonic() + self.ahead
 
-    def recall(self, known: float | None) -> None:
-        pass
+@dataclass
+class Notes:
+    """Keeps the newest of what a restart must not forget."""
 
-    def witness(self, other: float) -> None:
-        pass
+    content: Mapping[str, object] = field(default_factory=dict)
+    at: float = 0.0
+
+    def keep(self, image: Image, content: Mapping[str, object]) -> None:
+        self.content, self.at = content, image.monotonic
 
 
 @dataclass
@@ -123,9 +127,12 @@ class PlcBench:
     units: Mapping[str, RecordingUnit]
     proxies: Mapping[str, FaultProxy]
     servers: Sequence[ModbusServer]
-    plc: RegisterPlc
     clock: LoopClock
     store: MemoryStore
+    notes: Notes
+    build: Callable[[bool], tuple[RegisterPlc, ControlCycle]]
+    """Makes what a process has; tells it whether there was one before."""
+    plc: RegisterPlc
     cycle: ControlCycle
     running: list[asyncio.Future[object]] = field(default_factory=list)
 
@@ -149,6 +156,13 @@ class PlcBench:
         report = await self.cycle.stop(STOP_SECONDS - took)
         return report, asyncio.get_running_loop().time() - begin
 
+    async def restart(self, respect_hand: float) -> None:
+        """End the process without a word, and begin another one that knows what the old one noted."""
+        await self.plc.close()
+        self.plc, self.cycle = self.build(True)
+        agree = self.clock.monotonic() - self.notes.at <= respect_hand
+        self.cycle.recall(self.notes.content, 0.0, same=self.cycle.readback.points, agree=agree)
+
     async def close(self) -> None:
         await self.plc.close()
         for server in self.servers:
@@ -166,35 +180,44 @@ async def make_plc_bench(
     rate: float = 0.0,
     timeout: float = TIMEOUT,  # noqa: ASYNC109 - the bus'
     respect_hand: float = 0.0,
+    store: MemoryStore | None = None,
 ) -> PlcBench:
     """Put it together; the buses are being connected when this returns."""
     points = register_map(two_buses=two_buses)
     units = {name: RecordingUnit(points, name) for name in points.devices}
     clock = LoopClock()
-    proxies, buses, servers = {}, {}, []
+    proxies, settings, servers = {}, {}, []
     for number, name in enumerate(("first", "second") if two_buses else ("first",)):
         mine = [d for d in points.devices.values() if d.bus == name]
         server = ModbusServer({device.device_id: units[device.name] for device in mine})
         behind = await server.listen("127.0.0.1", 0, rtu=rtu)
         proxy = FaultProxy(behind, rtu=rtu, seed=seed + 1_000_000 * number, rate=rate, timeout=timeout)
         transport, gap = (Transport.RTU_OVER_TCP, 0.03) if rtu else (Transport.TCP, 0.0)
-        settings = BusSettings(name, transport, "127.0.0.1", await proxy.listen(), timeout=timeout, gap=gap)
-        proxies[name], buses[name] = proxy, ModbusBus(settings, monotonic=clock.monotonic)
+        settings[name] = BusSettings(name, transport, "127.0.0.1", await proxy.listen(), timeout=timeout, gap=gap)
+        proxies[name] = proxy
         servers.append(server)
-    plc = RegisterPlc(points, monotonic=clock.monotonic, buses=buses)
-    store = MemoryStore()
+    store, notes = store or MemoryStore(), Notes()
     devices = {name: point.device for name, point in points.points.items()}
-    cycle = ControlCycle(
-        plc,
-        clock,
-        ImageBuilder({name: SensorRule(-1e6, 1e6, stale_after=30.0) for name in points.points}, units=devices),
-        [*sources, HandsOff(SAFE)],
-        GuardRules(RULES, ()),
-        Readback(RULES, confirm_within=60.0, respect_hand=respect_hand, silence=3 * INTERVAL, units=devices),
-        GuardedWriter(plc, has_heartbeat=True),
-        Journal(store),
-        setpoints=tuple(RULES),
-        respect_hand=respect_hand,
-    )
-    plc.start()
-    return PlcBench(points, units, proxies, servers, plc, clock, store, cycle)
+
+    def build(others_asked: bool) -> tuple[RegisterPlc, ControlCycle]:
+        buses = {
+            name: ModbusBus(one, monotonic=clock.monotonic, others_asked=others_asked) for name, one in settings.items()
+        }
+        plc = RegisterPlc(points, monotonic=clock.monotonic, buses=buses)
+        cycle = ControlCycle(
+            plc,
+            clock,
+            ImageBuilder({name: SensorRule(-1e6, 1e6, stale_after=30.0) for name in points.points}, units=devices),
+            [*sources, HandsOff(SAFE)],
+            GuardRules(RULES, ()),
+            Readback(RULES, confirm_within=60.0, respect_hand=respect_hand, silence=3 * INTERVAL, units=devices),
+            GuardedWriter(plc, has_heartbeat=True),
+            Journal(store),
+            setpoints=tuple(RULES),
+            respect_hand=respect_hand,
+            keep=notes.keep,
+        )
+        plc.start()
+        return plc, cycle
+
+    return PlcBench(points, units, proxies, servers, clock, store, notes, build, *build(False))

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from igrow.edge.configuration import load_configuration
-from igrow.edge.cycle import CycleResult
+from igrow.edge.cycle_result import CycleResult
 from igrow.edge.daemon import Daemon
 from igrow.edge.ports import ActiveBundle, PlanningService
 from igrow.edge.registers.loading import load_register_map

@@ -2,6 +2,8 @@
 
 from datetime import UTC, datetime
 
+import pytest
+
 from igrow.edge.clock import PlcClock, SystemClock, TrustedTime
 
 NOW = datetime(2026, 3, 1, tzinfo=UTC).timestamp()
@@ -51,6 +53,40 @@ def test_small_corrections_of_a_time_service_cost_no_trust():
     for _ in range(100):
         machine.wall += 0.5
         assert machine.run(10.0) is not None
+
+
+@pytest.mark.parametrize("pace", [0.0, 0.3, -1.0, 5.0])
+def test_a_clock_that_stands_still_or_runs_at_a_pace_of_its_own_is_not_trusted(pace):
+    machine = Machine(NOW)
+    machine.run(10.0)
+    for _ in range(3):
+        machine.wall += 10.0 * (pace - 1.0)
+        machine.run(10.0)
+    assert "does not run evenly" in machine.clock.doubt
+    for _ in range(100):
+        machine.wall += 10.0 * (pace - 1.0)
+        assert machine.run(10.0) is None
+    for _ in range(7):
+        machine.run(10.0)
+    assert machine.clock.doubt == ""
+
+
+@pytest.mark.parametrize("step", [-90.0, -3.0, 3.0, 90.0])
+def test_a_step_of_a_time_service_costs_no_trust(step):
+    machine = Machine(NOW)
+    machine.run(10.0)
+    machine.wall += step
+    for _ in range(20):
+        assert machine.run(1.0) is not None
+
+
+def test_readings_in_quick_succession_say_nothing_of_the_pace():
+    machine = Machine(NOW)
+    for _ in range(100):
+        machine.wall += 0.01  # the process was set aside between reading one clock and the other
+        machine.run(0.001)
+        machine.wall -= 0.01
+        assert machine.run(0.001) is not None
 
 
 def test_a_year_far_in_the_future_is_not_trusted():

@@ -5,8 +5,11 @@ from dataclasses import replace
 
 import pytest
 
-from igrow.edge.bus.errors import UnitRestingError
+from igrow.edge.bus.errors import NoAnswerError, RefusedError, UnitRestingError
+from igrow.edge.bus.plc import Reading
 from igrow.edge.guard import Bound, Interlock
+from igrow.edge.guard.memory import note
+from igrow.edge.guard.point_memory import PointMemory, Sent
 from tests.control.control_fakes import FixedSource
 from tests.control.stubborn_plc import RULES, SAFE, make_stubborn_bench
 
@@ -335,6 +338,22 @@ async def test_a_setpoint_that_can_only_be_written_is_written_once_and_said_so()
     assert bench.plc.values["heating_setpoint"] == 19.0
 
 
+async def test_a_setpoint_that_is_seldom_read_is_looked_at_after_a_silence_before_it_is_called_unreadable():
+    """The write was lost in the outage; it is sent again, however seldom the point is read."""
+    bench = bench_of()
+    bench.plc.polls = {"irrigation_on": 300.0}
+    bench.plc.ignores = {"irrigation_on"}
+    await bench.run(2)
+    assert bench.plc.values["irrigation_on"] == SAFE["irrigation_on"]
+    bench.plc.ignores = set()
+    bench.plc.silent = True
+    await bench.run(121)
+    bench.plc.silent = False
+    await bench.run(40)
+    assert bench.plc.values["irrigation_on"] == WISH["irrigation_on"]
+    assert not bench.alarms
+
+
 async def test_setpoints_that_are_seldom_read_are_read_before_they_are_written():
     """A hand made since the last reading would be lost otherwise."""
     bench = bench_of()
@@ -468,3 +487,153 @@ async def test_the_alarm_of_a_write_that_the_bus_did_not_carry_ends_when_nobody_
     bench.plc.values |= WISH
     await bench.run(2)
     assert "bus heating_setpoint" not in bench.alarms
+
+
+# what a line that loses answers makes of it
+
+
+class Refusing:
+    """A PLC that does what it is told, and says that it did not."""
+
+    def __init__(self, plc, point):
+        self.write, self.point = plc.write, point
+
+    async def __call__(self, name, value):
+        await self.write(name, value)
+        if name == self.point:
+            raise RefusedError(f"{name}: refused", 4)
+
+
+@pytest.mark.parametrize("point", ["heating_setpoint", "heartbeat"])
+async def test_a_write_that_was_refused_and_done_all_the_same_is_no_hand_and_no_restart(point):
+    bench = bench_of()
+    await bench.run(3)
+    write, bench.plc.write = bench.plc.write, Refusing(bench.plc, point)
+    bench.cycle.sources[0].setpoints["heating_setpoint"] = 24.0
+    await bench.run(1)
+    bench.plc.write = write
+    await bench.run(5)
+    assert bench.plc.values["heating_setpoint"] == 24.0
+    assert not bench.events("changed_by_hand")
+    assert not bench.events("plc_restarted")
+
+
+async def test_a_write_that_was_refused_and_done_all_the_same_is_remembered_over_a_restart():
+    bench = bench_of()
+    await bench.run(3)
+    bench.plc.write = Refusing(bench.plc, "heating_setpoint")
+    bench.cycle.sources[0].setpoints["heating_setpoint"] = 24.0
+    await bench.run(1)
+    bench.cycle._keep(bench.result.image, note(bench.cycle.state, bench.cycle.readback))  # as the next cycle does
+    bench.restart()
+    await bench.run(2)
+    assert not bench.events("changed_by_hand")
+
+
+def test_a_write_that_was_lost_behind_one_that_was_done_is_no_limit_of_the_device():
+    rule, first, second = RULES["irrigation_on"], Sent(0.1, 1.0), Sent(0.5, 2.0)
+    memory = PointMemory(stands=0.3, sent=[first, second])
+    memory.applied(first, 0.1, 3.0)
+    assert not memory.is_limited(rule, second.value)
+    memory.move_to(0.2, 4.0)
+    assert memory.is_limited(rule, second.value)
+
+
+async def test_what_stands_outside_the_limits_is_never_left_there_for_a_limit_of_the_device():
+    """Between what stood and what was written, as after a start of the PLC, and below what the house can bear."""
+    bench = bench_of()
+    await bench.run(3)
+    bench.plc.values["heating_setpoint"] = 0.0
+    bench.plc.ramps = {"heating_setpoint": 0.1}
+    bench.plc.takes = {}
+    bench.cycle.readback.points["heating_setpoint"].stands = 0.0
+    bench.cycle.readback.points["heating_setpoint"].answers = None
+    await bench.run(1)
+    bench.plc._aims.clear()
+    bench.plc.values["heating_setpoint"] = 6.0
+    bench.plc.ramps = {}
+    await bench.run(20)
+    assert bench.plc.values["heating_setpoint"] == WISH["heating_setpoint"]
+
+
+async def test_a_plc_that_has_started_anew_is_not_judged_by_the_part_of_it_that_answers():
+    bench = bench_of()
+    await bench.run(3)
+    read, lost = bench.plc.read, {"co2_setpoint", "lamp_on", "irrigation_on", "heartbeat"}
+
+    async def half(names=None):
+        readings = dict(await read(names))
+        now = bench.clock.monotonic()
+        return readings | {name: Reading(None, NoAnswerError("lost"), now) for name in lost & readings.keys()}
+
+    bench.plc.read = half
+    bench.plc.power_up(dict.fromkeys(WISH, 0.0))
+    await bench.run(1)
+    assert not bench.events("changed_by_hand")
+    bench.plc.read = read
+    await bench.run(3)
+    assert not bench.events("changed_by_hand")
+    assert {event["point"] for event in bench.events("plc_restarted")} >= {"heating_setpoint", "co2_setpoint"}
+    assert {name: bench.plc.values[name] for name in WISH} == WISH
+
+
+async def test_a_hand_is_found_although_the_rest_of_its_unit_does_not_answer():
+    """The judgement waits, and not for ever; meanwhile the point is left alone."""
+    bench = bench_of()
+    await bench.run(3)
+    read = bench.plc.read
+
+    async def half(names=None):
+        readings = dict(await read(names))
+        now = bench.clock.monotonic()
+        return readings | {n: Reading(None, NoAnswerError("lost"), now) for n in {"lamp_on"} & readings.keys()}
+
+    bench.plc.read = half
+    bench.plc.by_hand("heating_setpoint", 16.0)
+    bench.cycle.sources[0].setpoints["heating_setpoint"] = 25.0
+    await bench.run(12)
+    assert bench.plc.values["heating_setpoint"] == 16.0
+    assert [event["shown"] for event in bench.events("changed_by_hand")] == [16.0]
+
+
+async def test_a_fallback_before_the_first_heartbeat_of_a_process_is_no_hand():
+    bench = bench_of()
+    await bench.run(3)
+    bench.pass_time(20.0)
+    bench.restart()
+    write = bench.plc.write
+
+    async def deaf_to_the_heart(name, value):
+        if name == "heartbeat":
+            raise UnitRestingError("rests")
+        await write(name, value)
+
+    bench.plc.write = deaf_to_the_heart
+    await bench.run(5)
+    bench.plc.values |= SAFE
+    await bench.run(2)
+    assert not bench.events("changed_by_hand")
+
+
+async def test_a_process_writes_to_no_point_that_it_has_not_read_yet():
+    """A hand may stand there, made while nobody was there; the others are written."""
+    bench = bench_of()
+    await bench.run(3)
+    bench.restart()
+    read = bench.plc.read
+
+    async def but_one(names=None):
+        readings = dict(await read(names))
+        now = bench.clock.monotonic()
+        lost = {"heating_setpoint"} & readings.keys()
+        return readings | {name: Reading(None, NoAnswerError("lost"), now) for name in lost}
+
+    bench.plc.by_hand("heating_setpoint", 16.0)
+    bench.cycle.sources[0].setpoints |= {"heating_setpoint": 25.0, "co2_setpoint": 800.0}
+    bench.plc.read = but_one
+    await bench.run(4)
+    assert bench.plc.values["heating_setpoint"] == 16.0
+    assert bench.plc.values["co2_setpoint"] == 800.0
+    bench.plc.read = read
+    await bench.run(2)
+    assert bench.plc.values["heating_setpoint"] == 16.0

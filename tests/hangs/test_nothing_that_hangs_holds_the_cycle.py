@@ -269,7 +269,7 @@ async def test_a_serial_port_whose_driver_hangs(bench: Bench, monkeypatch: pytes
             answers.wait()
             raise OSError(5, "Input/output error")
 
-    monkeypatch.setattr("igrow.edge.bus.pymodbus_link.SerialTransport", HangingTransport)
+    monkeypatch.setattr("igrow.edge.bus.serial_port.SerialTransport", HangingTransport)
     try:
         async with bench.running():
             await bench.controls()

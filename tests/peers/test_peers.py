@@ -205,9 +205,6 @@ async def test_libmodbus_is_read_and_written(transport: Transport, tmp_path: Pat
         assert await bus.read(ReadRequest(17, Function.INPUT, 0x108, 1), Priority.CONTROL) == (10,)
 
 
-@pytest.mark.xfail(
-    reason="since the bus keeps account of owed answers it waits longer than this test, which is to be written anew"
-)
 @LINES
 async def test_libmodbus_misbehaviour_is_seen_and_costs_one_answer(transport: Transport, tmp_path: Path) -> None:
     async with libmodbus_bus(transport, tmp_path) as bus:
@@ -272,9 +269,6 @@ async def test_modbus_serial_is_read_and_written(transport: Transport, tmp_path:
         assert await bus.read(ReadRequest(1, Function.COIL, 2, 3), Priority.CONTROL) == (0, 1, 0)
 
 
-@pytest.mark.xfail(
-    reason="since the bus keeps account of owed answers it waits longer than this test, which is to be written anew"
-)
 @LINES
 async def test_modbus_serial_refusals_and_late_answers(transport: Transport, tmp_path: Path) -> None:
     async with modbus_serial(transport, tmp_path) as bus:

@@ -74,7 +74,7 @@ def test_one_beyond_the_type_is_refused(data_type: DataType, order: ByteOrder) -
             encode_raw(value, data_type, order)
 
 
-@given(ORDERS, st.floats(width=32, allow_nan=False, allow_infinity=False))
+@given(ORDERS, st.floats(width=32, allow_nan=False, allow_infinity=False, allow_subnormal=False))
 def test_a_float32_travels_exactly_in_every_order(order: ByteOrder, value: float) -> None:
     assert decode(point(DataType.FLOAT32, order=order), encode(point(DataType.FLOAT32, order=order), value)) == value
 
@@ -97,6 +97,14 @@ def test_what_a_float32_cannot_hold_is_refused(value: float) -> None:
 def test_a_value_that_would_read_as_no_value_is_refused() -> None:
     with pytest.raises(NotEncodableError, match="no value"):
         encode(point(DataType.INT16, no_value=-32768), -32768.0)
+
+
+@pytest.mark.parametrize("value", [18.0, 20.25, 0.5, 612.0, -7.75])
+def test_a_number_whose_words_a_device_has_swapped_reads_as_no_value(value: float) -> None:
+    swapped = struct.unpack(">HH", struct.pack(">f", value))[::-1]
+    assert decode(point(DataType.FLOAT32), swapped) is None
+    assert decode(point(DataType.FLOAT32), (0, 0)) == 0.0
+    assert encode(point(DataType.FLOAT32), 1e-41) == (0, 0)
 
 
 def test_the_no_value_content_and_nan_read_as_none() -> None:

@@ -126,6 +126,6 @@ class Gateway:
 
 
 def wait_for(updates: BundleUpdates) -> None:
-    """Wait for the thread; a lock-step plant does the same."""
-    while updates.busy:
+    """Wait for the threads; a lock-step plant does the same for the first."""
+    while updates.busy or (updates._look is not None and not updates._look.done()):
         time.sleep(0.0005)
