@@ -295,7 +295,7 @@ class Planning:
                 raise SettingError(f"optimise has {name}: {yaml_schema.nearest(name, SETPOINTS)}", "optimise", position)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Site:
     """One greenhouse and all that the two sides must know of it."""
 
@@ -316,6 +316,9 @@ class Site:
     prices: Prices = setting(help="prices", default_factory=Prices)
     limits: Limits = setting(help="limits of the setpoints", default_factory=Limits)
     planning: Planning = setting(help="planning", default_factory=Planning)
+
+    def __repr__(self) -> str:
+        return f"Site({self.name!r}, {self.latitude:g}, {self.longitude:g}, {self.time_zone})"
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z0-9][a-z0-9-]{0,62}", self.name):

@@ -36,7 +36,7 @@ class TelemetryError(IgrowError):
     """A telemetry table or file that breaks the format."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Telemetry:
     """A table of quantities over time, regular or not, gaps allowed; its arrays cannot be written to.
 
@@ -47,6 +47,12 @@ class Telemetry:
     """UTC, datetime64[s], strictly increasing, shape (n,)."""
     columns: Mapping[str, Values]
     """Name of a quantity -> values in the unit of the registry, shape (n,), NaN where missing."""
+
+    def __repr__(self) -> str:
+        names = ", ".join(self.columns)
+        if len(self.time) == 0:
+            return f"Telemetry(empty: {names})"
+        return f"Telemetry({self.time[0]} to {self.time[-1]}, {len(self.time)} rows: {names})"
 
     def __post_init__(self) -> None:
         time = np.array(self.time, dtype="datetime64[s]")

@@ -15,7 +15,11 @@ command -v dpkg-deb >/dev/null || { echo "error: dpkg-deb is not here: the packa
 
 mkdir -p "$TREE/DEBIAN" "$TREE/opt/igrow/wheels" "$TREE/opt/igrow/docs" "$TREE/opt/igrow/config" \
     "$TREE/lib/systemd/system" "$TREE/usr/lib/sysusers.d" "$TREE/usr/lib/tmpfiles.d" "$TREE/usr/bin"
-"$PYTHON" -m pip wheel --quiet --disable-pip-version-check --wheel-dir "$TREE/opt/igrow/wheels" "$SOURCE[edge]"
+# Of a build before this one nothing may get into the package.
+rm -rf "$SOURCE/build"
+"$PYTHON" -m venv "$WORK/venv"
+"$WORK/venv/bin/pip" wheel --quiet --disable-pip-version-check --wheel-dir "$TREE/opt/igrow/wheels" "$SOURCE[edge]"
+rm -rf "$SOURCE/build"
 version=$(basename "$TREE"/opt/igrow/wheels/igrow-*.whl | cut -d- -f2)
 # To Debian a development version comes before the release that it leads to.
 version=$(echo "$version" | sed 's/\.dev/~dev/')

@@ -39,7 +39,7 @@ class Golden:
     outputs: Mapping[str, NDArray[Any]]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Bundle:
     """A bundle that was read and whose checksums agree."""
 
@@ -47,6 +47,9 @@ class Bundle:
     manifest: Manifest
     identity: str
     """The first 16 hexadecimal digits of the manifest's SHA-256: equal if and only if all content is."""
+
+    def __repr__(self) -> str:
+        return f"Bundle({self.label!r}, {self.manifest.variant}, {str(self.folder)!r})"
 
     def graph(self, name: str) -> Path:
         """Return the file of one of `GRAPHS`; raises BundleError where the bundle has none."""

@@ -44,3 +44,16 @@ def test_the_interface_of_a_notebook_is_whole() -> None:
     assert {"read_log", "calibrate", "compare", "diagnose", "export", "publish", "__version__"} <= set(
         dir(igrow.trainer)
     )
+
+
+def test_what_a_notebook_shows_fits_on_a_line() -> None:
+    from igrow.core.bundle import default_bundle_folder, read_bundle
+    from igrow.trainer import FittedModel, prepare_log
+    from tests.virtual_log import SITE, virtual_log
+
+    table = virtual_log(2, seed=1, step=900.0)
+    model = FittedModel.described(SITE)
+    for shown in (read_bundle(default_bundle_folder()), table.only(["air_temperature"]), SITE, model, model.posterior):
+        assert repr(shown).startswith(f"{type(shown).__name__}(")
+        assert len(repr(shown)) < 200
+    assert len(repr(prepare_log(table, SITE))) < 120

@@ -11,7 +11,7 @@ import numpy as np
 from igrow.core.arrays import Floats
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Gaussian:
     """What is known of p parameters; the posterior of one fit is the prior of the next."""
 
@@ -20,6 +20,9 @@ class Gaussian:
     """In each parameter's unit, (p,)."""
     covariance: Floats
     """Positive definite, (p, p)."""
+
+    def __repr__(self) -> str:
+        return f"Gaussian({len(self.names)} parameters)"
 
     @classmethod
     def independent(cls, mean: Mapping[str, float], deviation: Mapping[str, float]) -> Gaussian:
