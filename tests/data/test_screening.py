@@ -3,6 +3,7 @@ from __future__ import annotations
 import numpy as np
 
 from igrow.core.telemetry import Telemetry
+from igrow.trainer.data import prepare_log
 from igrow.trainer.data.screening import screen
 
 TIME = np.datetime64("2020-01-01T00:00:00", "s") + np.arange(576) * np.timedelta64(300, "s")
@@ -79,3 +80,13 @@ def test_a_needed_sensor_that_stood_still_for_most_of_the_log_is_a_fault_of_the_
     (fault,) = screen(Telemetry(TIME, {"air_temperature": air, "outdoor_temperature": wavy(5.0, 3.0)})).faults
     assert (fault.kind, fault.quantity) == ("sensor", "air_temperature")
     assert "the sensor of air_temperature does not work, 65 % of its readings were set aside (stuck)" in str(fault)
+
+
+def test_a_part_of_a_log_has_the_stretches_that_lie_in_it() -> None:
+    air = wavy(20.0, 2.0)
+    air[40] += 30.0
+    air[400] += 30.0
+    log = prepare_log(Telemetry(TIME, {"air_temperature": air, "outdoor_temperature": wavy(5.0, 3.0)}))
+    assert len(log.screened) == 2
+    assert [one.start for one in log.select(TIME[200]).screened] == [TIME[400]]
+    assert [one.start for one in log.select(None, TIME[200]).screened] == [TIME[40]]

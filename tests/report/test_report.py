@@ -20,7 +20,7 @@ from igrow.trainer.language import LANGUAGES, speak
 from igrow.trainer.language.units import written
 from igrow.trainer.report import render_report, sentences, write_diagnosis
 from igrow.trainer.report.page import error_rows
-from igrow.trainer.report.worth import worth
+from igrow.trainer.report.worth import Worth, worth
 
 
 def with_errors(result: Diagnosis, quantity: str, **stages: float) -> Diagnosis:
@@ -54,7 +54,7 @@ def test_where_correction_makes_it_worse_it_is_said(leak: Diagnosis) -> None:
     assert "CO2: correction makes predictions a day ahead worse: off by 31 ppm, before by 20 ppm." in said
     half = with_errors(leak, "air_co2", deployed=20.0, recalibrated=15.0, corrected=18.0)
     said = list(sentences.gains(half, speak("en")))
-    assert "The recalibrated model alone would be better there: off by 15 ppm." in said
+    assert "CO2: recalibration alone would be better, off by 15 ppm." in said
 
 
 @pytest.mark.parametrize("verdict", ["nothing", "named", "ambiguous", "unexplained"])
@@ -105,6 +105,19 @@ def test_rivals_are_sentences_and_each_has_its_check(leak: Diagnosis) -> None:
     for name in rivals:
         assert f"{EFFECTS[name].separating_test[1:]}." in page
     assert "vent_backlash" not in page
+
+
+def test_a_sensor_that_reads_too_much_saves_heat_since_the_greenhouse_is_colder(leak: Diagnosis) -> None:
+    off = replace(leak.findings[0], effect="air_temperature_offset", kind="sensor")
+    saved = Worth(heat=-3.6, co2=0.0, lamp_light=0.0, money=-0.03, spread=(0.5, 1.5))
+    assert sentences.costs(off, saved, 100.0, speak("en")) == [
+        "It saves 3.6 MJ of heat per m² and week (1 kWh).",
+        "That is so since the greenhouse is colder than its sensor shows.",
+        "In money, by the prices of the site: 0.03 EUR saved per m² and week, 3 EUR for the greenhouse.",
+        "It may be 0.5 to 1.5 times as much (90 % interval).",
+    ]
+    nothing = Worth(heat=0.0, co2=0.0, lamp_light=0.0, money=0.0, spread=None)
+    assert sentences.costs(off, nothing, 100.0, speak("en"))[0].startswith("It takes no heat and no CO2 worth counting")
 
 
 def test_an_actuator_that_the_log_lacks_is_told_in_every_language(leak: Diagnosis) -> None:

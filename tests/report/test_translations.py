@@ -14,6 +14,7 @@ from igrow.trainer.language import LANGUAGES, speak
 from igrow.trainer.language.messages import catalogue, messages
 from igrow.trainer.language.names import NAMES
 from igrow.trainer.report import sentences
+from tests.conftest import ROOT
 from tests.diagnosis.conftest import greenhouse_log
 
 OTHERS = LANGUAGES[1:]
@@ -64,3 +65,11 @@ def test_a_day_is_the_day_of_the_greenhouse() -> None:
     midnight = np.datetime64("2020-03-01T23:30:00", "s")
     assert speak("de", "Europe/Amsterdam").day(midnight) == "2. März 2020"
     assert speak("en").day(midnight) == "March 1, 2020"
+    assert speak("en").moment(midnight) == "1 Mar 2020 23:30"
+    assert speak("zh").moment(midnight) == "2020年3月1日 23:30"
+
+
+def test_no_text_hides_in_an_f_string_where_nobody_finds_it() -> None:
+    for folder in ("data", "diagnosis", "language", "report"):
+        for path in (ROOT / "trainer" / folder).rglob("*.py"):
+            assert not re.search(r"""f(["']).*\{[\w.]*(?:text|N_)\(["'].*\1""", path.read_text()), path

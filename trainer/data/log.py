@@ -77,7 +77,12 @@ class Log:
 
     def select(self, start: np.datetime64 | None = None, end: np.datetime64 | None = None) -> Log:
         """Return the part with start <= time < end; None leaves that side open."""
-        return replace(self, telemetry=self.telemetry.select(start, end))
+        inside = tuple(
+            one
+            for one in self.screened
+            if (start is None or one.end >= start) and (end is None or one.start < end)
+        )  # fmt: skip
+        return replace(self, telemetry=self.telemetry.select(start, end), screened=inside)
 
     def with_columns(self, columns: Mapping[str, Any]) -> Log:
         """Return the log with columns added, or put in the place of those with the same name, (n,) each."""

@@ -127,7 +127,8 @@ def coefficient_by_regime(
         axes.plot([value], [index], marker="o", color=COLOURS["ink"])
     axes.set_yticks(range(len(regimes)), [language.name(name) for name in regimes])
     axes.invert_yaxis()
-    axes.set_xlabel(f"{language.text('size')}{f', {language.unit(unit)}' if language.unit(unit) else ''}")
+    size, written = language.text("size"), language.unit(unit)
+    axes.set_xlabel(f"{size}, {written}" if written else size)
     return figure
 
 

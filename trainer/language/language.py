@@ -24,6 +24,9 @@ from igrow.trainer.language.units import written
 LANGUAGES = ("en", "nl", "de", "es", "zh")
 """Codes of the languages; texts are written in the first."""
 
+_MOMENTS = {"zh": "y年M月d日 HH:mm"}
+"""How a day and its time are written where the day does not come first."""
+
 
 @dataclass(frozen=True)
 class Language:
@@ -72,7 +75,7 @@ class Language:
 
     def moment(self, time: np.datetime64) -> str:
         """Return the local day and time of an instant."""
-        return str(format_datetime(self._local(time), "d MMM y HH:mm", locale=self.locale))
+        return str(format_datetime(self._local(time), _MOMENTS.get(self.code, "d MMM y HH:mm"), locale=self.locale))
 
     def listed(self, words: list[str]) -> str:
         """Return words one after the other."""

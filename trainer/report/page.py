@@ -119,7 +119,7 @@ def _cause(result: Diagnosis, finding: Finding, language: Language) -> Cause:
         sentences.cause(finding, language),
         sentences.rivals(finding, language),
         sentences.checks(finding, language),
-        sentences.costs(worth(result, finding), site.greenhouse.floor_area, language),
+        sentences.costs(finding, worth(result, finding), site.greenhouse.floor_area, language),
     )
 
 

@@ -13,7 +13,7 @@ from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator.hybrid.measurement import PREDICTED
 from igrow.trainer.data.fault import DataFault
 from igrow.trainer.diagnosis.persistence import misfits
-from igrow.trainer.diagnosis.result import DISCREPANCY, STAGES, Diagnosis, Finding
+from igrow.trainer.diagnosis.result import DISCREPANCY, WORSE, Diagnosis, Finding
 from igrow.trainer.language import Language
 from igrow.trainer.language.names import N_
 from igrow.trainer.report.worth import Worth
@@ -147,8 +147,8 @@ def checks(finding: Finding, language: Language) -> list[str]:
     return [f"{one[0].upper()}{one[1:]}." if language.code != "zh" else f"{one}。" for one in told]
 
 
-def costs(one: Worth | None, area: float, language: Language) -> list[str]:
-    """Return what a cause takes or saves in a week."""
+def costs(finding: Finding, one: Worth | None, area: float, language: Language) -> list[str]:
+    """Return what a cause takes or saves in a week, for a greenhouse of so many m2."""
     told: list[str] = []
     if one is None:
         return told
@@ -161,6 +161,10 @@ def costs(one: Worth | None, area: float, language: Language) -> list[str]:
         )
         size = abs(one.heat)
         told.append(language.text(text, heat=number(size), kwh=number(size / 3.6)))
+        if finding.effect in EFFECTS and "air_temperature" in EFFECTS[finding.effect].measured:
+            colder = N_("That is so since the greenhouse is colder than its sensor shows.")
+            warmer = N_("That is so since the greenhouse is warmer than its sensor shows.")
+            told.append(language.text(colder if one.heat < 0 else warmer))
     if abs(one.co2) >= _LEAST["co2"]:
         text = (
             N_("It takes {co2} g of CO2 per m² and week.")
@@ -201,11 +205,12 @@ def gains(result: Diagnosis, language: Language) -> Iterator[str]:
         )
         name = language.name(quantity)
         yield language.text(text, quantity=f"{name[0].upper()}{name[1:]}", before=before, after=after)
-        best = min(day, key=lambda stage: (day[stage], STAGES.index(stage)))
-        if best == "recalibrated" and day[best] < day["corrected"] <= day["deployed"] and result.findings:
+        alone = day.get("recalibrated", np.inf)
+        if result.findings and (1.0 + WORSE) * alone < day["corrected"] <= day["deployed"]:
             yield language.text(
-                "The recalibrated model alone would be better there: off by {best}.",
-                best=language.amount(day[best], unit, 3),
+                "{quantity}: recalibration alone would be better, off by {best}.",
+                quantity=f"{name[0].upper()}{name[1:]}",
+                best=language.amount(alone, unit, 3),
             )
 
 
