@@ -13,8 +13,9 @@ from igrow.core.sun import position
 from igrow.edge.bus.plc import RegisterPlc
 from igrow.edge.climate_alarms import ClimateAlarms, usual_climate_alarms
 from igrow.edge.clock import Clock, PlcClock, SystemClock
-from igrow.edge.configuration import ClockSource, Configuration
+from igrow.edge.configuration import Configuration
 from igrow.edge.cycle import ControlCycle
+from igrow.edge.daemon_file import ClockSource
 from igrow.edge.exchange import ExchangeService
 from igrow.edge.exchange.service import TransferRules
 from igrow.edge.guard import GuardedWriter, Readback

@@ -12,7 +12,8 @@ from igrow.core.errors import IgrowError
 from igrow.core.exchange.documents import parse_object
 from igrow.edge.cli.common import DEFAULT_CONFIGURATION, configuration_of
 from igrow.edge.clock import EARLIEST_PLAUSIBLE
-from igrow.edge.configuration import ClockSource, Configuration
+from igrow.edge.configuration import Configuration
+from igrow.edge.daemon_file import ClockSource
 from igrow.edge.exchange import Order, run_round
 from igrow.edge.exchange.courier import STATUS_FILE, RoundStatus
 

@@ -14,7 +14,8 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from igrow.core.errors import IgrowError
-from igrow.edge.configuration import ClockSource, Configuration, load_configuration
+from igrow.edge.configuration import Configuration, load_configuration
+from igrow.edge.daemon_file import ClockSource
 from igrow.edge.notifications.acknowledged import ACKNOWLEDGED_FILE, read_acknowledged
 from igrow.edge.overriding import override_file
 from igrow.edge.page.actions import Actions

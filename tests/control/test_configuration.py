@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from igrow.core.errors import IgrowError
 from igrow.core.site import SetpointLimits
 from igrow.core.yaml_schema import SchemaError, parse, setting
-from igrow.edge.configuration import ConfigurationError, DaemonFile, load_configuration
+from igrow.edge.configuration import ConfigurationError, load_configuration
+from igrow.edge.daemon_file import DaemonFile
 from igrow.edge.guard import GuardedWriter
 from igrow.edge.guard.rules import GuardRuleError
 from igrow.edge.point_rules import highest_beat, point_rule

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from igrow.edge.configuration import STATUS_PORT
+from igrow.edge.daemon_file import STATUS_PORT
 
 UNIT = Path(__file__).resolve().parents[2] / "systemd" / "igrow-edge.service"
 
