@@ -101,7 +101,8 @@ def test_five_commands_lead_from_the_box_to_the_first_plan(tmp_path):
     subprocess.run(["sh", "-n", str(script)], check=True)
     units = enable.removeprefix("sudo systemctl enable --now ").split()
     assert units == ["igrow-edge", "igrow-page"]
-    assert set(units) <= set(found_in(r"for unit in ([^;]*);", script.read_text()).split())
+    laid_down = found_in(r"for unit in ([^;]*);", script.read_text()).split()
+    assert {f"{unit}.service" for unit in units} <= set(laid_down)
     assert f"\nSocketBindAllow=tcp:{PAGE_PORT}\n" in (ROOT / "systemd" / "igrow-page.service").read_text()
     # 3
     assert edit.split() == ["sudoedit", "/etc/igrow/daemon.yaml", "/etc/igrow/site.yaml"]
