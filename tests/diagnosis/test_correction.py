@@ -10,7 +10,14 @@ import pytest
 
 from igrow.core.bundle import EffectRecord, Estimate
 from igrow.trainer.diagnosis.candidates import Candidate, Pattern
-from igrow.trainer.diagnosis.correction import Corrected, Stage, corrected_model, same_in_all_regimes, stands
+from igrow.trainer.diagnosis.correction import (
+    Corrected,
+    Stage,
+    corrected_model,
+    is_proven_change,
+    same_in_all_regimes,
+    stands,
+)
 from igrow.trainer.diagnosis.estimate import Estimated
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
 from igrow.trainer.diagnosis.linear import Term
@@ -62,6 +69,19 @@ def test_a_cause_stands_if_it_is_large_and_helps_on_unseen_days(values: dict[str
 )
 def test_beside_another_a_cause_must_do_more(values: dict[str, float], stays: bool) -> None:
     assert stands(cause(**values), [cause()], DEFAULT) is stays
+
+
+@pytest.mark.parametrize(
+    ("values", "stays"),
+    [
+        ({"skill": 0.0, "bootstrap_p": 0.4}, True),
+        ({"skill": 0.0, "bootstrap_p": 0.6}, False),
+        ({"skill": -0.02, "bootstrap_p": 0.1}, False),
+        ({"skill": 0.0, "bootstrap_p": 0.1, "effect_to_noise": 0.1}, False),
+    ],
+)
+def test_a_change_must_not_make_unseen_days_worse(values: dict[str, float], stays: bool) -> None:
+    assert is_proven_change(cause(**values), [], DEFAULT) is stays
 
 
 @pytest.mark.parametrize(

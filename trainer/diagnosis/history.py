@@ -129,9 +129,13 @@ def expected_misfit(known: Discrepancy, plain: Design) -> Floats:
 
 
 def applies(known: Discrepancy, plain: Design) -> bool:
-    """Tell whether a log has the step and the balances that the history was learned from."""
+    """Tell whether a log has the step and the balances that the history was learned from, and is not long.
+
+    Within a long one the crop changes, which only the search by what greenhouses show in general allows for.
+    """
     balances = averaging(plain.line, plain.interval, plain.rules).balances
-    return plain.interval == known.step and set(balances) <= set(known.filters)
+    short = plain.split.days <= plain.rules.long_days
+    return short and plain.interval == known.step and set(balances) <= set(known.filters)
 
 
 def expected(

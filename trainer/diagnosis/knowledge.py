@@ -72,8 +72,8 @@ def knowledge_of(model: FittedModel, site: Site, rules: DecisionRules) -> Knowle
     if not at_home:
         posterior = posterior.widened(drift(posterior.values, rules.transferred_drift, rules))
     known = at_home and rules.history and model.history is not None
-    change = home_drift if known else general_drift
-    prior = posterior.widened(change(posterior.values, rules))
+    # Fits to free runs may move further than a greenhouse changes: a parameter also stands in for what has no name.
+    prior = posterior.widened(general_drift(posterior.values, rules))
     low, high = bounds(prior.names)
     shift = np.array([discrepancy.get(PARAMETER_PREFIX + name, 0.0) for name in prior.names])
     centred = prior.moved(np.clip(prior.mean + shift, low, high))

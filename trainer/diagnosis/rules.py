@@ -50,7 +50,8 @@ class DecisionRules:
     discrepancy_pattern_ridge: float = _chosen(0.15, "prior deviation of a pattern in it, in its units")
 
     # What has changed since the calibration, where what the model misses of this greenhouse was learned then.
-    history: bool = _chosen(False, "ask what has changed since, and not what greenhouses with nothing missing show")
+    history: bool = _chosen(True, "ask what has changed since, and not what greenhouses with nothing missing show")
+    least_history_days: float = _chosen(21.0, "days of a calibration log from which on a history is learned")
     omission_effect: float = _tuned(0.3, "prior deviation of an effect in the discrepancy, in typical amplitudes")
     omission_pattern: float = _tuned(0.05, "the same of a pattern, in its units")
     wall_drift: float = _tuned(0.015, "relative change of a parameter within some weeks, by physics")
@@ -142,6 +143,10 @@ class DecisionRules:
     def meaning(self, name: str) -> str:
         """Return what a rule means."""
         return str(_rule(name).metadata["meaning"])
+
+    def learns_history(self, days: float) -> bool:
+        """Tell whether a calibration log of so many days is to teach what is missing in this greenhouse."""
+        return self.history and days >= self.least_history_days
 
     def gain_of_cause(self, *, time_steps: bool, transferred: bool) -> float:
         """Return what a cause must gain."""

@@ -124,7 +124,7 @@ def _with_discrepancy(model: FittedModel, log: Log, say: Report) -> FittedModel:
 
     say("learning what the model misses on its own log")
     try:
-        known = history_of(log, model) if DEFAULT.history else None
+        known = history_of(log, model) if DEFAULT.learns_history(log.days) else None
         return replace(model, discrepancy=discrepancy_of(log, model), history=known)
     except (IgrowError, np.linalg.LinAlgError) as error:
         note = (
