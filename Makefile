@@ -56,7 +56,6 @@ bundle: $(STAMP) ## Rebuild the default bundle in igrow_core/default_bundle.
 
 wheel: $(STAMP) ## Build source and wheel into dist, check them, and try the gateway's commands in an empty environment.
 	rm -rf dist build
-	$(BIN)/pip install --quiet --disable-pip-version-check build
 	$(BIN)/python -m build --outdir dist .
 	$(BIN)/twine check --strict dist/*
 	$(PYTHON) -m venv --clear dist/venv
