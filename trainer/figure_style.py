@@ -5,6 +5,7 @@ On a page each colour is a CSS variable, so that figures turn dark with it; `COL
 
 from __future__ import annotations
 
+import datetime
 import io
 import re
 import warnings
@@ -14,7 +15,17 @@ from typing import Any
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
-from matplotlib.dates import AutoDateLocator, num2date
+from matplotlib.dates import (
+    DAILY,
+    HOURLY,
+    MICROSECONDLY,
+    MINUTELY,
+    MONTHLY,
+    SECONDLY,
+    YEARLY,
+    AutoDateLocator,
+    num2date,
+)
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
@@ -54,6 +65,8 @@ STROKES: Mapping[str, str] = {"measured": "-", "deployed": ":", "recalibrated": 
 """So that nobody depends on colours."""
 WIDTH = 4.3
 """Inches: as wide as a telephone shows at the size that it is drawn in."""
+_MOST_TICKS = {YEARLY: 6, MONTHLY: 7, DAILY: 6, HOURLY: 7, MINUTELY: 8, SECONDLY: 8, MICROSECONDLY: 8}
+"""As few as a telephone has room for; with fewer, matplotlib finds no step for some spans and draws every tick."""
 _STYLE: Any = {
     "figure.facecolor": "none",
     "axes.facecolor": "none",
@@ -117,13 +130,13 @@ def legend(axes: Axes, columns: int = 2) -> None:
 
 def date_axis(axes: Axes, language: Language) -> None:
     """Label an axis of local times (`local`) with days."""
-    locator = AutoDateLocator(minticks=3, maxticks=5)  # type: ignore[no-untyped-call]
+    locator = AutoDateLocator(minticks=3, maxticks=_MOST_TICKS)  # type: ignore[no-untyped-call]
     axes.xaxis.set_major_locator(locator)
     clock = Language(language.code, language.translations)
 
     def label(value: float, _position: int | None = None) -> str:
         moment = num2date(value).replace(tzinfo=None)  # type: ignore[no-untyped-call]
-        return clock.short_day(np.datetime64(moment, "s"))
+        return clock.short_day(np.datetime64(moment, "s")) if moment.time() == datetime.time() else f"{moment:%H:%M}"
 
     axes.xaxis.set_major_formatter(FuncFormatter(label))
 
