@@ -43,6 +43,10 @@ def test_the_sentence_names_the_size_and_the_day_on_which_it_began() -> None:
     assert always.endswith(".")
     late = wording.sentence(replace(leak(), onset=OnsetInterval(BEGAN, BEGAN, BEGAN)))
     assert late.startswith("Since 14 March more air leaks in")
+    # East of Greenwich a day begins before midnight in UTC, west of it after.
+    for began in ("2020-03-13T23:42:00", "2020-03-14T05:00:00"):
+        time = np.datetime64(began, "s")
+        assert "Since 14 March" in wording.sentence(replace(leak(), onset=OnsetInterval(time, time, time)))
 
 
 def test_a_finding_holds_size_shapes_balances_and_test_of_its_effect() -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from igrow.core.effects import EFFECTS
 from igrow.trainer.diagnosis.actuators import Replaced
 from igrow.trainer.diagnosis.candidates import UNIT_FLUX, Pattern
@@ -85,7 +87,8 @@ def sentence(one: Estimated) -> str:
     effect = EFFECTS[one.effect]
     text = effect.sentence.format(value=plain(one.amplitude.value), unit=effect.amplitude.unit)
     if one.onset is not None:
-        time = one.onset.time.astype("datetime64[D]").item()
+        # A day begins at solar midnight, which may be before midnight in UTC: its noon tells the date.
+        time = (one.onset.time + np.timedelta64(12, "h")).astype("datetime64[D]").item()
         return f"Since {time.day} {time:%B} {text}."
     return f"{text[0].upper()}{text[1:]}."
 
