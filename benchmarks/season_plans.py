@@ -27,7 +27,9 @@ from igrow.core.planner import Budget, EvolutionSettings, NumpyGeneration, Plann
 from igrow.core.planner.objective import Outcome
 from igrow.core.planner.recent_use import grown_days, totals
 from igrow.core.planner.season import SeasonPlan, valued
+from igrow.core.planner.season.course import RADIATION
 from igrow.core.planner.season.search import rule_and_strategy
+from igrow.core.planner.template import for_site
 from igrow.core.quantities import SETPOINTS
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Site
@@ -64,18 +66,23 @@ class Planned(Recipe):
             co2_before=float(morning.co2_before[house]),
             memory=None if morning.memory is None else one_of(morning.memory, row),
         )
-        worth = None
+        weather, recipe = np.tile(morning.weather[house], (2, 1)), np.tile(morning.recipe, (2, 1))
+        template = for_site(self._site, morning.begin, len(weather), radiation=weather[:, RADIATION])
+        worth, seeds = None, []
         if self._season is not None:
             worth = self._season.worth(self._site, morning.begin, present, self._warmth.get(house))
+            seeds = [self._season.setpoints(template, weather, recipe, morning.begin)]
         found = optimise(
             recently(self._simulator, self._site, past),
             self._site,
             state,
-            np.tile(morning.weather[house], (2, 1)),
-            np.tile(morning.recipe, (2, 1)),
+            weather,
+            recipe,
             np.random.default_rng(1000 * morning.day + house),
             self._budget,
             generation=SEARCH,
+            template=template,
+            seeds=seeds,
             worth=worth,
         )
         return found.setpoints[:24]

@@ -28,6 +28,8 @@ from igrow.core.planner.recent_use import (
     warmer,
 )
 from igrow.core.planner.season import CropWorth, SeasonPlan
+from igrow.core.planner.season.course import RADIATION
+from igrow.core.planner.template import for_site
 from igrow.core.planner.weather_ensemble import WeatherEnsemble
 from igrow.core.quantities import SETPOINTS
 from igrow.core.simulator.growth import GrowthBalance
@@ -76,15 +78,21 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
     corrected = recently(simulator, simulator.growth, site, request.telemetry, start)
     expected = corrected if len(courses) == 1 else WeatherEnsemble(corrected, courses)
     worth = None if season is None else season.worth(site, state.time, state.initial, warmth(request.telemetry, start))
+    recipe = hourly_recipe(site, request, hours)
+    template = for_site(site, state.time, hours, radiation=forecast[:, RADIATION])
+    # What the season asks of these days is the first candidate.
+    seeds = [] if season is None or worth is None else [season.setpoints(template, forecast, recipe, state.time)]
     result = optimise(
         expected,
         site,
         state,
         forecast,
-        hourly_recipe(site, request, hours),
+        recipe,
         np.random.default_rng(request.seed),
         Budget(),
         generation=generation,
+        template=template,
+        seeds=seeds,
         worth=worth,
     )
     steps = round(horizon / request.step_seconds)

@@ -12,6 +12,7 @@ from igrow.core.greenhouse import GreenhouseParameters, tomato
 from igrow.core.planner import Budget, PlanningState, optimise
 from igrow.core.planner.season import Season, SeasonPlan, Strategy, valued
 from igrow.core.planner.season.search import SETTINGS, genetic, worth_of
+from igrow.core.planner.template import for_site
 from igrow.core.site import Site
 from tests.planner.toy_greenhouse import ToySimulator
 
@@ -103,6 +104,21 @@ def test_a_day_is_searched_by_the_season_s_values(
         lamps.append(found.setpoints[:, 2].sum())
         assert found.profits(24) == pytest.approx((found.expected_profit, found.recipe_profit))
     assert lamps[1] < lamps[0]
+
+
+def test_the_first_candidate_of_a_day_is_what_the_season_asks_of_it(
+    plan: SeasonPlan, site: Site, weather: np.ndarray, recipe: np.ndarray
+) -> None:
+    """Its day and its night, warmer by the sun that is expected, and the recipe where it says nothing."""
+    time = START + 5 * DAY
+    template = for_site(site, time, 48, radiation=weather[:48, 3])
+    asked = plan.setpoints(template, weather[:48], recipe[:48], time)
+    assert asked.shape == (48, 4)
+    numbers = plan.numbers(time)
+    warm = numbers["day_temperature"] + numbers["warmer_by_sun"] * weather[:24, 3].mean() / 100.0
+    assert asked[:24, 0].max() == pytest.approx(warm)
+    assert asked[:24, 0].min() == pytest.approx(numbers["night_temperature"])
+    np.testing.assert_array_equal(asked[:, 3], recipe[:48, 3])
 
 
 def test_the_search_of_a_season_finds_more_than_its_first_generation(season: Season) -> None:

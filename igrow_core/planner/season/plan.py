@@ -23,6 +23,7 @@ from igrow.core.planner.season.course import DAY, Season, run_season
 from igrow.core.planner.season.crop import REFERENCE_LEAF_AREA
 from igrow.core.planner.season.strategy import Strategy
 from igrow.core.planner.season.worth import CropWorth, MarginalValues, marginal_values
+from igrow.core.planner.template import Setpoints, Template
 from igrow.core.site import Site
 
 Values = NDArray[np.float64]
@@ -70,6 +71,24 @@ class SeasonPlan:
         """Return what the strategy says on the day of a UTC time, in a grower's terms."""
         said = self.strategy.numbers(self.genes[None], self.day_of(time))
         return {name: float(value[0]) for name, value in said.items()}
+
+    def setpoints(self, template: Template, weather: Values, recipe: Setpoints, time: np.datetime64) -> Setpoints:
+        """Return what the strategy asks of a horizon of whole days from a UTC time on, (H, 4), before any limit.
+
+        Args:
+            template: of the horizon.
+            weather: that is expected, (H, 6).
+            recipe: (H, 4), for what a strategy says nothing of.
+            time: at which the horizon begins.
+        """
+        days = []
+        for first in range(0, len(weather), 24):
+            hours = slice(first, first + 24)
+            clock = np.array([one.clock for one in template.moments[hours]])
+            sun_up = np.array([one.sun_up for one in template.moments[hours]])
+            day = self.day_of(time) + first / 24.0
+            days.append(self.strategy.setpoints(self.genes[None], day, clock, sun_up, weather[hours], recipe[hours])[0])
+        return np.concatenate(days)
 
     def typical_weather(self, time: np.datetime64, hours: int) -> Values:
         """Return the weather that is usual from a UTC time on, (hours, 6)."""
