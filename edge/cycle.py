@@ -156,6 +156,7 @@ class ControlCycle:
         left = until - asyncio.get_running_loop().time()
         outcomes = await write_at_once(self._writer, writes, left)
         self._written(outcomes, before)
+        self._remember(image)  # that which never left, too
         self._journal.ledger(verdict.clamps, outcomes, ())
         return outcomes
 
@@ -224,6 +225,9 @@ class ControlCycle:
         """Note what is going to be written, so that neither a later look nor a restart takes it for somebody else's."""
         for write in writes:
             self.readback.wrote(write, image.monotonic)
+        self._remember(image)
+
+    def _remember(self, image: Image) -> None:
         # What is not known yet must not be replaced by what little is known until then.
         if self._keep is not None and image.monotonic >= self.unknown_until:
             self._keep(image, {**note(self.state, self.readback), "manual": self._manual})

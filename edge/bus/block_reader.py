@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 
 from igrow.edge.bus.errors import AddressRefusedError, BusError
 from igrow.edge.bus.protocol import Bus, Priority, ReadRequest
@@ -19,12 +20,24 @@ Results = dict[str, tuple[Content | None, BusError | None, float]]
 MOST_PLANS = 256
 """Plans kept: one for each set of points that were ever due together."""
 
-ASK_REFUSED_AGAIN = 600.0
-"""Seconds after which a point whose address was refused is asked for again: a PLC program may have been loaded."""
+ASK_REFUSED_AGAIN = 10.0, 600.0
+"""Seconds after which a point whose address was refused is asked for again, at first and at the most: a PLC that starts
+may refuse for a while what it has, and a program may be loaded at any time."""
 
 
 def _priority(block: Block) -> Priority:
     return Priority.CONTROL if any(needed_for_control(point.name) for point in block.points) else Priority.LOG
+
+
+@dataclass(frozen=True, slots=True)
+class _Refused:
+    """A point whose address was refused."""
+
+    error: AddressRefusedError
+    wait: float
+    """Seconds for which it is not asked for."""
+    until: float
+    """Monotonic seconds."""
 
 
 class BlockReader:
@@ -36,7 +49,7 @@ class BlockReader:
         self._monotonic = monotonic
         self._plans: dict[frozenset[str], tuple[Block, ...]] = {}
         self._pieces: dict[Block, tuple[Block, Block]] = {}
-        self._refused: dict[str, tuple[float, AddressRefusedError]] = {}
+        self._refused: dict[str, _Refused] = {}
 
     async def read(self, points: Iterable[Point]) -> Results:
         """Return for every point, by name, its registers or bits or the error, and the monotonic time of it."""
@@ -61,8 +74,8 @@ class BlockReader:
                 await self._read_block(piece, results)
             return
         refused = self._refused.get(block.points[0].name)
-        if refused is not None and self._monotonic() < refused[0]:
-            results.update(dict.fromkeys(block.names, (None, refused[1], self._monotonic())))
+        if refused is not None and self._monotonic() < refused.until:
+            results.update(dict.fromkeys(block.names, (None, refused.error, self._monotonic())))
             return
         device = self._devices[block.device]
         request = ReadRequest(device.device_id, block.function, block.address, block.count)
@@ -75,17 +88,20 @@ class BlockReader:
         else:
             at = self._monotonic()
             for point in block.points:
+                self._refused.pop(point.name, None)
                 results[point.name] = (block.content_of(point, content), None, at)
 
     async def _split_and_read(self, block: Block, error: AddressRefusedError, results: Results) -> None:
         try:
             pieces = split(block)
         except ValueError:
-            again = self._monotonic() + ASK_REFUSED_AGAIN
+            first, most = ASK_REFUSED_AGAIN
             for point in block.points:
-                if point.name not in self._refused:
+                before = self._refused.get(point.name)
+                if before is None:
                     _log.warning("%s cannot be read: %s", point.name, error)
-                self._refused[point.name] = (again, error)
+                wait = first if before is None else min(2.0 * before.wait, most)
+                self._refused[point.name] = _Refused(error, wait, self._monotonic() + wait)
                 results[point.name] = (None, error, self._monotonic())
             return
         self._pieces[block] = pieces

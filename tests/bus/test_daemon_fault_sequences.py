@@ -286,6 +286,10 @@ class World:
             self.hand()
         if self.disk is not None:
             self.disk.answer()
+        if self.anew:
+            # PLC and daemon have both started anew, unseen by one another: its values may pass for a hand's.
+            for name in self.bench.units["plc"].points.keys() & RULES.keys():
+                self.made.setdefault(name, []).append(self.bench.stands(name) or 0.0)
         await self.bench.restart(RESPECT)
 
     # lines

@@ -333,7 +333,7 @@ def test_a_unit_that_holds_nothing_more_is_left_alone_until_no_late_answer_can_c
 
 
 def test_a_refusal_that_may_be_an_older_requests_is_not_taken_for_the_address_s() -> None:
-    """A block that is refused is split for good, and a point for ten minutes: not for somebody else's refusal."""
+    """A block that is refused is split for good, a point left alone for a while: not for somebody else's refusal."""
 
     async def main() -> None:
         bus, _ = await behind_proxy(Fault.NO_ANSWER, Fault.EXCEPTION, transport=Transport.RTU_OVER_TCP)

@@ -134,18 +134,31 @@ def test_a_block_with_an_unreadable_gap_is_split_once_and_for_good() -> None:
     assert [(address, count) for _, address, count in net.requests] == [(0, 1), (2, 1), (5, 1)]
 
 
-def test_an_address_that_does_not_exist_fails_alone_and_is_tried_again_after_ten_minutes() -> None:
+def test_an_address_that_does_not_exist_fails_alone_and_is_tried_again_soon_and_then_ever_more_rarely() -> None:
     plc, net, _, clock = make([a for a in range(200) if a != 2])
-    readings = run(plc.read(["air_temperature", "air_humidity"]))
-    assert readings["air_temperature"].value == 0.0
-    assert isinstance(readings["air_humidity"].error, AddressRefusedError)
-    net.requests.clear()
-    clock.now = 599.0
-    assert isinstance(run(plc.read(["air_temperature", "air_humidity"]))["air_humidity"].error, AddressRefusedError)
-    assert [(address, count) for _, address, count in net.requests] == [(0, 1)]
-    clock.now = 601.0
+    begin, asked = clock.now, []
+    for second in range(3000):
+        clock.now = begin + second
+        net.requests.clear()
+        readings = run(plc.read(["air_temperature", "air_humidity"]))
+        assert readings["air_temperature"].value == 0.0
+        assert isinstance(readings["air_humidity"].error, AddressRefusedError)
+        if any(address == 2 for _, address, _ in net.requests):
+            asked.append(second)
+    assert asked == [0, 10, 30, 70, 150, 310, 630, 1230, 1830, 2430]
     net.content[2] = 80
+    clock.now = begin + 3030
     assert values(plc, ["air_temperature", "air_humidity"]) == {"air_temperature": 0.0, "air_humidity": 80.0}
+
+
+def test_an_address_that_a_plc_refuses_while_it_starts_is_back_within_seconds() -> None:
+    plc, net, _, clock = make([a for a in range(200) if a != 2])
+    for _ in range(2):
+        run(plc.read(["air_humidity"]))
+        net.content[2] = 80
+        clock.now += 10.0
+        assert values(plc, ["air_humidity"]) == {"air_humidity": 80.0}
+        del net.content[2]
 
 
 def test_one_bus_that_fails_leaves_the_other_ones_values() -> None:

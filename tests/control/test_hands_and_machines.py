@@ -637,3 +637,19 @@ async def test_a_process_writes_to_no_point_that_it_has_not_read_yet():
     bench.plc.read = read
     await bench.run(2)
     assert bench.plc.values["heating_setpoint"] == 16.0
+
+
+async def test_a_stop_that_could_not_write_explains_no_hand_after_it():
+    """Between the safe value that never left and what stood there, it would pass for the PLC's way to it."""
+    bench = bench_of()
+    await bench.run(3)
+    bench.plc.write_error = UnitRestingError("rests")
+    bench.clock.advance(1.0)
+    await bench.cycle.stop()
+    bench.plc.write_error = None
+    bench.plc.by_hand("irrigation_on", 0.3)
+    bench.pass_time(5.0)
+    bench.restart()
+    await bench.run(3)
+    assert bench.plc.values["irrigation_on"] == 0.3
+    assert [event["shown"] for event in bench.events("changed_by_hand")] == [0.3]
