@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -95,6 +97,16 @@ def test_a_leak_costs_what_the_outdoor_air_that_comes_in_must_be_heated(leak: Di
     assert found.money == pytest.approx(0.0083 * found.heat + 0.08 * found.co2)
     half = replace(finding, parameters={"air_changes": Interval(1.0, 0.5, 1.5, "h-1")})
     assert worth(leak, half).spread == (0.5, 1.5)  # type: ignore[union-attr]
+
+
+def test_the_document_tells_what_a_finding_takes_from_the_whole_greenhouse(leak: Diagnosis, tmp_path: Path) -> None:
+    (finding,) = leak.findings
+    found = worth(leak, finding)
+    assert found is not None
+    write_diagnosis(tmp_path, leak)
+    document = json.loads((tmp_path / "diagnosis.json").read_text())
+    area = leak.model.site.greenhouse.floor_area
+    assert document["findings"][0]["eur_per_week"] == pytest.approx(area * found.money, abs=0.01)
 
 
 def test_rivals_are_sentences_and_each_has_its_check(leak: Diagnosis) -> None:

@@ -45,7 +45,7 @@ class SiteRow:
     finding: str
     """What the last diagnosis said."""
     worth: float | None
-    """Of the finding, EUR a week, where the diagnosis tells."""
+    """What the finding takes from the whole greenhouse, EUR a week by the site's prices; None where nothing tells."""
     error_before: float | None
     error_after: float | None
     """Air temperature a day ahead, live at the gateway before and after the newest adoption (K)."""

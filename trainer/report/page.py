@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from jinja2 import Environment, PackageLoader, select_autoescape
 
@@ -57,11 +58,21 @@ def write_diagnosis(folder: Path, result: Diagnosis, language: str = "en") -> No
     page = render_report(result, language)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        text = json.dumps(result.to_json(), indent=2, allow_nan=False) + "\n"
+        text = json.dumps(priced(result), indent=2, allow_nan=False) + "\n"
         (folder / "diagnosis.json").write_text(text, encoding="utf-8")
         (folder / "report.html").write_text(page, encoding="utf-8")
     except OSError as error:
         raise IgrowError(f"{folder}: cannot be written: {error.strerror}") from None
+
+
+def priced(result: Diagnosis) -> dict[str, Any]:
+    """Return the diagnosis' document, each finding with what it takes from the whole greenhouse, EUR a week or null."""
+    document = result.to_json()
+    area = result.model.site.greenhouse.floor_area
+    for told, finding in zip(document["findings"], result.findings, strict=True):
+        found = worth(result, finding)
+        told["eur_per_week"] = None if found is None else round(area * found.money, 2)
+    return document
 
 
 def render_report(result: Diagnosis, language: str = "en") -> str:
