@@ -6,4 +6,4 @@ import sys
 
 from igrow.edge.exchange.courier import main
 
-sys.exit(main())
+sys.exit(main(sys.argv[1:]))

@@ -1,7 +1,7 @@
 """The courier: one round between the gateway's own disk and the exchange, as a process that may be ended at any time.
 
-`python -m igrow.edge.exchange` reads its order as JSON from standard input. Beside itself it needs nothing
-of the daemon: it reads the log as a second process, and answers in `status.json`.
+`python -m igrow.edge.exchange PARENT` reads its order as JSON from standard input, and ends when the process PARENT is
+gone. Beside itself it needs nothing of the daemon: it reads the log as a second process, and answers in `status.json`.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from igrow.core.whole_files import write_whole
 from igrow.edge.exchange.outbox import REPORTS, Outbox
 from igrow.edge.exchange.places import open_place
 from igrow.edge.exchange.sealing import seal_due
+from igrow.edge.parent import end_with_parent
 
 STATUS_FILE = "status.json"
 LARGEST_BUNDLE = 512 * 2**20
@@ -180,11 +181,16 @@ def _alone(folder: Path) -> Iterator[None]:
         yield
 
 
-def main() -> int:
-    """Read the order, make the round."""
+def main(arguments: list[str]) -> int:
+    """Read the order, make the round; the one argument is the process that asked for it, with which it ends."""
+
+    def end(*_: object) -> None:
+        # With all that it has started, such as `sftp`: it leads a session of its own.
+        os.killpg(0, signal.SIGKILL)
+
+    end_with_parent(int(arguments[0]), end)
     order = Order(**json.loads(sys.stdin.read()))
-    # With all that it has started, such as `sftp`: it leads a session of its own.
-    signal.signal(signal.SIGALRM, lambda *_: os.killpg(0, signal.SIGKILL))
+    signal.signal(signal.SIGALRM, end)
     signal.setitimer(signal.ITIMER_REAL, order.deadline)
     os.nice(10)
     return 1 if run_round(order).problem else 0

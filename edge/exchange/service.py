@@ -149,7 +149,7 @@ class ExchangeService:
         environment["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))
         try:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "igrow.edge.exchange"],
+                [sys.executable, "-m", "igrow.edge.exchange", str(os.getpid())],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,
                 env=environment,

@@ -13,11 +13,10 @@ import os
 import pickle
 import resource
 import sys
-import threading
-import time
 from pathlib import Path
 
 from igrow.core.errors import IgrowError
+from igrow.edge.parent import end_with_parent
 from igrow.edge.planning.messages import MessageError, receive, send
 
 ANSWER_SECONDS = 60.0
@@ -27,7 +26,7 @@ ANSWER_SECONDS = 60.0
 def main(arguments: list[str]) -> int:
     """Serve calls until the daemon is gone or has nothing to ask."""
     parent, idle, memory = int(arguments[0]), float(arguments[1]), int(arguments[2])
-    threading.Thread(target=_end_with_parent, args=(parent,), daemon=True).start()
+    end_with_parent(parent, lambda: os._exit(0))
     _give_way(memory)
     # Whatever a library prints must not end up between two messages.
     answers = os.dup(1)
@@ -83,13 +82,6 @@ def _bound_processor(seconds: float) -> None:
     usage = resource.getrusage(resource.RUSAGE_SELF)
     _, hard = resource.getrlimit(resource.RLIMIT_CPU)
     resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(usage.ru_utime + usage.ru_stime + seconds) + 1, hard))
-
-
-def _end_with_parent(parent: int) -> None:
-    """End at once when the daemon is gone, also in the middle of a call and before the first."""
-    while os.getppid() == parent:
-        time.sleep(0.5)
-    os._exit(0)
 
 
 if __name__ == "__main__":

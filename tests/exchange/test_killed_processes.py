@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import random
 import subprocess
 import sys
@@ -47,7 +48,7 @@ def test_killed_couriers_and_collectors_lose_nothing_and_repeat_nothing(seed: in
     collect = ["-c", COLLECT, "collect", SITE, "--exchange", str(tmp_path / "exchange"), "--state", str(tmp_path)]
     killed = 0
     for _ in range(10):
-        killed += killed_after(chance.uniform(0.2, 1.5), ["-m", "igrow.edge.exchange"], given) < 0
+        killed += killed_after(chance.uniform(0.2, 1.5), ["-m", "igrow.edge.exchange", str(os.getpid())], given) < 0
         killed += killed_after(chance.uniform(0.5, 3.0), collect) < 0
     assert killed > 3
     assert world.round(end + 600).problem == ""
