@@ -61,8 +61,8 @@ class Recorder:
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let no unit or line rest and the plant not be waited for, so that faults follow one another quickly."""
 
-    def make_bus(settings: BusSettings, devices: Collection[Device]) -> ModbusBus:
-        bus = ModbusBus(settings, rest_step=0.0, first_wait=0.01, quiet=0.005)
+    def make_bus(settings: BusSettings, devices: Collection[Device], *, others_asked: bool = False) -> ModbusBus:
+        bus = ModbusBus(settings, rest_step=0.0, first_wait=0.01, quiet=0.005, others_asked=others_asked)
         bus._supervisor._longest_wait = 0.02
         return bus
 
