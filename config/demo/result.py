@@ -80,9 +80,9 @@ def summarise(out: Path, effect: str, days: Days) -> str:
 
 
 def found_since(diagnosis: Any) -> str | None:
-    """Return the day on which the first cause was found to have begun, None where it was always there."""
+    """Return when the first cause was found to have begun (UTC), None where it was always there."""
     onsets = [one["onset"] for one in diagnosis["findings"] if one.get("onset")]
-    return str(onsets[0]["time"])[:10] if onsets else None
+    return str(onsets[0]["time"])[:16].replace("T", " ") if onsets else None
 
 
 def live_error(bundle: Any, log: Telemetry) -> dict[str, NDArray[np.float64]]:
@@ -201,9 +201,10 @@ def draw(path: Path, live: Any, since: int | None, days: Days, log: Telemetry, d
     for axis, name, title in zip(axes, PREDICTED, ("air temperature", "relative humidity", "CO2"), strict=True):
         first, corrected = live["first"][name], live["corrected"][name]
         day = np.arange(len(first)) + 0.5
-        axis.plot(day, first, color="#b0b6bd", lw=1.6, label="first bundle")
+        axis.plot(day, first, color="#b0b6bd", lw=1.6, label="first bundle" if axis is axes[0] else None)
         if since is not None:
-            axis.plot(day[since:], corrected[since:], color="#1f8a4c", lw=2.2, label="corrected bundle, in force")
+            label = "corrected bundle, in force" if axis is axes[0] else None
+            axis.plot(day[since:], corrected[since:], color="#1f8a4c", lw=2.2, label=label)
         for moment, _, colour in moments:
             axis.axvline(moment, color=colour, lw=0.9, ls="--")
         axis.set_ylabel(f"{title}\n{QUANTITIES[name].unit}")
@@ -214,11 +215,11 @@ def draw(path: Path, live: Any, since: int | None, days: Days, log: Telemetry, d
         axes[0].text(moment - 0.15, axes[0].get_ylim()[1], text, va="top", ha="right", color=colour, rotation=90)
     begun = found_since(diagnosis)
     if begun is not None:
-        place = float((np.datetime64(begun, "D") - log.time[0]) / np.timedelta64(1, "D"))
+        place = float((np.datetime64(begun) - log.time[0]) / np.timedelta64(1, "D"))
         label = f"found to have begun {begun}"
-        axes[0].plot([place], [0.0], marker="^", ms=9, color="#b3261e", clip_on=False, label=label)
+        axes[0].plot([place], [0.0], marker="^", ms=9, ls="", color="#b3261e", clip_on=False, label=label)
     axes[0].set_title(f"Error of the 24 h prediction, day by day\nfound by the trainer: {found}", loc="left")
-    axes[0].legend(loc="upper left", frameon=False)
+    figure.legend(loc="outside lower center", ncols=3, frameon=False)
     axes[-1].set_xlabel("day since the daemon took over")
     figure.savefig(path, dpi=120)
     plt.close(figure)

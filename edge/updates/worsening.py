@@ -56,7 +56,7 @@ def worsening_sentence(found: Sequence[Worsening]) -> str:
     """Return what to tell people, in one line; times are in UTC."""
     since = datetime.fromtimestamp(min(one.since for one in found), UTC)
     how = ", ".join(
-        f"{one.quantity.replace('_', ' ')} {one.before:.2g} -> {one.now:.2g} {QUANTITIES[one.quantity].unit}"
+        f"{one.quantity.replace('_', ' ')} {one.before:.3g} -> {one.now:.3g} {QUANTITIES[one.quantity].unit}"
         for one in found
     )
     return (
