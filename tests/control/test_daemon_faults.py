@@ -172,7 +172,6 @@ async def test_a_hand_that_has_been_respected_for_long_enough_does_not_begin_aga
         await until(lambda: agreed(daemon, "co2_setpoint") == 700.0)
         plant.plc.set_by_hand("co2_setpoint", 555.0)
         await until(lambda: "changed_by_hand" in kinds(tmp_path))
-    assert plant.shows("co2_setpoint") in (555.0, 700.0)
     async with running(path) as daemon:
         await until(lambda: plant.shows("co2_setpoint") == 700.0)
         cycles = daemon.cycles
