@@ -81,7 +81,7 @@ async def test_a_serial_port_that_is_not_there_is_named() -> None:
 
 
 def make_certificate(folder: Path) -> tuple[Path, Path]:
-    x509 = pytest.importorskip("cryptography.x509", reason="cryptography makes the certificate of this test")
+    from cryptography import x509
     from cryptography.hazmat.primitives import hashes, serialization
     from cryptography.hazmat.primitives.asymmetric import ec
 

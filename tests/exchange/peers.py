@@ -1,7 +1,6 @@
 """Servers that nobody here wrote, on loopback: OpenSSH's sshd for SFTP, moto for S3.
 
-`tests/exchange/install-peers.sh` installs what they need. Where one is missing its tests are skipped with a reason in
-capitals; under CI (environment variable CI) that is a failure.
+`tests/exchange/install-peers.sh` installs what they need.
 """
 
 from __future__ import annotations
@@ -18,15 +17,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import pytest
+from tests import needs
 
-
-def missing(what: str) -> None:
-    """Skip, or fail under CI."""
-    text = f"{what.upper()} IS MISSING: run tests/exchange/install-peers.sh; this was NOT tested"
-    if os.environ.get("CI"):
-        pytest.fail(text)
-    pytest.skip(text)
+INSTALL = "tests/exchange/install-peers.sh"
 
 
 def free_port() -> int:
@@ -49,9 +42,8 @@ class Sftp:
 @contextlib.contextmanager
 def sftp_server(folder: Path) -> Iterator[Sftp]:
     """Run sshd for the present user, with a key of its own, serving SFTP and nothing else."""
-    sshd = shutil.which("sshd", path=os.environ.get("PATH", "") + ":/usr/sbin:/usr/local/sbin")
-    if sshd is None or shutil.which("sftp") is None:
-        missing("openssh-server")
+    sshd = needs.program("sshd", INSTALL)
+    needs.program("sftp", INSTALL)
     folder.mkdir(parents=True)
     port = free_port()
     for name in ("host", "client"):
@@ -69,7 +61,7 @@ def sftp_server(folder: Path) -> Iterator[Sftp]:
     if os.geteuid() == 0:
         Path("/run/sshd").mkdir(exist_ok=True)
     with (folder / "log").open("wb") as log:
-        server = subprocess.Popen([str(sshd), "-D", "-e", "-f", str(folder / "sshd_config")], stderr=log)
+        server = subprocess.Popen([sshd, "-D", "-e", "-f", str(folder / "sshd_config")], stderr=log)
     try:
         _wait_for_port(port, server, folder / "log")
         user = subprocess.run(["id", "-un"], capture_output=True, text=True, check=True).stdout.strip()
@@ -82,12 +74,8 @@ def sftp_server(folder: Path) -> Iterator[Sftp]:
 @contextlib.contextmanager
 def s3_server(folder: Path) -> Iterator[str]:
     """Run moto's S3 server with one bucket; yields its address as an exchange's."""
-    try:
-        import boto3
-        import moto  # noqa: F401
-        import s3fs  # noqa: F401
-    except ImportError as error:
-        missing(str(error.name))
+    import boto3
+
     folder.mkdir(parents=True)
     port = free_port()
     with (folder / "log").open("wb") as log:

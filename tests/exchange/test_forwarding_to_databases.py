@@ -21,7 +21,8 @@ from igrow.core.errors import IgrowError
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.service.archive import Archive
 from igrow.trainer.service.forwarding import Forwarded, forward, line_protocol
-from tests.exchange.peers import _wait_for_port, free_port, missing
+from tests import needs
+from tests.exchange.peers import INSTALL, _wait_for_port, free_port
 
 TODAY = date(2026, 2, 20)
 START = int(datetime(2026, 2, 16, tzinfo=UTC).timestamp())
@@ -42,9 +43,7 @@ def archive(tmp_path: Path) -> Archive:
 
 @pytest.fixture(scope="module")
 def influx(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    program = shutil.which("influxd")
-    if program is None:
-        missing("influxdb")
+    program = needs.program("influxd", INSTALL)
     folder, port, other = tmp_path_factory.mktemp("influx"), free_port(), free_port()
     (folder / "influx.conf").write_text(
         f'reporting-disabled = true\nbind-address = "127.0.0.1:{other}"\n[meta]\n  dir = "{folder}/meta"\n'
@@ -52,7 +51,7 @@ def influx(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         "[monitor]\n  store-enabled = false\n"
     )
     with (folder / "log").open("wb") as log:
-        server = subprocess.Popen([str(program), "-config", str(folder / "influx.conf")], stdout=log, stderr=log)
+        server = subprocess.Popen([program, "-config", str(folder / "influx.conf")], stdout=log, stderr=log)
     try:
         _wait_for_port(port, server, folder / "log")
         ask(f"http://127.0.0.1:{port}", "CREATE DATABASE igrow")
@@ -115,7 +114,7 @@ def postgresql() -> Iterator[str]:
 
     programs = sorted(Path("/usr/lib/postgresql").glob("*/bin/initdb"))
     if not programs:
-        missing("postgresql")
+        needs.absent("postgresql", f"sh {INSTALL}")
     binaries, port = programs[-1].parent, free_port()
     with tempfile.TemporaryDirectory(prefix="igrow-postgresql-") as text:
         folder = Path(text)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-import shutil
 import socket
 import subprocess
 
@@ -20,6 +19,7 @@ from igrow.edge.mqtt.commands import Commands
 from igrow.edge.mqtt.topics import discovery, state_payload
 from igrow.edge.overriding import override_file
 from igrow.edge.sources.override import read_leases
+from tests import needs
 from tests.control.daemon_bench import free_port, write_files
 
 STATE = {
@@ -108,7 +108,8 @@ def test_a_message_overrides_for_a_time_and_not_more_often_than_people_do(tmp_pa
 
 
 def start(file):
-    return subprocess.Popen(["mosquitto", "-c", str(file)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    mosquitto = needs.program("mosquitto", "tests/peers/install.sh")
+    return subprocess.Popen([mosquitto, "-c", str(file)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
 async def until(condition):
@@ -136,11 +137,6 @@ async def broker(tmp_path):
         process.wait(30)
 
 
-needs_broker = pytest.mark.skipif(
-    shutil.which("mosquitto") is None, reason="mosquitto is not installed (tests/peers/install.sh installs it)"
-)
-
-
 @contextlib.asynccontextmanager
 async def bridging(configuration, fetch):
     task = asyncio.create_task(run_bridge(configuration, fetch))
@@ -160,7 +156,6 @@ async def first(client, topic):
     raise AssertionError
 
 
-@needs_broker
 async def test_a_real_broker_gets_state_discovery_and_the_last_will(tmp_path):
     async with broker(tmp_path) as port:
         configuration = configured(tmp_path, port)
@@ -175,7 +170,6 @@ async def test_a_real_broker_gets_state_discovery_and_the_last_will(tmp_path):
                 assert await first(client, "igrow/test-house/available") == "online"
 
 
-@needs_broker
 async def test_a_daemon_that_does_not_answer_shows_as_offline(tmp_path):
     def silent():
         raise IgrowError("no daemon answers")
@@ -186,7 +180,6 @@ async def test_a_daemon_that_does_not_answer_shows_as_offline(tmp_path):
             assert await first(client, "igrow/test-house/available") == "offline"
 
 
-@needs_broker
 async def test_an_override_by_message_takes_effect_and_one_that_was_retained_does_not(tmp_path):
     async with broker(tmp_path) as port:
         configuration = configured(tmp_path, port, permit=True)
@@ -200,7 +193,6 @@ async def test_an_override_by_message_takes_effect_and_one_that_was_retained_doe
         assert {name: lease.value for name, lease in leases(configuration).items()} == {"co2_setpoint": 600.0}
 
 
-@needs_broker
 async def test_a_broker_that_comes_up_later_is_found(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "FIRST_PAUSE", 0.05)
     monkeypatch.setattr(module, "LONGEST_PAUSE", 0.1)

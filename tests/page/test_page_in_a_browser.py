@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import io
 import os
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,10 +16,9 @@ import pytest
 from igrow.edge.overriding import override_file
 from igrow.edge.page.password import hashed, write_password
 from igrow.edge.sources.override import read_leases
+from tests import needs
 from tests.page.page_bench import PASSWORD, ROOT, Told, alarm, fill_log, pages_of, served, state, write_house
 
-BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or ""
-pytestmark = pytest.mark.skipif(not BROWSER, reason="no Chromium on this machine: apt-get install chromium")
 LOOKS = [(width, scheme) for width in (390, 1280) for scheme in ("light", "dark")]
 PICTURES = ROOT / "docs" / "page"
 KEPT = ("calm-1280-light", "plan-1280-light", "calm-390-dark", "not-heard-390-light")
@@ -52,10 +50,11 @@ def house(tmp_path_factory) -> Iterator[House]:
 
 @pytest.fixture(scope="module")
 def browser():
+    chromium = needs.program("chromium", "tests/page/install-browser.sh")
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        launched = playwright.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+        launched = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         yield launched
         launched.close()
 

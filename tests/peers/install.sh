@@ -1,6 +1,6 @@
 #!/bin/sh
-# Installs the peers that tests talk to: mbpoll, socat, libmodbus' own test server, mosquitto, and
-# two Node packages. Tests whose peer is absent are skipped. Needs root (or sudo) for the Debian packages.
+# Installs the peers that tests talk to: mbpoll, socat, libmodbus' own test server, mosquitto,
+# systemd-analyze, and two Node packages. Needs root (or sudo) for the Debian packages.
 set -eu
 cd "$(dirname "$0")"
 
@@ -11,6 +11,7 @@ for package in mbpoll socat libmodbus-dev mosquitto gcc pkg-config; do
     dpkg -s "$package" >/dev/null 2>&1 || missing="$missing $package"
 done
 command -v node >/dev/null 2>&1 || missing="$missing nodejs"
+command -v systemd-analyze >/dev/null 2>&1 || missing="$missing systemd"
 command -v npm >/dev/null 2>&1 || missing="$missing npm"
 if [ -n "$missing" ]; then
     $as_root apt-get update -qq

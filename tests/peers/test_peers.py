@@ -1,11 +1,10 @@
-"""Against Modbus software that nobody here wrote. `tests/peers/install.sh` installs it; what is absent is skipped."""
+"""Against Modbus software that nobody here wrote. `tests/peers/install.sh` installs it."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
 import re
-import shutil
 import socket
 from collections.abc import AsyncIterator
 from dataclasses import replace
@@ -21,27 +20,22 @@ from igrow.edge.registers.loading import load_register_map, parse_register_map
 from igrow.edge.registers.model import BusSettings, Function, Parity, Transport
 from igrow.edge.virtual_plc.pace import Lockstep
 from igrow.edge.virtual_plc.virtual_plc import VirtualPlc
+from tests import needs
 from tests.virtual_plc.toy_plant import ToyPlant
 
 HERE = Path(__file__).parent
 MAP = load_register_map(HERE.parents[1] / "config" / "register-maps" / "virtual-plc.yaml")
 LIBMODBUS = HERE / "build" / "unit-test-server"
-
-
-def tool(name: str) -> None:
-    if shutil.which(name) is None:
-        pytest.skip(f"{name} is not installed; tests/peers/install.sh does it")
+INSTALL = "tests/peers/install.sh"
 
 
 def node_package(name: str) -> None:
-    tool("node")
-    if not (HERE / "node_modules" / name).is_dir():
-        pytest.skip(f"npm {name} is not installed; tests/peers/install.sh does it")
+    needs.program("node", INSTALL)
+    needs.file(HERE / "node_modules" / name, INSTALL)
 
 
 def libmodbus() -> None:
-    if not LIBMODBUS.exists():
-        pytest.skip("libmodbus' test server is not built; tests/peers/install.sh does it")
+    needs.file(LIBMODBUS, INSTALL)
 
 
 def free_port() -> int:
@@ -75,7 +69,7 @@ async def running(*command: str, ready: str = "") -> AsyncIterator[None]:
 
 @contextlib.asynccontextmanager
 async def serial_pair(folder: Path) -> AsyncIterator[tuple[str, str]]:
-    tool("socat")
+    needs.program("socat", INSTALL)
     ends = folder / "a", folder / "b"
     async with running("socat", *(f"pty,rawer,link={end}" for end in ends)):
         for _ in range(200):
@@ -134,7 +128,7 @@ async def answers_again(bus: ModbusBus, request: ReadRequest, expected: tuple[in
 
 
 async def test_mbpoll_reads_and_writes_the_virtual_plc_over_tcp() -> None:
-    tool("mbpoll")
+    needs.program("mbpoll", INSTALL)
     plant = ToyPlant()
     virtual = VirtualPlc(plant, MAP, Lockstep())
     port = await virtual.start()
@@ -153,7 +147,7 @@ async def test_mbpoll_reads_and_writes_the_virtual_plc_over_tcp() -> None:
 
 
 async def test_mbpoll_reads_and_writes_the_virtual_plc_over_a_serial_line(tmp_path: Path) -> None:
-    tool("mbpoll")
+    needs.program("mbpoll", INSTALL)
     async with serial_pair(tmp_path) as (ours, theirs):
         virtual = VirtualPlc(ToyPlant(), MAP, Lockstep())
         await virtual.start_serial(ours, parity=Parity.NONE)

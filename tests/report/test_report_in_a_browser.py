@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,16 +12,14 @@ from playwright.sync_api import Browser, sync_playwright
 
 from igrow.trainer.diagnosis import Diagnosis
 from igrow.trainer.report import render_report
-
-CHROMIUM = shutil.which("chromium")
+from tests import needs
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    if CHROMIUM is None:
-        pytest.skip("chromium is not installed; tests/page/install-browser.sh does it")
+    chromium = needs.program("chromium", "tests/page/install-browser.sh")
     with sync_playwright() as run:
-        one = run.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        one = run.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         yield one
         one.close()
 

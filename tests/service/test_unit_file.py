@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import configparser
 import re
-import shutil
 import subprocess
 from pathlib import Path
 
-import pytest
-
 from igrow.edge.daemon_file import STATUS_PORT
+from tests import needs
 
 UNIT = Path(__file__).resolve().parents[2] / "systemd" / "igrow-edge.service"
 
@@ -29,8 +27,7 @@ def service() -> dict[str, list[str]]:
 
 
 def test_the_exposure_by_systemd_s_own_measure_is_at_most_2() -> None:
-    if shutil.which("systemd-analyze") is None:
-        pytest.skip("systemd-analyze is not installed on this machine")
+    needs.program("systemd-analyze", "tests/peers/install.sh")
     done = subprocess.run(
         ["systemd-analyze", "security", "--offline=true", "--no-pager", str(UNIT)],
         check=False,
@@ -39,13 +36,12 @@ def test_the_exposure_by_systemd_s_own_measure_is_at_most_2() -> None:
     )
     level = re.search(r"Overall exposure level for igrow-edge\.service: ([\d.]+)", done.stdout)
     if level is None:
-        pytest.skip(f"this systemd-analyze knows no offline analysis: {done.stderr.strip()[:80]}")
+        needs.absent("systemd-analyze with offline analysis (systemd 250 or later)", done.stderr.strip()[:80])
     assert float(level[1]) <= 2.0
 
 
 def test_systemd_finds_no_unknown_setting() -> None:
-    if shutil.which("systemd-analyze") is None:
-        pytest.skip("systemd-analyze is not installed on this machine")
+    needs.program("systemd-analyze", "tests/peers/install.sh")
     done = subprocess.run(["systemd-analyze", "verify", str(UNIT)], check=False, capture_output=True, text=True)
     complaints = [line for line in done.stderr.splitlines() if "igrow-edge" in line and "not executable" not in line]
     assert complaints == []

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import random
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from igrow.edge.store import SqliteStore, StoreLimits, read_telemetry
+from tests import needs
 from tests.store.store_helpers import START, number_of, values
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -119,10 +119,7 @@ def test_a_read_only_disk_keeps_everything_waiting_until_it_can_be_written(tmp_p
 
 def run_with_small_disk(tmp_path: Path, scenario: str) -> None:
     """Run a scenario below in a mount namespace of its own, in which /mnt is a disk of 8 MB."""
-    if os.geteuid() != 0 or shutil.which("unshare") is None:
-        pytest.skip("mounting a small disk needs root and unshare")
-    if subprocess.run(["unshare", "-m", "true"], check=False, capture_output=True).returncode != 0:
-        pytest.skip("this machine allows no mount namespaces")
+    needs.mount_namespace()
     command = f"mount -t tmpfs -o size=8M small /mnt && exec {sys.executable} {__file__} {scenario}"
     done = subprocess.run(
         ["unshare", "-m", "sh", "-c", command],
