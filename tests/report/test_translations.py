@@ -14,7 +14,7 @@ from igrow.trainer.language import LANGUAGES, speak
 from igrow.trainer.language.messages import catalogue, messages
 from igrow.trainer.language.names import NAMES
 from igrow.trainer.report import sentences
-from tests.conftest import ROOT
+from tests.needs import ROOT
 from tests.diagnosis.conftest import greenhouse_log
 
 OTHERS = LANGUAGES[1:]
