@@ -14,8 +14,8 @@ from igrow.trainer.language import LANGUAGES, speak
 from igrow.trainer.language.messages import catalogue, messages
 from igrow.trainer.language.names import NAMES
 from igrow.trainer.report import sentences
-from tests.needs import ROOT
 from tests.diagnosis.conftest import greenhouse_log
+from tests.needs import ROOT
 
 OTHERS = LANGUAGES[1:]
 
