@@ -15,6 +15,7 @@ from igrow.core.local_time import utc_datetime
 from igrow.core.telemetry import Telemetry, write_csv
 from igrow.trainer import FittedModel, export, prepare_log
 from igrow.trainer.cli import main
+from igrow.trainer.cli.diagnose import since_calibration
 from igrow.trainer.fit.scoring import ACTUATORS, BY_SETPOINTS, score_bundle, unseen
 from tests.virtual_log import SITE, virtual_log
 
@@ -72,6 +73,32 @@ def test_days_that_the_bundle_was_calibrated_on_are_left_out(
         score_bundle(log.select(None, telemetry.time[4 * 96]), bundle)
     elsewhere = export(replace(truth, training_span=span, calibrated_on="elsewhere"), tmp_path / "elsewhere")
     assert unseen(log, elsewhere) is log
+
+
+def test_a_diagnosis_leaves_out_the_days_that_its_bundle_was_calibrated_on(
+    telemetry: Telemetry, truth: FittedModel, tmp_path: Path
+) -> None:
+    span = Span(*(utc_datetime(telemetry.time[row]) for row in (0, 4 * 96)))
+    bundle = export(replace(truth, training_span=span), tmp_path / "bundle").folder
+    (tmp_path / "site.yaml").write_text(SITE_FILE)
+
+    given = ["--site", str(tmp_path / "site.yaml"), "--bundle", str(bundle), "--out", str(tmp_path / "out")]
+    write_csv(tmp_path / "log.csv", telemetry)
+    assert main(["diagnose", str(tmp_path / "log.csv"), *given]) in {0, 10, 11, 12}
+    told = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert told["span"]["start"] == f"{telemetry.time[4 * 96 + 1]}Z"
+    assert "they are left out" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_where_less_than_a_week_is_left_the_whole_log_is_diagnosed_and_what_that_cannot_see_is_said(
+    telemetry: Telemetry, truth: FittedModel, tmp_path: Path
+) -> None:
+    span = Span(*(utc_datetime(telemetry.time[row]) for row in (0, 6 * 96)))
+    bundle = export(replace(truth, training_span=span), tmp_path / "bundle")
+    log = prepare_log(telemetry, SITE)
+    whole, (note,) = since_calibration(log, bundle)
+    assert whole is log
+    assert "not seen" in note
 
 
 def test_the_command_prints_a_table_and_writes_it(

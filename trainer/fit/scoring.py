@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from datetime import datetime
 
 import numpy as np
 
@@ -79,26 +80,31 @@ def _scores(record: Record, predict: Predictor, horizons: Sequence[str], how: st
     return summarise([found])
 
 
+def calibrated_until(log: Log, bundle: Bundle) -> datetime | None:
+    """Return the end of the days that a bundle was calibrated on, UTC, where a log holds some of them, else None."""
+    span, time = bundle.manifest.training_span, log.telemetry.time
+    if span is None or bundle.manifest.calibrated_on != log.known_site.name or len(time) == 0:
+        return None
+    start, end = (np.datetime64(one.replace(tzinfo=None), "s") for one in (span.start, span.end))
+    return None if time[-1] <= start or time[0] > end else span.end
+
+
 def unseen(log: Log, bundle: Bundle) -> Log:
-    """Return the part of a log that a bundle was not calibrated on.
+    """Return the part of a log that a bundle was not calibrated on: what is later, with a note on what was left out.
 
     Raises:
         IgrowError: there is none.
     """
-    span = bundle.manifest.training_span
-    time = log.telemetry.time
-    if span is None or bundle.manifest.calibrated_on != log.known_site.name or len(time) == 0:
+    until = calibrated_until(log, bundle)
+    if until is None:
         return log
-    start, end = (np.datetime64(one.replace(tzinfo=None), "s") for one in (span.start, span.end))
-    if time[-1] <= start or time[0] > end:
-        return log
-    if time[-1] <= end:
+    rest = log.select(np.datetime64(until.replace(tzinfo=None), "s") + np.timedelta64(1, "s"), None)
+    if len(rest) == 0:
         raise IgrowError(
-            f"{log.name}: the bundle was calibrated on {span.start:%Y-%m-%d} to {span.end:%Y-%m-%d}, all days of this "
-            "log are among them: give a later one"
+            f"{log.name}: the bundle was calibrated on days up to {until:%Y-%m-%d %H:%M} UTC, all days of this log are "
+            "among them: give a later one"
         )
-    rest = log.select(end + np.timedelta64(1, "s"), None)
-    return replace(rest, notes=(*log.notes, f"days up to {span.end:%Y-%m-%d %H:%M} UTC were fitted on: left out"))
+    return replace(rest, notes=(*log.notes, f"days up to {until:%Y-%m-%d %H:%M} UTC were fitted on: left out"))
 
 
 def planned_runs(bundle: Bundle, site: Site, record: Record, setpoints: Mapping[str, Floats]) -> Predictor:
