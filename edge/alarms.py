@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from igrow.edge.alarm_levels import Level, usual_level
-from igrow.edge.ports import AlarmRecord
+from igrow.edge.records import AlarmRecord
 
 
 class AlarmBoard:

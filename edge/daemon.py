@@ -24,7 +24,7 @@ from igrow.edge.image import Quality
 from igrow.edge.journal import Journal
 from igrow.edge.notify import Notifier
 from igrow.edge.ports import Plan
-from igrow.edge.reloading import Reloading
+from igrow.edge.reloading import Reloading, refuse_what_needs_a_restart, same_registers
 from igrow.edge.snapshot import snapshot_of
 from igrow.edge.state_lock import sole_use
 from igrow.edge.stopping import STOP_SECONDS, StopReport
@@ -216,7 +216,7 @@ class Daemon:
             self.services,
             self._journal,
             clock=before.clock if before else None,
-            plc=before.plc if before and _same_registers(before.configuration, self.configuration) else None,
+            plc=before.plc if before and same_registers(before.configuration, self.configuration) else None,
         )
         if before is not None:
             carry_over(control, before)
@@ -232,7 +232,7 @@ class Daemon:
             configuration = self._reloading.take()
             if configuration is None:
                 return
-            _refuse_what_needs_a_restart(self.configuration, configuration)
+            refuse_what_needs_a_restart(self.configuration, configuration)
         except (IgrowError, OSError) as error:
             self._configuration_problem = f"the new configuration is not used: {error}"
             self._journal.event("reload_refused", reason=str(error))
@@ -263,24 +263,6 @@ class Daemon:
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(HandOff("closing").run(self.services.close), CLOSE_SECONDS)
             self._notifier.close()
-
-
-def _same_registers(old: Configuration, new: Configuration) -> bool:
-    return old.register_map == new.register_map
-
-
-def _refuse_what_needs_a_restart(old: Configuration, new: Configuration) -> None:
-    """Raise IgrowError for a change that a running daemon cannot take."""
-    for what, before, after in (
-        ("the site's name", old.site.name, new.site.name),
-        ("state", old.state_folder, new.state_folder),
-        ("exchange", old.exchange, new.exchange),
-        ("transfer", old.file.transfer, new.file.transfer),
-        ("status.port", old.file.status.port, new.file.status.port),
-        ("cycle.clock", old.file.cycle.clock, new.file.cycle.clock),
-    ):
-        if before != after:
-            raise IgrowError(f"{new.path}: {what} changed from {before} to {after}, which needs a restart")
 
 
 async def run_daemon(path: Path) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from igrow.core.telemetry import Telemetry
-from igrow.edge.ports import WriteRecord
+from igrow.edge.records import WriteRecord
 
 
 @dataclass(frozen=True)

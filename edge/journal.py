@@ -17,7 +17,8 @@ from igrow.edge.alarms import AlarmBoard
 from igrow.edge.guard import Clamp, Finding, Force, WriteOutcome
 from igrow.edge.guard.findings import Outcome, Problem
 from igrow.edge.image import Image, Value
-from igrow.edge.ports import AlarmRecord, Store, WriteRecord
+from igrow.edge.ports import Store
+from igrow.edge.records import AlarmRecord, WriteRecord
 from igrow.edge.sensors.consequences import CONSEQUENCES
 from igrow.edge.sentences import log_event
 

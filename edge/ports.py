@@ -1,4 +1,4 @@
-"""What the control cycle needs from the rest of the gateway, as Protocols, and the records that cross.
+"""What the control cycle needs from the rest of the gateway, as Protocols, and what they hand over.
 
 The cycle is written against this file alone (and `igrow.edge.bus.plc` for the PLC). The store, the planning process,
 the bundle updates and the status page implement it; tests implement it with a few lines each.
@@ -18,47 +18,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from igrow.core.telemetry import Telemetry
-from igrow.edge.alarm_levels import Level
 from igrow.edge.image import Value
+from igrow.edge.records import AlarmRecord, WriteRecord
 
 if TYPE_CHECKING:
     from igrow.core.planner.explain import Explanation
     from igrow.edge.earlier import Earlier
-
-# --- records --------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True)
-class WriteRecord:
-    """One value that left for the PLC, or that the guard changed or held back: a row of the ledger."""
-
-    time: float | None
-    monotonic: float
-    point: str
-    requested: float | None
-    """What the decision asked for; NaN and infinities are stored as None."""
-    applied: float | None
-    """What was written; None when nothing was."""
-    source: str
-    """Who asked: override, plan, last_plan, recipe, hands_off, interlock, hand or stop."""
-    reason: str
-    """Why applied differs from requested, or what an interlock or a hand gets back; else empty."""
-    outcome: str
-    """"written", "clamped" (nothing was written this time), "confirmed", "unconfirmed" or "failed"."""
-
-
-@dataclass(frozen=True, slots=True)
-class AlarmRecord:
-    """An alarm that came or went. `name` is stable, so that two records with one name are one alarm's life."""
-
-    time: float | None
-    monotonic: float
-    name: str
-    active: bool
-    text: str
-    """One line for people: what is wrong, where, what to do."""
-    level: Level = Level.WARNING
-
 
 # --- store ----------------------------------------------------------------------------------------------------
 

@@ -1,4 +1,7 @@
-"""Reads the configuration again while control goes on: a file on a share that hangs must not hold a cycle."""
+"""Reads the configuration again while control goes on: a file on a share that hangs must not hold a cycle.
+
+And says what of it a running daemon can take over.
+"""
 
 from __future__ import annotations
 
@@ -49,3 +52,22 @@ class Reloading:
         with contextlib.suppress(TimeoutError):
             return await asyncio.wait_for(reading, RELOAD_SECONDS)
         raise IgrowError(f"{self._path}: its files could not be read within {RELOAD_SECONDS:g} s")
+
+
+def same_registers(old: Configuration, new: Configuration) -> bool:
+    """Tell whether the lines can stay as they are."""
+    return old.register_map == new.register_map
+
+
+def refuse_what_needs_a_restart(old: Configuration, new: Configuration) -> None:
+    """Raise IgrowError for a change that a running daemon cannot take."""
+    for what, before, after in (
+        ("the site's name", old.site.name, new.site.name),
+        ("state", old.state_folder, new.state_folder),
+        ("exchange", old.exchange, new.exchange),
+        ("transfer", old.file.transfer, new.file.transfer),
+        ("status.port", old.file.status.port, new.file.status.port),
+        ("cycle.clock", old.file.cycle.clock, new.file.cycle.clock),
+    ):
+        if before != after:
+            raise IgrowError(f"{new.path}: {what} changed from {before} to {after}, which needs a restart")

@@ -6,89 +6,28 @@ from __future__ import annotations
 import itertools
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
-from typing import Literal
 
 from igrow.core.yaml_schema import SettingError, load, parse, setting
+from igrow.edge.registers.bus_file import RtuBus, RtuOverTcpBus, TcpBus, TlsBus, bus_settings
 from igrow.edge.registers.bus_load import estimate
 from igrow.edge.registers.codec import NotEncodableError, encode
 from igrow.edge.registers.model import (
     POINT_NAMES,
-    BusSettings,
     ByteOrder,
     DataType,
     Device,
     Function,
-    Parity,
     Point,
     RegisterMap,
-    Transport,
     expected_unit,
     valid_range,
 )
 
 _ZERO = timedelta(0)
 _SECOND = timedelta(seconds=1)
-_SERIAL_GAP = timedelta(milliseconds=30)
-_LONGEST_TIMEOUT = timedelta(seconds=60)
-
-_TIMEOUT = "longest wait for an answer"
-_GAP = "rest between two requests on the bus"
-
-
-@dataclass(frozen=True)
-class TcpBus:
-    """A device or gateway that speaks Modbus TCP."""
-
-    transport: Literal["tcp"] = setting(help="how the bus carries its frames")
-    host: str = setting(help="address or name")
-    port: int = setting(help="TCP port", low=1, high=65535, default=502)
-    timeout: timedelta = setting(help=_TIMEOUT, low=_ZERO, high=_LONGEST_TIMEOUT, default=_SECOND)
-    gap: timedelta = setting(help=_GAP, low=_ZERO, default=_ZERO)
-
-
-@dataclass(frozen=True)
-class RtuOverTcpBus:
-    """A converter that carries the frames of a serial line over TCP."""
-
-    transport: Literal["rtu_over_tcp"] = setting(help="how the bus carries its frames")
-    host: str = setting(help="address or name")
-    port: int = setting(help="TCP port", low=1, high=65535)
-    baudrate: int = setting(help="speed of the line behind the converter", low=300, high=4_000_000, default=19200)
-    parity: Parity = setting(help="parity of that line", default=Parity.EVEN)
-    stop_bits: int = setting(help="stop bits of that line", low=1, high=2, default=1)
-    timeout: timedelta = setting(help=_TIMEOUT, low=_ZERO, high=_LONGEST_TIMEOUT, default=_SECOND)
-    gap: timedelta = setting(help=_GAP, low=_ZERO, default=_SERIAL_GAP)
-
-
-@dataclass(frozen=True)
-class RtuBus:
-    """A serial line (RS-485 or RS-232)."""
-
-    transport: Literal["rtu"] = setting(help="how the bus carries its frames")
-    serial_port: str = setting(help="such as /dev/ttyUSB0, or better a name under /dev/serial/by-id")
-    baudrate: int = setting(help="speed of the line", low=300, high=4_000_000, default=19200)
-    parity: Parity = setting(help="parity bit", default=Parity.EVEN)
-    stop_bits: int = setting(help="stop bits", low=1, high=2, default=1)
-    timeout: timedelta = setting(help=_TIMEOUT, low=_ZERO, high=_LONGEST_TIMEOUT, default=_SECOND)
-    gap: timedelta = setting(help=_GAP, low=_ZERO, default=_SERIAL_GAP)
-
-
-@dataclass(frozen=True)
-class TlsBus:
-    """Modbus TCP inside TLS (Modbus/TCP Security)."""
-
-    transport: Literal["tls"] = setting(help="how the bus carries its frames")
-    host: str = setting(help="address or name")
-    certificate_authority: str = setting(help="file of the authority that signed the server's certificate")
-    port: int = setting(help="TCP port", low=1, high=65535, default=802)
-    server_name: str = setting(help="name in the server's certificate, if it is not the host", default="")
-    certificate: str | None = setting(help="file of our own certificate", default=None)
-    private_key: str | None = setting(help="file of the key to our certificate", default=None)
-    timeout: timedelta = setting(help=_TIMEOUT, low=_ZERO, high=_LONGEST_TIMEOUT, default=_SECOND)
-    gap: timedelta = setting(help=_GAP, low=_ZERO, default=_ZERO)
 
 
 @dataclass(frozen=True)
@@ -220,7 +159,7 @@ class MapFile:
         return RegisterMap(
             title=self.title,
             source=self.source,
-            buses={name: _bus(name, bus, folder) for name, bus in self.buses.items()},
+            buses={name: bus_settings(name, bus, folder) for name, bus in self.buses.items()},
             devices={name: _device(name, device) for name, device in self.devices.items()},
             points={name: point.point(name) for name, point in self.points.items()},
             hardware_tested=self.hardware_tested,
@@ -289,28 +228,6 @@ class MapFile:
 
 def _unknown(kind: str, name: str, known: Mapping[str, object]) -> str:
     return f"there is no {kind} {name}: known here: {', '.join(known)}"
-
-
-def _bus(name: str, bus: TcpBus | RtuBus | RtuOverTcpBus | TlsBus, folder: Path) -> BusSettings:
-    common = BusSettings(
-        name, Transport(bus.transport), timeout=bus.timeout.total_seconds(), gap=bus.gap.total_seconds()
-    )
-    if isinstance(bus, RtuBus):
-        return replace(
-            common, serial_port=bus.serial_port, baudrate=bus.baudrate, parity=bus.parity, stop_bits=bus.stop_bits
-        )
-    common = replace(common, host=bus.host, port=bus.port)
-    if isinstance(bus, RtuOverTcpBus):
-        return replace(common, baudrate=bus.baudrate, parity=bus.parity, stop_bits=bus.stop_bits)
-    if isinstance(bus, TlsBus):
-        return replace(
-            common,
-            server_name=bus.server_name,
-            certificate_authority=folder / bus.certificate_authority,
-            certificate=folder / bus.certificate if bus.certificate else None,
-            private_key=folder / bus.private_key if bus.private_key else None,
-        )
-    return common
 
 
 def _device(name: str, device: DeviceSettings) -> Device:

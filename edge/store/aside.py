@@ -16,7 +16,7 @@ from igrow.core.telemetry import Telemetry
 from igrow.edge.earlier import Earlier
 from igrow.edge.hand_off import PATIENCE, SHARE, HandOff, LateError
 from igrow.edge.image import Value
-from igrow.edge.ports import AlarmRecord, WriteRecord
+from igrow.edge.records import AlarmRecord, WriteRecord
 from igrow.edge.store.packing import pack
 from igrow.edge.store.store import SqliteStore, StoreError, StoreLimits, read_telemetry
 

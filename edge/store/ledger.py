@@ -11,106 +11,22 @@ import json
 import os
 import shutil
 import sqlite3
-from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing, suppress
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 
-from igrow.edge.store.database import Synchronous, describe, is_damage, is_full, open_database, set_aside
+from igrow.edge.store.database import Synchronous, describe, is_damage, is_full, set_aside
+from igrow.edge.store.ledger_file import LedgerFile, Record, all_lines, newest_in, record_of
 
-SCHEMA = """
-CREATE TABLE IF NOT EXISTS records (
-    sequence INTEGER PRIMARY KEY, category TEXT NOT NULL, time REAL, body TEXT NOT NULL
-);
-CREATE INDEX IF NOT EXISTS by_category ON records (category, sequence);
-"""
 NAMES = ("ledger-a.db", "ledger-b.db")
 RESERVE_BYTES = 2**20
-LOG_PAGES = 32
-"""A short write-ahead log, so that the reserve holds hundreds of events."""
-WAITING = 10_000
-"""Records that are kept in memory for a disk that takes none."""
-
-
-@dataclass(frozen=True, slots=True)
-class Record:
-    """One line of the ledger."""
-
-    sequence: int
-    category: str
-    """"event", "write", "alarm", or "state": what a restart must not forget, of which only the newest counts."""
-    time: float | None
-    """Seconds since 1970 UTC; None where the clock was not to be trusted."""
-    body: Mapping[str, object]
-
-
-_Line = tuple[int, str, float | None, str]
-
-
-class _File:
-    """One of the twins."""
-
-    def __init__(self, path: Path, *, max_bytes: int, synchronous: Synchronous) -> None:
-        self.path = path
-        self._max_bytes = max_bytes
-        self._synchronous: Synchronous = synchronous
-        self._connection: sqlite3.Connection | None = None
-        self.waiting: deque[_Line] = deque(maxlen=WAITING)
-        self.problem = ""
-
-    def open(self) -> sqlite3.Connection:
-        if self._connection is None:
-            self._connection = open_database(
-                self.path,
-                max_bytes=self._max_bytes,
-                synchronous=self._synchronous,
-                schema=SCHEMA,
-                log_pages=LOG_PAGES,
-            )
-        return self._connection
-
-    def close(self) -> None:
-        if self._connection is not None:
-            self._connection.close()
-        self._connection = None
-
-    def insert(self, lines: Sequence[_Line]) -> None:
-        connection = self.open()
-        connection.execute("BEGIN IMMEDIATE")
-        try:
-            connection.executemany("INSERT OR IGNORE INTO records VALUES (?, ?, ?, ?)", lines)
-            connection.execute("COMMIT")
-        except BaseException:
-            if connection.in_transaction:
-                connection.execute("ROLLBACK")
-            raise
-
-    def prune(self) -> bool:
-        """Delete the oldest tenth of the writes and states or, where there are few, of everything; tell if it could.
-
-        The newest state stays, as there may have been nothing to note for a long time.
-        """
-        connection = self.open()
-        newest = "sequence != (SELECT ifnull(max(sequence), 0) FROM records WHERE category = 'state')"
-        for where in (f"category IN ('write', 'state') AND {newest}", newest):
-            (count,) = connection.execute(f"SELECT count(*) FROM records WHERE {where}").fetchone()
-            if count >= 1000:
-                connection.execute(
-                    f"DELETE FROM records WHERE sequence IN (SELECT sequence FROM records WHERE {where} "
-                    "ORDER BY sequence LIMIT ?)",
-                    (count // 10,),
-                )
-                connection.execute("PRAGMA incremental_vacuum").fetchall()
-                return True
-        return False
 
 
 class Ledger:
     """The twins as one. Nothing here raises for a bad disk; `problem` tells."""
 
     def __init__(self, folder: Path, *, max_bytes: int, synchronous: Synchronous) -> None:
-        self._files = tuple(_File(folder / name, max_bytes=max_bytes, synchronous=synchronous) for name in NAMES)
+        self._files = tuple(LedgerFile(folder / name, max_bytes=max_bytes, synchronous=synchronous) for name in NAMES)
         self._reserve = folder / "reserve.bin"
         self._since_reserve = 0
         self.reports: list[str] = []
@@ -153,9 +69,9 @@ class Ledger:
         """Yield the records of one category, newest first; those that wait in memory are included."""
         file = min(self._files, key=lambda candidate: (bool(candidate.problem), len(candidate.waiting)))
         for line in reversed([line for line in file.waiting if line[1] == category]):
-            yield _record(line)
+            yield record_of(line)
         with suppress(sqlite3.Error):
-            yield from _newest(file.open(), category)
+            yield from newest_in(file.open(), category)
 
     def last_time(self) -> float | None:
         """Return the time of the newest record that has one, as far as a file can be read."""
@@ -172,7 +88,7 @@ class Ledger:
         for file in self._files:
             file.close()
 
-    def _flush(self, file: _File) -> None:
+    def _flush(self, file: LedgerFile) -> None:
         for _ in range(4):
             try:
                 file.insert(list(file.waiting))
@@ -186,7 +102,7 @@ class Ledger:
                 file.problem = ""
                 return
 
-    def _cure(self, file: _File, error: Exception) -> bool:
+    def _cure(self, file: LedgerFile, error: Exception) -> bool:
         """Do what can be done about an error; tell whether another attempt makes sense."""
         if not isinstance(error, sqlite3.Error):
             return False
@@ -204,11 +120,11 @@ class Ledger:
             pass
         return False
 
-    def _replace(self, file: _File, error: sqlite3.Error) -> None:
+    def _replace(self, file: LedgerFile, error: sqlite3.Error) -> None:
         """Set a damaged file aside and fill a new one from its twin."""
         aside = set_aside(file.path)
         (twin,) = (other for other in self._files if other is not file)
-        lines = _all_lines(twin)
+        lines = all_lines(twin)
         file.insert(lines)
         self.reports.append(
             f"{file.path.name} was damaged ({describe(error)}); set aside as {aside.name}, "
@@ -229,7 +145,7 @@ class Ledger:
                 file.open().execute("SELECT count(*), total(sequence) FROM records").fetchone() for file in self._files
             ]
             if ends[0] != ends[1]:
-                ours, theirs = _all_lines(first), _all_lines(second)
+                ours, theirs = all_lines(first), all_lines(second)
                 first.insert(theirs)
                 second.insert(ours)
         except (sqlite3.Error, OSError):
@@ -250,9 +166,7 @@ class Ledger:
         if self._numbered:
             self._next += last
             for file in self._files:
-                file.waiting = deque(
-                    ((line[0] + last, line[1], line[2], line[3]) for line in file.waiting), maxlen=WAITING
-                )
+                file.number_after(last)
 
     def _keep_reserve(self) -> None:
         """Keep the reserve file at its size; a disk without room for it is no error here."""
@@ -268,42 +182,3 @@ class Ledger:
                     os.close(descriptor)
         except OSError:
             pass
-
-
-def read_newest(path: Path, category: str, after: int = 0) -> list[Record]:
-    """Read one category of a ledger file that another process may be writing, newest first.
-
-    Only records with a sequence number above `after`. Raises sqlite3.Error.
-    """
-    with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=5.0)) as connection:
-        return list(_newest(connection, category, after))
-
-
-def read_after(path: Path, after: int, most: int) -> list[Record]:
-    """Read the first `most` records with a sequence number above `after`, oldest first; raises sqlite3.Error."""
-    query = "SELECT sequence, category, time, body FROM records WHERE sequence > ? ORDER BY sequence LIMIT ?"
-    with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=5.0)) as connection:
-        return [_record(line) for line in connection.execute(query, (after, most))]
-
-
-def read_newest_sequence(path: Path) -> int:
-    """Return the newest record's sequence number, 0 where there is none; raises sqlite3.Error."""
-    with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=5.0)) as connection:
-        return int(connection.execute("SELECT max(sequence) FROM records").fetchone()[0] or 0)
-
-
-def _newest(connection: sqlite3.Connection, category: str, after: int = 0) -> Iterator[Record]:
-    query = (
-        "SELECT sequence, category, time, body FROM records WHERE category = ? AND sequence > ? ORDER BY sequence DESC"
-    )
-    for line in connection.execute(query, (category, after)):
-        yield _record(line)
-
-
-def _all_lines(file: _File) -> list[_Line]:
-    return file.open().execute("SELECT sequence, category, time, body FROM records").fetchall()
-
-
-def _record(line: _Line) -> Record:
-    sequence, category, time, body = line
-    return Record(sequence, category, time, json.loads(body))

@@ -14,10 +14,11 @@ from igrow.core.errors import IgrowError
 from igrow.core.telemetry import Telemetry, concatenate
 from igrow.edge.earlier import Earlier
 from igrow.edge.image import Value
-from igrow.edge.ports import AlarmRecord, WriteRecord
+from igrow.edge.records import AlarmRecord, WriteRecord
 from igrow.edge.sentences import log_event
 from igrow.edge.store.database import Synchronous, describe
-from igrow.edge.store.ledger import NAMES, RESERVE_BYTES, Ledger, Record, read_after, read_newest, read_newest_sequence
+from igrow.edge.store.ledger import NAMES, RESERVE_BYTES, Ledger
+from igrow.edge.store.ledger_file import Record, read_after, read_newest, read_newest_sequence
 from igrow.edge.store.packing import Row, pack
 from igrow.edge.store.telemetry_file import TelemetryFile, read_file, read_first_time, to_telemetry
 

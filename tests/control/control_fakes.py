@@ -18,7 +18,7 @@ from igrow.edge.earlier import Earlier
 from igrow.edge.guard import GuardedWriter, GuardRules, Interlock, PointRule, Readback
 from igrow.edge.image import Image, Quality, Value
 from igrow.edge.journal import Journal
-from igrow.edge.ports import AlarmRecord, WriteRecord
+from igrow.edge.records import AlarmRecord, WriteRecord
 from igrow.edge.sensors import ImageBuilder, SensorRule
 from igrow.edge.sources import HandsOff, Source
 
@@ -26,6 +26,9 @@ SETPOINTS = ("heating_setpoint", "co2_setpoint")
 
 HEATING = PointRule(low=12.0, high=28.0, safe=18.0, slew=4.0 / 3600.0, dead_band=0.1, minimum_interval=300.0)
 CO2 = PointRule(low=400.0, high=1000.0, safe=400.0, slew=None, dead_band=10.0, minimum_interval=60.0)
+
+READ_AGAIN = 0.001
+"""Seconds by which a second reading in a cycle is later than the first."""
 
 
 class FakePlc:
@@ -40,6 +43,7 @@ class FakePlc:
         self.writes: list[tuple[float, str, float]] = []
 
     async def read(self, names: Collection[str] | None = None) -> Mapping[str, Reading]:
+        self.clock.advance(0.0 if names is None else READ_AGAIN)
         now = self.clock.monotonic()
         wanted = self.values if names is None else names
         if self.silent:

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from igrow.edge.image import Quality, Value
-from igrow.edge.ports import AlarmRecord, Plan, SetpointStatus, Snapshot, WriteRecord
+from igrow.edge.ports import Plan, SetpointStatus, Snapshot
+from igrow.edge.records import AlarmRecord, WriteRecord
 
 NOW = 1_773_500_400.0
 

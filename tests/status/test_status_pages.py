@@ -7,7 +7,7 @@ import json
 
 import pytest
 
-from igrow.edge.ports import AlarmRecord
+from igrow.edge.records import AlarmRecord
 from igrow.edge.status import StatusServer
 from tests.status.status_helpers import NOW, snapshot
 

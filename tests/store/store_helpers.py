@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from igrow.edge.image import Quality, Value
-from igrow.edge.ports import WriteRecord
+from igrow.edge.records import WriteRecord
 from igrow.edge.store import SqliteStore, StoreLimits
-from igrow.edge.store.ledger import Record
+from igrow.edge.store.ledger_file import Record
 
 START = 1_780_000_000.0
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from igrow.core.telemetry import read_csv
 from igrow.edge.image import Quality, Value
-from igrow.edge.ports import AlarmRecord
+from igrow.edge.records import AlarmRecord
 from igrow.edge.store import SqliteStore, StoreError, StoreLimits, backup, export, read_records, read_telemetry, restore
 from igrow.edge.store.packing import pack, unpack_good
 from tests.store.store_helpers import START, values, write_record

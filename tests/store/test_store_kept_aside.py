@@ -11,12 +11,12 @@ import pytest
 
 from igrow.edge.hand_off import LateError
 from igrow.edge.image import Quality, Value
-from igrow.edge.ports import AlarmRecord, WriteRecord
+from igrow.edge.records import AlarmRecord, WriteRecord
 from igrow.edge.store import SqliteStore, StoreAside, StoreError, StoreLimits, read_records
 from igrow.edge.store import aside as aside_module
+from tests.patience import PATIENCE as SOON
 
 LIMITS = StoreLimits(survive_power_cut=False)
-SOON = 60.0
 
 
 class Disk:
@@ -59,7 +59,7 @@ def test_what_was_recorded_while_the_disk_hung_is_there_in_its_order_when_it_ans
     store.record_write(WriteRecord(1.8e9, 1.0, "co2_setpoint", 700.0, 700.0, "plan", "", "written"))
     store.record_alarm(AlarmRecord(1.8e9, 1.0, "link", True, "down"))
     store.record_state(1.8e9, {"points": {}})
-    assert time.monotonic() - begin < SOON / 10
+    assert time.monotonic() - begin < SOON
     assert kinds(tmp_path) == ["before"]
     disk.answers.set()
     store.flush()
@@ -75,7 +75,7 @@ def test_a_disk_that_hangs_from_the_start_delays_the_first_records_and_not_the_s
     begin = time.monotonic()
     store = StoreAside(tmp_path, LIMITS, patience=0.05)
     store.record_event(None, "started", {})
-    assert time.monotonic() - begin < SOON / 10
+    assert time.monotonic() - begin < SOON
     earlier = store.earlier(0.0)
     disk.answers.set()
     earlier.result(SOON)
@@ -123,7 +123,7 @@ def test_a_stop_leaves_a_disk_behind_that_hangs(tmp_path: Path, disk, monkeypatc
     begin = time.monotonic()
     with pytest.raises(StoreError, match="pieces of work are lost"):
         store.close()
-    assert time.monotonic() - begin < SOON / 10
+    assert time.monotonic() - begin < SOON
     store.append(1.8e9, {"air_temperature": Value(1.0, Quality.GOOD, 0.0)})  # nobody listens any more
 
 
