@@ -22,8 +22,8 @@ from igrow.core.site import Site, load_site
 from igrow.core.yaml_schema import duration, load, place
 from igrow.edge.daemon_file import BUILT_IN_BUNDLE, ClockSource, CycleSettings, DaemonFile
 from igrow.edge.guard import DEFAULT_INTERLOCKS, GuardRules
+from igrow.edge.guard.heartbeat import HEARTBEAT
 from igrow.edge.guard.rules import GuardRuleError
-from igrow.edge.guard.writer import HEARTBEAT
 from igrow.edge.point_rules import highest_beat, point_rule
 from igrow.edge.registers.bus_load import estimate
 from igrow.edge.registers.loading import load_register_map

@@ -27,8 +27,8 @@ from igrow.edge.guard import (
 )
 from igrow.edge.guard.core import LONGEST_RAMP, begin_again, go_on, never_sent, postponed
 from igrow.edge.guard.findings import moved_and_stood
+from igrow.edge.guard.heartbeat import HEARTBEAT
 from igrow.edge.guard.memory import note, recall
-from igrow.edge.guard.writer import HEARTBEAT
 from igrow.edge.image import Image, Quality
 from igrow.edge.journal import Journal
 from igrow.edge.sensors import ImageBuilder, RawReading
@@ -99,13 +99,16 @@ class ControlCycle:
         self._source, self._manual = before._source, before._manual
         self._seen, self.unknown_until = before._seen, before.unknown_until
         self._builder.carry_over(before._builder, same)
-        for name in self.readback.points.keys() & before.readback.points.keys() & set(same):
-            self.readback.points[name] = before.readback.points[name]
+        self.readback.carry_over(before.readback, same)
+        if HEARTBEAT in same:
+            self._writer.beats.carry_over(before._writer.beats)
 
     def recall(self, content: Mapping[str, object], later: float, *, same: Collection[str], agree: bool) -> None:
         """Go on where the process before this one stood; see `igrow.edge.guard.memory`."""
         self.state = recall(content, self.readback, later, same=same, agree=agree)
         self._manual = content.get("manual") is True
+        if HEARTBEAT in same:
+            self._writer.beats.recall(content)
 
     async def run(self, names: Collection[str] | None = None) -> CycleResult:
         """Run one cycle. `names` None reads what is due."""
@@ -170,7 +173,9 @@ class ControlCycle:
         if names is None and (more := {*self._look_at, *self._builder.names((MANUAL,))} - readings.keys()):
             readings = {**readings, **await self._plc.read(sorted(more))}
         image = self._image(readings, patient=names is None)
-        if names is None and (unseen := self.readback.unseen(image) - readings.keys()):
+        # Who has just not answered is not asked twice in a cycle.
+        failed = {name for name, reading in readings.items() if reading.error is not None}
+        if names is None and (unseen := self.readback.unseen(image) - failed):
             image = self._image(await self._plc.read(sorted(unseen)), patient=True)
         self._look_whether_by_hand(image)
         return image
@@ -181,8 +186,8 @@ class ControlCycle:
         self._seen |= image.link_ok and bool(readings)
         self._journal.begin(image)
         beat = image.value_of(HEARTBEAT)
-        lost = self._writer.heartbeat_was_lost(beat.value if beat.age <= 0.0 else None)
-        findings = self.readback.observe(image, restarted=lost, patient=patient)
+        cleared = beat.value is not None and beat.age <= 0.0 and self._writer.beats.was_cleared(beat.value)
+        findings = self.readback.observe(image, restarted=cleared, patient=patient)
         self._journal.findings(findings, self._respect_hand)
         moved, stood = moved_and_stood(findings, briefly=LONGEST_RAMP)
         self.state = go_on(begin_again(self.state, moved), stood)
@@ -230,7 +235,8 @@ class ControlCycle:
     def _remember(self, image: Image) -> None:
         # What is not known yet must not be replaced by what little is known until then.
         if self._keep is not None and image.monotonic >= self.unknown_until:
-            self._keep(image, {**note(self.state, self.readback), "manual": self._manual})
+            content = {**note(self.state, self.readback), **self._writer.beats.note(), "manual": self._manual}
+            self._keep(image, content)
 
     def _written(self, outcomes: Sequence[WriteOutcome], before: GuardState) -> None:
         """Forget what certainly never left."""
@@ -250,10 +256,7 @@ class ControlCycle:
             if hand.stands:
                 held[name] = hand.seconds
             else:
-                why = (
-                    f"back to {hand.value:g}, set by hand at the PLC and respected for {hand.seconds / 60:.0f} min more"
-                )
-                restored[name] = Request(hand.value, "hand", why, at_once=True)
+                restored[name] = hand.asked_back()
         held |= dict.fromkeys(self.readback.in_question, 0.0)
         if now < self.unknown_until:
             held |= {name: self.unknown_until - now for name in self._rules.points if name not in held}

@@ -66,6 +66,8 @@ class Image:
     """At least one unit answers."""
     silent: Mapping[str, frozenset[str]] = field(default_factory=lambda: MappingProxyType({}))
     """The units that were asked and did not answer, each with its points."""
+    interrupted: Mapping[str, frozenset[str]] = field(default_factory=lambda: MappingProxyType({}))
+    """The units that did not answer each of these requests, or none, each with its points."""
 
     def value_of(self, name: str) -> Value:
         """Return the value of a point, `MISSING` for a point that this plant does not have."""

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 
 from igrow.core.site import SetpointLimits
+from igrow.edge.guard.heartbeat import HIGHEST_BEAT
 from igrow.edge.guard.rules import GuardRuleError, PointRule
-from igrow.edge.guard.writer import HIGHEST_BEAT
 from igrow.edge.registers.codec import decode, encode
 from igrow.edge.registers.model import DataType, Point
 

@@ -19,7 +19,7 @@ from igrow.edge.daemon_file import ClockSource
 from igrow.edge.exchange import ExchangeService
 from igrow.edge.exchange.service import TransferRules
 from igrow.edge.guard import GuardedWriter, Readback
-from igrow.edge.guard.writer import HEARTBEAT
+from igrow.edge.guard.heartbeat import HEARTBEAT
 from igrow.edge.hand_off import PATIENCE, SHARE, HandOff
 from igrow.edge.journal import Journal
 from igrow.edge.moment import this_boot
@@ -210,7 +210,8 @@ def build_control(
     every = site.planning.replan_every.total_seconds()
     units = {name: point.device for name, point in register_map.points.items()}
     boot = this_boot() if isinstance(clock, SystemClock) else ""
-    notes = StateNotes(services.store, boot, registers_of(register_map, rules.points))
+    remembered = [name for name in (*rules.points, HEARTBEAT) if name in register_map.points]
+    notes = StateNotes(services.store, boot, registers_of(register_map, remembered))
     heartbeat = register_map.points.get(HEARTBEAT)
     override = GrowerOverride(
         StateFile(override_file(configuration.state_folder), services.state_files), boot, journal.event

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 
+from igrow.edge.guard.causes import FALLBACK
+from igrow.edge.guard.heartbeat import HEARTBEAT
 from igrow.edge.guard.point_memory import PointMemory
 from igrow.edge.guard.rules import PointRule
 from igrow.edge.image import Image, Quality
-
-HEARTBEAT = "heartbeat"
 
 
 class Questions:
@@ -21,34 +21,43 @@ class Questions:
         self._units = units
         self._longest = longest
         self._since: dict[str, float] = {}
-        self.wanted: Mapping[str, frozenset[str]] = {}
-        """By point in question: what is to be read to judge it."""
+        self.names: Collection[str] = ()
+        """The points in question."""
+        self.wanted: Collection[str] = ()
+        """What is to be read to judge them."""
 
     def ask(self, changed: Collection[str], image: Image) -> None:
-        """Put those of the changed points in question whose unit has not been read as a whole since they changed."""
-        self._since = {name: self._since.get(name, image.monotonic - image.value_of(name).age) for name in changed}
-        wanted = {
-            name: self._missing(name, since, image)
-            for name, since in self._since.items()
-            if image.monotonic - since <= self._longest
-        }
-        self.wanted = {name: missing for name, missing in wanted.items() if missing}
+        """Put the changed points in question whose unit has not been read as a whole since the last of them was seen.
 
-    def _missing(self, name: str, since: float, image: Image) -> frozenset[str]:
-        unit = self._units.get(name, "")
-        others = (other for other in (*self._decided, HEARTBEAT) if self._units.get(other, "") == unit)
-        return frozenset(other for other in others if _is_older(other, since, image))
+        A reading of the same sweep does not count: one half of it may lie before a PLC's start, the other after it.
+        What has changed in a unit is judged together, as it may have one cause.
+        """
+        self._since = {name: self._since.get(name, image.monotonic - image.value_of(name).age) for name in changed}
+        names: set[str] = set()
+        wanted: set[str] = set()
+        for unit in {self._units.get(name, "") for name in changed}:
+            since = {name: at for name, at in self._since.items() if self._units.get(name, "") == unit}
+            missing = self._missing(unit, since, image)
+            if missing and image.monotonic - min(since.values()) <= self._longest:
+                names |= since.keys()
+                wanted |= missing
+        self.names, self.wanted = names, wanted
+
+    def _missing(self, unit: str, since: Mapping[str, float], image: Image) -> set[str]:
+        last = max(since.values())
+        others = {other for other in (*self._decided, HEARTBEAT, FALLBACK) if self._units.get(other, "") == unit}
+        return {other for other in others if since.get(other) != last and not _is_newer(other, last, image)}
 
 
 def disturbed(points: Mapping[str, PointMemory], image: Image) -> set[str]:
-    """Return the points whose PLC was silent, fell back or started anew since they were last looked at.
+    """Return the points whose PLC was silent, fell back or started anew, and that were not looked at since.
 
     A hand that comes after that could not be told from it. A point that was never read is left out: it cannot be.
     """
     return {
         name
         for name, memory in points.items()
-        if memory.was_disturbed and image.reaches(name) and math.isfinite(image.value_of(name).age)
+        if memory.is_to_be_seen and image.reaches(name) and math.isfinite(image.value_of(name).age)
     }
 
 
@@ -59,7 +68,7 @@ def cannot_be_read(name: str, memory: PointMemory, image: Image, patience: float
     return long and image.reaches(name) and image.value_of(name).quality is Quality.MISSING
 
 
-def _is_older(name: str, since: float, image: Image) -> bool:
-    """Tell whether a point that can be read was not read since then."""
+def _is_newer(name: str, since: float, image: Image) -> bool:
+    """Tell whether a point was read after that; one that cannot be read is not waited for."""
     value = image.value_of(name)
-    return value.quality is not Quality.MISSING and image.monotonic - value.age < since - 1e-6
+    return value.quality is Quality.MISSING or image.monotonic - value.age > since + 1e-6

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
+from igrow.edge.guard.state import Request
+
 
 class Outcome(Enum):
     """What a look at the PLC showed."""
@@ -52,6 +54,11 @@ class Hand:
     """How long it still is."""
     stands: bool
     """It is what the PLC shows; otherwise something else has moved the point away."""
+
+    def asked_back(self) -> Request:
+        """Return the request that puts it back."""
+        why = f"back to {self.value:g}, set by hand at the PLC and respected for {self.seconds / 60:.0f} min more"
+        return Request(self.value, "hand", why, at_once=True)
 
 
 def moved_and_stood(findings: Sequence[Finding], *, briefly: float) -> tuple[set[str], dict[str, float]]:

@@ -67,7 +67,7 @@ def _note_point(memory: PointMemory, state: PointState) -> Entry:
 
 def _recall_point(memory: PointMemory, entry: Entry, later: float, *, agree: bool) -> None:
     # Whatever happened to the PLC in the meantime, nobody looked.
-    memory.absence, memory.was_silent = math.inf, True
+    memory.absence, memory.was_silent, memory.was_interrupted = math.inf, True, True
     memory.hand = _number(entry, "hand")
     memory.held_until = _number(entry, "held_until", -math.inf) + later
     memory.ceiling, memory.floor = _number(entry, "ceiling", math.inf), _number(entry, "floor", -math.inf)

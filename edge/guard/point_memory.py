@@ -62,10 +62,14 @@ class PointMemory:
     """When the unit was heard again after its last silence; None while it is silent."""
     absence: float = 0.0
     """The longest time since the last look that the unit was not heard, or heard no heartbeat."""
+    present_absence: float = 0.0
+    """How long that has been by now; a PLC may fall back at any time until it ends."""
     was_silent: bool = False
-    fell_back: bool = False
-    restarted: bool = False
-    """Seen since the last look: an unanswered request, `plc_fallback`, a cleared heartbeat register."""
+    was_interrupted: bool = False
+    """Since the last look its unit did not answer at all for a cycle, or not to each request."""
+    fell_back_at: float | None = None
+    restarted_at: float | None = None
+    """When `plc_fallback`, or a cleared heartbeat register, was seen that no later look has judged."""
 
     @property
     def shown(self) -> float | None:
@@ -75,9 +79,25 @@ class PointMemory:
         return self.stands if self.answers is None else self.answers
 
     @property
+    def fell_back(self) -> bool:
+        """Its PLC said so, and what it put there may not have been looked at yet."""
+        return self.fell_back_at is not None
+
+    @property
+    def restarted(self) -> bool:
+        """Its PLC has started anew, and what that put there may not have been looked at yet."""
+        return self.restarted_at is not None
+
+    @property
     def was_disturbed(self) -> bool:
         """Its PLC was silent, fell back or started anew since the last look."""
         return self.was_silent or self.fell_back or self.restarted
+
+    @property
+    def is_to_be_seen(self) -> bool:
+        """Something has happened to its PLC, and no reading that certainly came after that was looked at."""
+        fell_back = self.fell_back_at is not None and self.fell_back_at > self.looked_at + 1e-6
+        return self.was_silent or self.restarted or fell_back
 
     def shows(self, rule: PointRule, value: float) -> bool:
         """Tell whether the PLC itself shows a value."""
@@ -164,21 +184,31 @@ class PointMemory:
         else:
             self.floor = self.stands
 
-    def hear(self, now: float, *, answers: bool, beat_at: float | None) -> None:
-        """Take note of whether the unit answers in this cycle, and when it last got a heartbeat."""
+    def hear(self, now: float, *, answers: bool, interrupted: bool, beat_at: float | None) -> None:
+        """Take note of whether the unit answers in this cycle, to each request, and when it last got a heartbeat."""
         since = self.heard_at if self.heard_at is not None else now
-        self.absence = max(self.absence, now - since, 0.0 if beat_at is None else now - beat_at)
+        self.present_absence = max(now - since, 0.0 if beat_at is None else now - beat_at)
+        self.absence = max(self.absence, self.present_absence)
         self.was_silent |= not answers
+        self.was_interrupted |= interrupted
         if answers:
             self.heard_at = now
             self.answering_since = now if self.answering_since is None else self.answering_since
         else:
             self.answering_since = None
 
-    def was_looked_at(self, at: float) -> None:
-        """A reading of the point, taken then, was judged."""
+    def was_looked_at(self, at: float, now: float) -> None:
+        """A reading of the point was judged, taken `at`.
+
+        What was noticed of its PLC in the same sweep may have happened after this reading, so it is kept for the next.
+        """
         self.looked_at = at
-        self.absence, self.was_silent, self.fell_back, self.restarted = 0.0, False, False, False
+        self.absence = self.present_absence
+        self.was_silent = self.was_interrupted = False
+        if self.fell_back_at is not None and self.fell_back_at < now:
+            self.fell_back_at = None
+        if self.restarted_at is not None and self.restarted_at + 1e-6 < at:
+            self.restarted_at = None
 
     def grow_old(self, now: float) -> None:
         """Expect no write any more that is too long ago, and try a limit again that has stood for long enough."""

@@ -24,8 +24,8 @@ class Look:
     """It shows something that neither stood there nor was written."""
     since: float
     """Seconds since it was looked at before."""
-    was_silent: bool
-    """Its unit did not answer in between."""
+    was_interrupted: bool
+    """Its unit did not answer all the time in between."""
     unapplied: bool = False
     """It still shows what stood there before a write of ours."""
 
@@ -34,7 +34,7 @@ def started_anew(looks: Mapping[str, Look], rules: Mapping[str, PointRule]) -> b
     """Tell whether the setpoints of one unit look like those of a PLC after power-up.
 
     At least two do not show what they should, all of them show zero or something outside the limits, at least one
-    that has changed shows that; and it came after a silence, or faster than a hand could be.
+    that has changed shows that; and it came while the unit did not answer each request, or faster than a hand could be.
     """
     changed = [name for name, look in looks.items() if look.changed]
     if not changed or len(changed) + sum(look.unapplied for look in looks.values()) < 2:
@@ -43,8 +43,8 @@ def started_anew(looks: Mapping[str, Look], rules: Mapping[str, PointRule]) -> b
         return False
     if not any(_outside(rules[name], looks[name].shown) for name in changed):
         return False
-    silent = all(looks[name].was_silent for name in changed)
-    return silent or max(looks[name].since for name in changed) < SECONDS_PER_HAND * len(changed)
+    interrupted = all(looks[name].was_interrupted for name in changed)
+    return interrupted or max(looks[name].since for name in changed) < SECONDS_PER_HAND * len(changed)
 
 
 def by_unit(looks: Mapping[str, Look], units: Mapping[str, str]) -> Iterator[tuple[str, Mapping[str, Look]]]:

@@ -19,13 +19,15 @@ import math
 from collections.abc import Collection, Iterator, Mapping
 
 from igrow.edge.guard.answers import matches, on_the_way, rounds
-from igrow.edge.guard.evidence import HEARTBEAT, Questions, cannot_be_read, disturbed
+from igrow.edge.guard.causes import FALLBACK, Causes
+from igrow.edge.guard.evidence import Questions, cannot_be_read, disturbed
 from igrow.edge.guard.findings import Finding, Hand, Outcome, Problem
+from igrow.edge.guard.heartbeat import HEARTBEAT
 from igrow.edge.guard.point_memory import PointMemory
 from igrow.edge.guard.power_up import Look, by_unit, started_anew
 from igrow.edge.guard.rules import PointRule
 from igrow.edge.guard.state import Write
-from igrow.edge.image import Image, Quality
+from igrow.edge.image import Image
 
 SILENCE = 30.0
 """Seconds without a word after which a PLC may have fallen back: three cycles of ten seconds."""
@@ -50,10 +52,10 @@ class Readback:
         self._rules = rules
         self._confirm_within = confirm_within
         self._respect_hand = respect_hand
-        self._silence = silence
         self._units = units or {}
         self.points = {name: PointMemory() for name in rules}
         self._beat_at: float | None = None
+        self._causes = Causes(rules, self.points, self._units, silence)
         self._questions = Questions(rules, self._units, confirm_within)
 
     def wrote(self, write: Write, now: float) -> None:
@@ -67,6 +69,13 @@ class Readback:
     def beat(self, now: float) -> None:
         """Remember that the heartbeat went out."""
         self._beat_at = now
+
+    def carry_over(self, before: Readback, same: Collection[str]) -> None:
+        """Go on where the read-back before a reload stood; `same` are the points that are the same registers."""
+        for name in self.points.keys() & before.points.keys() & set(same):
+            self.points[name] = before.points[name]
+        if HEARTBEAT in same:
+            self._beat_at = before._beat_at
 
     def held(self, now: float) -> dict[str, float]:
         """Return the seconds that each point changed by hand is still respected."""
@@ -95,7 +104,7 @@ class Readback:
 
     def unseen(self, image: Image) -> set[str]:
         """Return the points to be read now, although they may not be due: something has happened to their PLC."""
-        return disturbed(self.points, image).union(*self._questions.wanted.values())
+        return disturbed(self.points, image).union(self._questions.wanted)
 
     def cannot_be_read(self, name: str, image: Image) -> bool:
         """Tell whether no reading of a point is to be waited for."""
@@ -104,7 +113,7 @@ class Readback:
     @property
     def in_question(self) -> Collection[str]:
         """The points that have changed, nobody knows yet by whom; they are to be left alone."""
-        return self._questions.wanted
+        return self._questions.names
 
     def settle(self, targets: Mapping[str, float | None]) -> Mapping[str, Problem | None]:
         """Return what is wrong with our writes by point, leaving out what is no longer wanted otherwise.
@@ -134,27 +143,28 @@ class Readback:
             assert value.value is not None
             found = self._ours(name, value.value, image)
             since, unapplied = now - value.age - memory.looked_at, found is not None and self.pending(name)
-            looks[name] = Look(value.value, found is None, since, memory.was_silent, unapplied)
+            looks[name] = Look(value.value, found is None, since, memory.was_interrupted, unapplied)
             findings.extend(found or ())
-        self._questions.ask({name for name, look in looks.items() if look.changed and patient}, image)
+        unclear = {name for name, look in looks.items() if look.changed and not self.points[name].restarted}
+        self._questions.ask(unclear if patient else (), image)
         looks = {name: look for name, look in looks.items() if name not in self.in_question}
         findings.extend(self._explain(looks, image))
         for name in looks:
-            self.points[name].was_looked_at(now - image.value_of(name).age)
+            self.points[name].was_looked_at(now - image.value_of(name).age, now)
         findings.extend(self._ended(now))
         return findings
 
     def _listen(self, image: Image, restarted: bool) -> None:
         """Note how long each point's unit could not be heard, or could not hear us."""
-        now, fallback = image.monotonic, image.value_of("plc_fallback").says_yes
+        now, fallback = image.monotonic, image.value_of(FALLBACK).says_yes
         beat_at = -math.inf if self._beat_at is None and HEARTBEAT in image.values else self._beat_at
         for name, memory in self.points.items():
-            memory.hear(now, answers=image.reaches(name), beat_at=beat_at)
-            memory.fell_back |= fallback
-            memory.restarted |= restarted and self._same_unit(name, HEARTBEAT)
-
-    def _same_unit(self, name: str, other: str) -> bool:
-        return self._units.get(name, "") == self._units.get(other, "")
+            interrupted = any(name in points for points in image.interrupted.values())
+            memory.hear(now, answers=image.reaches(name), interrupted=interrupted, beat_at=beat_at)
+            if fallback:
+                memory.fell_back_at = now
+            if restarted and self._causes.same_unit(name, HEARTBEAT):
+                memory.restarted_at = now
 
     def _ended(self, now: float) -> Iterator[Finding]:
         for name, memory in self.points.items():
@@ -191,7 +201,7 @@ class Readback:
         if memory.overdue or not memory.sent or memory.stands is None:
             return None
         moving = memory.moved_at > -math.inf and not memory.was_disturbed
-        if memory.restarted or (not moving and self._fell_back(name, shown, image)):
+        if memory.restarted or (not moving and self._causes.fell_back(name, shown, image)):
             return None
         newest = memory.sent[-1]
         on_its_way = any(on_the_way(rule, memory.stands, sent.value, shown) for sent in memory.sent)
@@ -215,7 +225,9 @@ class Readback:
         if rounds(rule, newest.value, shown):
             return [self._confirmed(name, shown)]
         there = {other: memory.stands for other, memory in self.points.items()}
-        text = self._crossed(name, there) or f"{newest.value:g} was written to {name}, but the PLC shows {shown:g}"
+        text = (
+            self._causes.crossed(name, there) or f"{newest.value:g} was written to {name}, but the PLC shows {shown:g}"
+        )
         limited = not newest.urgent and memory.is_limited(rule, newest.value)
         if limited:
             memory.learn_limit(newest.value)
@@ -244,7 +256,7 @@ class Readback:
         decided = {name: look for name, look in looks.items() if self._rules[name].decided}
         anew = {name for _, unit in by_unit(decided, self._units) if started_anew(unit, self._rules) for name in unit}
         shows = {name: look.shown for name, look in looks.items()}
-        crossed = {n: text for n, look in decided.items() if look.changed and (text := self._crossed(n, shows))}
+        crossed = {n: text for n, look in decided.items() if look.changed and (text := self._causes.crossed(n, shows))}
         for name, look in looks.items():
             if not look.changed:
                 continue
@@ -263,7 +275,7 @@ class Readback:
                 outcome, text = Outcome.CROSSED, crossed[name]
             elif memory.restarted or name in anew:
                 outcome = Outcome.RESTARTED
-            elif self._fell_back(name, look.shown, image):
+            elif self._causes.fell_back(name, look.shown, image):
                 outcome = Outcome.FALLBACK
             else:
                 outcome = Outcome.BY_HAND
@@ -271,27 +283,3 @@ class Readback:
             memory.found(look.shown)
             memory.problem = Problem(text) if text else None
             yield Finding(name, outcome, expected, look.shown, source, text, look.since)
-
-    def _fell_back(self, name: str, shown: float, image: Image) -> bool:
-        """Tell whether the PLC's own fallback, since the last look, explains what it shows."""
-        rule, memory = self._rules[name], self.points[name]
-        flag, own = image.value_of("plc_fallback"), self._same_unit(name, "plc_fallback")
-        safe = matches(rule, shown, rule.safe)
-        if memory.fell_back:
-            return safe or (own and flag.says_yes)
-        if own and flag.quality is Quality.GOOD and flag.age <= image.value_of(name).age:
-            return False  # the PLC itself says that it did not
-        return safe and memory.absence > self._silence
-
-    def _crossed(self, name: str, shows: Mapping[str, float | None]) -> str:
-        """Return a line where a point shows what was written to another one of its unit; `shows` is what all show."""
-        rule, shown, own = self._rules[name], shows[name], self.points[name].sent
-        for other, there in shows.items():
-            sent = self.points[other].sent
-            if other == name or not sent or shown is None or there is None or not self._same_unit(name, other):
-                continue
-            swapped = bool(own) and self._rules[other].same(there, own[-1].value)
-            outside = not rule.low <= shown <= rule.high
-            if rule.same(shown, sent[-1].value) and (swapped or outside):
-                return f"{name} shows {shown:g}, which was written to {other}: is the register map right?"
-        return ""

@@ -6,20 +6,14 @@ when a second place calls `write`.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from igrow.core.errors import IgrowError
 from igrow.edge.bus.errors import BusError, RefusedError
+from igrow.edge.guard.heartbeat import HEARTBEAT, HIGHEST_BEAT, BeatCount
 from igrow.edge.guard.state import Write
-
-HEARTBEAT = "heartbeat"
-HIGHEST_BEAT = 65_535
-"""Where the counter wraps in an unsigned register of 16 bits; smaller registers wrap earlier."""
-UNSURE_BEATS = 1000
-"""Beats without an answer, of which any one may stand in the register."""
 
 
 class WritablePlc(Protocol):
@@ -46,14 +40,10 @@ class GuardedWriter:
     """Carries out what the guard decided, in its order, and beats the heart."""
 
     def __init__(self, plc: WritablePlc, *, has_heartbeat: bool, highest_beat: int = HIGHEST_BEAT) -> None:
-        """`highest_beat` is the largest number that the heartbeat's register takes; 0 follows it."""
+        """`highest_beat` is the largest number that the heartbeat's register takes."""
         self._plc = plc
         self._has_heartbeat = has_heartbeat
-        self._highest_beat = highest_beat
-        self._beat = 0
-        self._sure: int | None = None
-        self._unsure: deque[int] = deque(maxlen=UNSURE_BEATS)
-        self._register_keeps_it = False
+        self.beats = BeatCount(highest_beat)
 
     async def carry_out(self, writes: Sequence[Write]) -> list[WriteOutcome]:
         """Write each value once; a failure is returned, never repeated here."""
@@ -71,29 +61,12 @@ class GuardedWriter:
         """Change the heartbeat register, so that the PLC knows that a whole cycle was completed."""
         if not self._has_heartbeat:
             return None
-        self._beat = (self._beat + 1) % (self._highest_beat + 1)
+        number = self.beats.next()
         try:
-            await self._plc.write(HEARTBEAT, float(self._beat))
+            await self._plc.write(HEARTBEAT, float(number))
         except BusError as error:
             if error.sent or isinstance(error, RefusedError):  # some devices do what they refuse
-                self._unsure.append(self._beat)
+                self.beats.may_have_arrived()
             return error
-        self._sure = self._beat
-        self._unsure.clear()
+        self.beats.arrived()
         return None
-
-    def heartbeat_was_lost(self, shown: float | None) -> bool:
-        """Tell whether a reading of the heartbeat register shows that its PLC has started anew.
-
-        A register that has kept our number until now and suddenly shows another one was cleared: nobody else writes
-        there. One that never kept it (a PLC that takes the number away) proves nothing.
-        """
-        if shown is None:
-            return False
-        if self._sure is None:
-            # Nothing of ours stands there for certain yet: the next beat must differ from what does.
-            self._beat = min(max(0, round(shown)), self._highest_beat)
-            return False
-        kept = self._register_keeps_it
-        self._register_keeps_it = round(shown) in (self._sure, *self._unsure)
-        return kept and not self._register_keeps_it

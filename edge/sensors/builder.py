@@ -100,7 +100,8 @@ class ImageBuilder:
                 values[name], track.rule, monotonic, news=name in news, tried=name in readings
             )
         self._contact.hear(readings)
-        return Image(monotonic, true_time, values, self._contact.link_ok, self._contact.silent)
+        contact = self._contact
+        return Image(monotonic, true_time, values, contact.link_ok, contact.silent, contact.interrupted)
 
 
 def _suspected(value: Value, why: str) -> Value:

@@ -28,6 +28,7 @@ class Contact:
             unit = units.get(name, "")
             self._points[unit] = self._points.get(unit, frozenset()) | {name}
         self._silent: set[str] = set()
+        self._interrupted: set[str] = set()
         self.link_ok = True
         """A unit answers, or nobody was asked."""
 
@@ -36,10 +37,18 @@ class Contact:
         """The units that do not answer, each with its points."""
         return {unit: self._points[unit] for unit in sorted(self._silent)}
 
+    @property
+    def interrupted(self) -> Mapping[str, frozenset[str]]:
+        """The units that did not answer each request of the last ones, each with its points."""
+        return {unit: self._points[unit] for unit in sorted(self._interrupted)}
+
     def hear(self, readings: Mapping[str, RawReading]) -> None:
         """Take note of who answered."""
+        self._interrupted = set(self._silent)
         for unit, points in self._points.items():
             heard = {_answered(readings[name]) for name in points if name in readings}
+            if False in heard:
+                self._interrupted.add(unit)
             if True in heard:
                 self._silent.discard(unit)
             elif False in heard:

@@ -12,6 +12,7 @@ from igrow.edge.bus.plc import RegisterPlc
 from igrow.edge.clock import SystemClock, TrustedTime
 from igrow.edge.cycle import ControlCycle
 from igrow.edge.guard import GuardedWriter, GuardRules, PointRule, Readback
+from igrow.edge.guard.heartbeat import HEARTBEAT
 from igrow.edge.image import Image
 from igrow.edge.journal import Journal
 from igrow.edge.registers.codec import decode
@@ -161,7 +162,7 @@ class PlcBench:
         await self.plc.close()
         self.plc, self.cycle = self.build(True)
         agree = self.clock.monotonic() - self.notes.at <= respect_hand
-        self.cycle.recall(self.notes.content, 0.0, same=self.cycle.readback.points, agree=agree)
+        self.cycle.recall(self.notes.content, 0.0, same={*self.cycle.readback.points, HEARTBEAT}, agree=agree)
 
     async def close(self) -> None:
         await self.plc.close()

@@ -12,11 +12,12 @@ from igrow.edge.bus.plc import Reading
 from igrow.edge.clock import FakeClock
 from igrow.edge.cycle import ControlCycle
 from igrow.edge.guard import GuardedWriter, GuardRules, Interlock, PointRule, Readback
+from igrow.edge.guard.heartbeat import HEARTBEAT
 from igrow.edge.image import Image
 from igrow.edge.journal import Journal
 from igrow.edge.sensors import ImageBuilder, SensorRule
 from igrow.edge.sources import HandsOff, Source
-from tests.control.control_fakes import Bench, FakePlc, MemoryStore
+from tests.control.control_fakes import READ_AGAIN, Bench, FakePlc, MemoryStore
 
 SAFE = {"heating_setpoint": 18.0, "co2_setpoint": 400.0, "lamp_on": 0.0, "irrigation_on": 0.1}
 RULES: Mapping[str, PointRule] = {
@@ -57,6 +58,7 @@ class StubbornPlc(FakePlc):
         return self.units.get(name, "")
 
     async def read(self, names: Collection[str] | None = None) -> Mapping[str, Reading]:
+        self.clock.advance(0.0 if names is None else READ_AGAIN)
         now = self.clock.monotonic()
         wanted = [name for name in self.values if self._is_due(name, now)] if names is None else names
         return {name: self._reading(name, now) for name in wanted}
@@ -176,7 +178,9 @@ class StubbornBench(Bench):
         """A new process that knows what the old one noted."""
         away = self.clock.monotonic() - self.notes.at
         self.cycle = self.build()
-        self.cycle.recall(self.notes.content, 0.0, same=self.cycle.readback.points, agree=away <= respect_hand)
+        self.cycle.recall(
+            self.notes.content, 0.0, same={*self.cycle.readback.points, HEARTBEAT}, agree=away <= respect_hand
+        )
 
     def events(self, kind: str) -> list[Mapping[str, Any]]:
         return [detail for name, detail in self.store.events if name == kind]

@@ -175,10 +175,10 @@ async def test_a_heartbeat_wraps_where_its_register_ends():
             written.append(value)
 
     writer = GuardedWriter(Plc(), has_heartbeat=True, highest_beat=3)
-    writer.heartbeat_was_lost(2.0)
+    writer.beats.was_cleared(2.0)
     for _ in range(6):
         assert await writer.heartbeat() is None
-    assert written == [3.0, 0.0, 1.0, 2.0, 3.0, 0.0]
+    assert written == [3.0, 1.0, 2.0, 3.0, 1.0, 2.0]
 
 
 def test_vents_are_the_plcs_own_and_setpoints_are_decided(tmp_path):

@@ -237,7 +237,8 @@ async def noted_and_recalled(old: Moment, new: Moment, hand_for: float = 3600.0)
     second.clock.now = new.monotonic
     notes = StateNotes(ledger, new.boot, dict.fromkeys(RULES, "same"))
     date = notes.recall(second.cycle, ledger.newest_state(), new, respect_hand=7200.0)
-    return second.cycle.readback.held(new.monotonic).get("heating_setpoint"), date
+    left = second.cycle.readback.held(new.monotonic).get("heating_setpoint")
+    return left, None if date is None else round(date)
 
 
 NOON = 1.7e9

@@ -167,7 +167,7 @@ class World:
         unit = self.random.choice(sorted({self.plc.unit_of(name) for name in RULES}))
         names = [name for name in RULES if self.plc.unit_of(name) == unit]
         has_heartbeat = self.plc.unit_of("heartbeat") == unit
-        if has_heartbeat and self.bench.cycle._writer._register_keeps_it and self.random.random() < 0.5:
+        if has_heartbeat and self.bench.cycle._writer.beats.kept and self.random.random() < 0.5:
             values = {
                 name: self.random.choice([0.0, self.rules[name].low, 0.9 * self.rules[name].low]) for name in names
             }
