@@ -20,6 +20,7 @@ from igrow.edge.status.server import StatusServer
 from igrow.edge.virtual_plc.pace import Lockstep, Pace
 from igrow.edge.virtual_plc.virtual_plc import VirtualPlc
 from igrow.edge.wiring import Control
+from tests.patience import PATIENCE
 
 MAP = """
 title: test plant
@@ -141,7 +142,7 @@ class Plant:
         return value
 
 
-async def until(condition: Callable[[], object], seconds: float = 60.0) -> None:
+async def until(condition: Callable[[], object], seconds: float = PATIENCE) -> None:
     """Wait for a condition; the limit only says when a test has failed."""
     async with asyncio.timeout(seconds):
         while not condition():  # noqa: ASYNC110 - what is waited for happens in other tasks and processes
@@ -185,4 +186,4 @@ async def running(path: Path, **replaced: object) -> AsyncIterator[Daemon]:
         yield daemon
     finally:
         daemon.stop()
-        await asyncio.wait_for(task, 60.0)
+        await asyncio.wait_for(task, PATIENCE)

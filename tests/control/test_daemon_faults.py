@@ -26,6 +26,7 @@ from tests.control.daemon_bench import (
     until,
     write_files,
 )
+from tests.patience import PATIENCE
 
 
 def kinds(folder: Path) -> list[str]:
@@ -135,7 +136,7 @@ async def test_a_setpoint_changed_at_the_plc_is_respected_also_across_kill_9_and
 
     try:
         await until(lambda: plant.shows("co2_setpoint") > 400.0)
-        await asyncio.sleep(2.5)
+        await two_cycles()
         plant.plc.set_by_hand("co2_setpoint", 555.0)
         await until(lambda: "changed_by_hand" in kinds(tmp_path))
         process.send_signal(signal.SIGKILL)
@@ -144,7 +145,7 @@ async def test_a_setpoint_changed_at_the_plc_is_respected_also_across_kill_9_and
         await two_cycles()
         assert plant.shows("co2_setpoint") == 555.0
         process.send_signal(signal.SIGTERM)
-        assert await asyncio.wait_for(process.wait(), 60.0) == 0
+        assert await asyncio.wait_for(process.wait(), PATIENCE) == 0
         assert (plant.shows("heating_setpoint"), plant.shows("co2_setpoint")) == (18.0, 555.0)
         process = await asyncio.create_subprocess_exec(*command)
         await two_cycles()
@@ -247,7 +248,7 @@ async def test_an_int16_heartbeat_goes_on_past_its_highest_number(tmp_path):
         await until(lambda: daemon.cycles >= 20)
         assert not daemon._journal.alarms.active
     await plant.down()
-    assert seen[:10] == [32761.0, 32762.0, 32763.0, 32764.0, 32765.0, 32766.0, 32767.0, 0.0, 1.0, 2.0]
+    assert seen[:10] == [32761.0, 32762.0, 32763.0, 32764.0, 32765.0, 32766.0, 32767.0, 1.0, 2.0, 3.0]
 
 
 TWO_BUSES = MAP.replace(

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tests import needs
+from tests.patience import PATIENCE
 
 INSTALL = "tests/exchange/install-peers.sh"
 
@@ -85,7 +86,7 @@ def s3_server(folder: Path) -> Iterator[str]:
     try:
         _wait_for_port(port, server, folder / "log")
         endpoint = f"http://127.0.0.1:{port}"
-        urllib.request.urlopen(f"{endpoint}/moto-api", timeout=30).close()
+        urllib.request.urlopen(f"{endpoint}/moto-api", timeout=PATIENCE).close()
         boto3.client("s3", endpoint_url=endpoint, region_name="us-east-1").create_bucket(Bucket="igrow")
         yield f"s3://igrow/exchange?endpoint={endpoint}"
     finally:
@@ -94,7 +95,7 @@ def s3_server(folder: Path) -> Iterator[str]:
 
 
 def _wait_for_port(port: int, server: subprocess.Popen[bytes], log: Path) -> None:
-    until = time.monotonic() + 60
+    until = time.monotonic() + PATIENCE
     while time.monotonic() < until:
         with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port), timeout=1):
             return

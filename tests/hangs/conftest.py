@@ -17,9 +17,8 @@ from igrow.edge.pace import TickPace
 from igrow.edge.store import read_records
 from igrow.edge.virtual_plc.pace import Realtime
 from tests.control.daemon_bench import Plant, control_of, free_port, until, write_files
+from tests.patience import PATIENCE
 
-PATIENCE = 120.0
-"""Seconds; only says when a test has failed, on however busy a machine."""
 SAFE = {"heating_setpoint": 18.0, "co2_setpoint": 400.0}
 PROMPT = "minimum_interval: 0 s, dead_band: 0.1}\n"
 CYCLES = 25

@@ -24,8 +24,9 @@ from igrow.edge.planning import GraphProcess, PlanningProcess
 from igrow.edge.sources.override import Lease, write_leases
 from igrow.edge.status.server import StatusServer
 from tests.control.daemon_bench import plan_at_once, until
-from tests.hangs.conftest import PATIENCE, Bench, hurry
+from tests.hangs.conftest import Bench, hurry
 from tests.hangs.hanging_disk import HangingDisk
+from tests.patience import PATIENCE
 from tests.tiny_bundle import endless_graph, write_tiny_bundle
 
 FUNCTIONS = "tests.hangs.hanging_functions"

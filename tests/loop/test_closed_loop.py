@@ -16,11 +16,10 @@ from pathlib import Path
 import pytest
 
 from igrow.trainer.data.open_source import open_source
+from tests.patience import PATIENCE
 
 ROOT = Path(__file__).resolve().parents[2]
 BIN = Path(sys.executable).parent
-PATIENCE = 240.0
-"""Seconds of wall clock after which a test gives up on something that should happen; machines may be slow."""
 
 
 def free_port() -> int:

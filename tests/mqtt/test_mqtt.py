@@ -21,6 +21,7 @@ from igrow.edge.overriding import override_file
 from igrow.edge.sources.override import read_leases
 from tests import needs
 from tests.control.daemon_bench import free_port, write_files
+from tests.patience import PATIENCE
 
 STATE = {
     "time": 1.0,
@@ -114,7 +115,7 @@ def start(file):
 
 async def until(condition):
     """Wait, generously, for what has to come."""
-    async with asyncio.timeout(15.0):
+    async with asyncio.timeout(PATIENCE):
         while not condition():  # noqa: ASYNC110 - the condition is a file's or a server's, which no event tells of
             await asyncio.sleep(0.05)
 
@@ -134,7 +135,7 @@ async def broker(tmp_path):
         yield port
     finally:
         process.terminate()
-        process.wait(30)
+        process.wait(PATIENCE)
 
 
 @contextlib.asynccontextmanager
@@ -149,7 +150,7 @@ async def bridging(configuration, fetch):
 
 
 async def first(client, topic):
-    async with asyncio.timeout(15.0):
+    async with asyncio.timeout(PATIENCE):
         async for message in client.messages:
             if str(message.topic) == topic:
                 return message.payload.decode()
@@ -204,7 +205,7 @@ async def test_a_broker_that_comes_up_later_is_found(tmp_path, monkeypatch):
         assert not task.done()
         process = start(file)
         try:
-            async with asyncio.timeout(15.0):
+            async with asyncio.timeout(PATIENCE):
                 while True:
                     with contextlib.suppress(aiomqtt.MqttError):
                         async with aiomqtt.Client("127.0.0.1", port) as client:
@@ -214,7 +215,7 @@ async def test_a_broker_that_comes_up_later_is_found(tmp_path, monkeypatch):
                     await asyncio.sleep(0.1)
         finally:
             process.terminate()
-            process.wait(30)
+            process.wait(PATIENCE)
 
 
 async def test_a_server_that_speaks_no_mqtt_is_tried_again_and_harms_nothing(tmp_path, monkeypatch):

@@ -21,10 +21,9 @@ from pathlib import Path
 from igrow.edge.page.settings import PAGE_PORT
 from tests.control.daemon_bench import free_port
 from tests.page.page_bench import ROOT, found_in
+from tests.patience import PATIENCE
 
 BIN = Path(sys.executable).parent
-PATIENCE = 300.0
-"""Only says when the test has failed."""
 
 
 def typed() -> list[str]:

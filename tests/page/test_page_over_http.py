@@ -21,6 +21,7 @@ from igrow.edge.page.password import hashed, remove_password, write_password
 from igrow.edge.page.server import PageServer
 from igrow.edge.sources.override import read_leases
 from tests.page.page_bench import PASSWORD, Told, alarm, found_in, pages_of, state, write_house
+from tests.patience import PATIENCE
 
 HASHED = hashed(PASSWORD)
 
@@ -45,7 +46,7 @@ class Visitor:
         self.server = server
         self.cookie = ""
 
-    async def send(self, raw: bytes, *, wait: float = 30.0) -> Answer:
+    async def send(self, raw: bytes, *, wait: float = PATIENCE) -> Answer:
         reader, writer = await asyncio.open_connection("127.0.0.1", self.server.port)
         writer.write(raw)
         answer = (await asyncio.wait_for(reader.read(), wait)).decode()
@@ -95,7 +96,7 @@ async def visitor(tmp_path):
     await server.close()
 
 
-async def until(true, seconds: float = 30.0) -> None:
+async def until(true, seconds: float = PATIENCE) -> None:
     """Wait for something to become true."""
     async with asyncio.timeout(seconds):
         while not true():  # noqa: ASYNC110 - nobody tells when
@@ -144,7 +145,7 @@ async def test_a_browser_that_takes_it_gets_the_page_compressed(visitor: Visitor
     plain = await visitor.get()
     reader, writer = await asyncio.open_connection("127.0.0.1", visitor.server.port)
     writer.write(b"GET / HTTP/1.1\r\nHost: localhost\r\nAccept-Encoding: gzip;q=1.0, br\r\n\r\n")
-    head, _, body = (await asyncio.wait_for(reader.read(), 30.0)).partition(b"\r\n\r\n")
+    head, _, body = (await asyncio.wait_for(reader.read(), PATIENCE)).partition(b"\r\n\r\n")
     writer.close()
     assert b"Content-Encoding: gzip" in head
     assert len(gzip.decompress(body)) == pytest.approx(len(plain.body.encode()), rel=0.01)
@@ -364,7 +365,7 @@ async def test_an_endless_head_is_cut_off(visitor: Visitor):
     reader, writer = await asyncio.open_connection("127.0.0.1", visitor.server.port)
     writer.write(b"GET / HTTP/1.1\r\nX: " + b"a" * 1_000_000)
     with contextlib.suppress(ConnectionError):
-        answer = await asyncio.wait_for(reader.read(), 10.0)
+        answer = await asyncio.wait_for(reader.read(), PATIENCE)
         assert answer == b"" or answer.startswith(b"HTTP/1.1 431")
     writer.close()
     assert (await visitor.get()).status == 200
@@ -376,7 +377,7 @@ async def test_visitors_who_say_nothing_are_hung_up_on(visitor: Visitor, monkeyp
     for _, writer in silent[:5]:
         writer.write(b"POST /sign-in HTTP/1.1\r\nHost: localhost\r\nContent-Length: 100\r\n\r\nwho=")
     for reader, writer in silent:
-        await asyncio.wait_for(reader.read(), 10.0)
+        await asyncio.wait_for(reader.read(), PATIENCE)
         writer.close()
     assert (await visitor.get()).status == 200
     await until(lambda: not visitor.server._visits)
@@ -402,7 +403,7 @@ async def test_one_address_cannot_shut_out_the_others(visitor: Visitor):
     await until(lambda: len(visitor.server._visits) == page_server.MOST_OF_ONE < page_server.MOST_CONNECTIONS)
     reader, writer = await asyncio.open_connection("127.0.0.1", visitor.server.port, local_addr=("127.0.0.2", 0))
     writer.write(b"GET /page.css HTTP/1.1\r\nHost: localhost\r\n\r\n")
-    assert (await asyncio.wait_for(reader.read(), 10.0)).startswith(b"HTTP/1.1 200")
+    assert (await asyncio.wait_for(reader.read(), PATIENCE)).startswith(b"HTTP/1.1 200")
     for _, one in [*crowd, (None, writer)]:
         one.close()
 

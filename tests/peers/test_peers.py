@@ -21,6 +21,7 @@ from igrow.edge.registers.model import BusSettings, Function, Parity, Transport
 from igrow.edge.virtual_plc.pace import Lockstep
 from igrow.edge.virtual_plc.virtual_plc import VirtualPlc
 from tests import needs
+from tests.patience import PATIENCE
 from tests.virtual_plc.toy_plant import ToyPlant
 
 HERE = Path(__file__).parent
@@ -52,7 +53,7 @@ async def running(*command: str, ready: str = "") -> AsyncIterator[None]:
     )
     assert process.stdout is not None
     try:
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(PATIENCE):
             while ready:
                 line = (await process.stdout.readline()).decode()
                 assert line, f"{command[0]} ended before it was ready"
@@ -72,10 +73,9 @@ async def serial_pair(folder: Path) -> AsyncIterator[tuple[str, str]]:
     needs.program("socat", INSTALL)
     ends = folder / "a", folder / "b"
     async with running("socat", *(f"pty,rawer,link={end}" for end in ends)):
-        for _ in range(200):
-            if all(end.exists() for end in ends):
-                break
-            await asyncio.sleep(0.02)
+        async with asyncio.timeout(PATIENCE):
+            while not all(end.exists() for end in ends):  # noqa: ASYNC110 - a file, of which no event tells
+                await asyncio.sleep(0.02)
         yield str(ends[0]), str(ends[1])
 
 
@@ -84,10 +84,9 @@ async def opened(settings: BusSettings) -> AsyncIterator[ModbusBus]:
     bus = ModbusBus(settings, rest_step=0.0, first_wait=0.05)
     bus.start()
     try:
-        for _ in range(100):
-            if bus.connected:
-                break
-            await asyncio.sleep(0.05)
+        async with asyncio.timeout(PATIENCE):
+            while not bus.connected:  # noqa: ASYNC110 - the bus connects in the background
+                await asyncio.sleep(0.05)
         yield bus
     finally:
         await bus.close()
@@ -105,7 +104,7 @@ async def run_tool(*command: str) -> str:
     process = await asyncio.create_subprocess_exec(
         *command, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT
     )
-    output, _ = await asyncio.wait_for(process.communicate(), 20)
+    output, _ = await asyncio.wait_for(process.communicate(), PATIENCE)
     assert process.returncode == 0, output.decode()
     return output.decode()
 

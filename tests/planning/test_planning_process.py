@@ -19,11 +19,10 @@ from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 from igrow.edge.planning import GraphProcess, NotCalledError, PlanningProcess, ProcessError, ProcessLimits
 from igrow.edge.ports import PlanRequest
+from tests.patience import PATIENCE
 
 LOG = Telemetry(np.array(["2026-03-14"], dtype="datetime64[s]"), {"air_temperature": np.array([20.0])})
 FUNCTIONS = "tests.planning.plan_functions"
-PATIENCE = 300.0
-"""Seconds; only says when a test has failed, on however busy a machine."""
 
 
 def request(seed: int = 0, log: Telemetry = LOG) -> PlanRequest:

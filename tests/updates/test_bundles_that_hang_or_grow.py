@@ -17,11 +17,11 @@ from igrow.edge.planning import GraphProcess, ProcessLimits
 from igrow.edge.updates import UpdateRules, bundles, life
 from igrow.edge.updates.state import UpdateState, load_state, save_state
 from igrow.trainer.publishing import publish
+from tests.patience import PATIENCE
 from tests.tiny_bundle import endless_graph, greedy_graph, write_tiny_bundle
 from tests.updates.update_helpers import Gateway, wait_for
 
 RULES = UpdateRules(check_hours=1.0, shadow_hours=30.0, watch_hours=48.0, live_error_hours=6.0)
-PATIENCE = 300.0
 
 
 @pytest.fixture
