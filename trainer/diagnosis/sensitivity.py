@@ -192,7 +192,7 @@ def _flux_batch(line: Linearisation, fluxes: Sequence[tuple[Mapping[str, Array],
 
 
 def run_memory(effect: Effect, values: Mapping[str, float], drivers: Mapping[str, Array], step: float) -> Floats:
-    """Return the memory of an effect along the drivers, (n,)."""
+    """Return the memory of an effect in the middle of every step along the drivers, (n,)."""
     memory = effect.memory
     assert memory is not None
     count = max(np.size(drivers[name]) for name in effect.drivers)
@@ -203,10 +203,12 @@ def run_memory(effect: Effect, values: Mapping[str, float], drivers: Mapping[str
     now = dict(zip(names, (column[0] for column in columns), strict=True))
     value = float(memory.start(_Scalars, now, values))
     for k, cells in enumerate(zip(*columns, strict=True)):
-        course[k] = value
         now = dict(zip(names, cells, strict=True))
+        total = 0.0
         for _ in range(substeps):
+            total += memory.advance(_Scalars, value, now, values, 0.5 * step / substeps)
             value = memory.advance(_Scalars, value, now, values, step / substeps)
+        course[k] = total / substeps
     return course
 
 

@@ -77,15 +77,22 @@ class ClimateWiring:
         return drivers
 
     def effects(self, drivers: Tensors, state: Tensors, seconds: str) -> tuple[dict[str, str], dict[str, str]]:
-        """Return what the active effects add, as ``added:channel``, and their memories after a step."""
+        """Return what the active effects add, as ``added:channel``, and their memories after a step.
+
+        A memory counts as it is in the middle of the step.
+        """
         added: dict[str, list[str]] = {}
         memories: dict[str, str] = {}
         for one in self.blocks.effects:
             tensors = self._effect_tensors(one, drivers, state)
             if one.effect.kind == "process":
+                if one.memory:
+                    (half,) = self.wiring.add("Mul", [seconds, self.wiring.constant("half", [0.5])])
+                    tensors |= self.wiring.call(one.memory, tensors | {"seconds": half})
                 for channel, tensor in self.wiring.call(one.contribution, tensors).items():
                     added.setdefault(channel, []).append(tensor)
             if one.memory:
+                tensors["memory"] = state[memory_name(one.effect.name)]
                 following = self.wiring.call(one.memory, tensors | {"seconds": seconds})
                 memories[memory_name(one.effect.name)] = following["memory"]
         return {f"added:{channel}": self.wiring.total(parts) for channel, parts in added.items()}, memories

@@ -88,7 +88,7 @@ def _needed(record: Record, stage: Stage) -> dict[str, Floats]:
     effects, parameters = activate(record, stage.terms), stage.posterior.values
     state = observe(record, parameters, effects)
     drivers = climate.derive(np, state, record.inputs, parameters, record.lamp_efficacy)
-    added: dict[str, Array] = climate.contributions(np, drivers, state, effects)
+    added: dict[str, Array] = climate.contributions(np, drivers, state, effects, record.step)
     for channel, flux in stage.added.items():
         added[channel] = added.get(channel, 0.0) + flux
     none = np.zeros(len(record))
@@ -106,7 +106,8 @@ def _brought_in(record: Record, stage: Stage, effect: str, channel: str) -> Floa
     effects, parameters = activate(record, stage.terms), stage.posterior.values
     state = observe(record, parameters, effects)
     drivers = climate.derive(np, state, record.inputs, parameters, record.lamp_efficacy)
-    return _course(climate.contributions(np, drivers, state, {effect: effects[effect]})[channel], record)
+    added = climate.contributions(np, drivers, state, {effect: effects[effect]}, record.step)
+    return _course(added[channel], record)
 
 
 def _course(values: Array, record: Record) -> Floats:

@@ -153,13 +153,19 @@ def derive(xp: Any, state: Values, inputs: Drivers, parameters: Values, lamp_eff
     }
 
 
-def contributions(xp: Any, drivers: Drivers, state: Values, effects: ActiveEffects) -> dict[str, Array]:
-    """Return the sum over the active process effects of what they add to each channel they enter."""
+def contributions(xp: Any, drivers: Drivers, state: Values, effects: ActiveEffects, seconds: float) -> dict[str, Array]:
+    """Return the sum over the active process effects of what they add to each channel they enter, within a step.
+
+    A memory counts as it is in the middle of the step: pulses of irrigation or moves of a vent within it are felt
+    within it, and not a step later.
+    """
     total: dict[str, Array] = {}
     for name, values in effects.items():
         effect = EFFECTS[name]
         if effect.kind == "process":
-            memory = state[memory_name(name)] if effect.memory else None
+            memory = None
+            if effect.memory is not None:
+                memory = effect.memory.advance(xp, state[memory_name(name)], drivers, values, 0.5 * seconds)
             for channel, flux in effect.contribution(xp, drivers, values, memory).items():
                 total[channel] = total[channel] + flux if channel in total else flux
     return total
@@ -275,7 +281,7 @@ def advance(
         added: further fluxes by channel (a learned residual model, a disturbance).
     """
     drivers = derive(xp, state, inputs, parameters, lamp_efficacy)
-    total = contributions(xp, drivers, state, effects)
+    total = contributions(xp, drivers, state, effects, seconds)
     for channel, flux in (added or {}).items():
         total[channel] = total[channel] + flux if channel in total else flux
     following = relax(xp, state, drivers, parameters, total, seconds)

@@ -68,7 +68,8 @@ def missing_fluxes(
     ahead = dict(states)
     substeps = max(1, round(record.step / records.SUBSTEP))
     drivers = climate.derive(np, ahead, inputs, parameters, record.lamp_efficacy)
-    fluxes = climate.balances(np, ahead, drivers, parameters, climate.contributions(np, drivers, ahead, effects))
+    added_by_effects = climate.contributions(np, drivers, ahead, effects, record.step)
+    fluxes = climate.balances(np, ahead, drivers, parameters, added_by_effects)
     for _ in range(substeps):
         ahead = climate.advance(
             np,
