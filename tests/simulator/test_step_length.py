@@ -13,6 +13,10 @@ MINUTES = 1440
 # A crop that answers strongly to the air couples heat and vapour most tightly.
 VALUES = {name: parameter.value for name, parameter in PARAMETERS.items()} | {"transpiration_deficit": 60.0}
 
+PULSES = np.where((np.arange(MINUTES) % 50 < 3) & (np.arange(MINUTES) // 60 % 24 >= 6), 6.0, 0.0)
+"""Irrigation of each minute, L m-2 h-1: three minutes of fifty."""
+WET = {"irrigation_evaporation": {"share": 0.2, "time_constant": 20.0}}
+
 
 def inputs_over(first: int, minutes: int) -> dict[str, NDArray[np.float64]]:
     """Mean inputs over some minutes of a day with lamps, screens and a little sun."""
@@ -34,21 +38,23 @@ def inputs_over(first: int, minutes: int) -> dict[str, NDArray[np.float64]]:
         "blackout_screen": 0.0 if sun else 95.0 * lamps,
         "lamp_power": 81.0 * lamps,
         "co2_dosing": 0.006 * lamps,
+        "irrigation": float(np.mean(PULSES[first : first + minutes])),
         "leaf_area_index": 3.2,
         "mean_height": 5.0,
     }
     return {name: np.array([value]) for name, value in values.items()}
 
 
-def half_hours(minutes: int) -> NDArray[np.float64]:
+def half_hours(minutes: int, effects: climate.ActiveEffects | None = None) -> NDArray[np.float64]:
     """Air temperature, humidity and CO2 at each half hour of the day, stepped by so many minutes, (48, 3)."""
+    active = effects or {}
     start = {"air_temperature": 18.0, "air_humidity": 85.0, "air_co2": 600.0}
     begin = {name: np.array([value]) for name, value in start.items()}
-    state = climate.initial_state(np, begin, inputs_over(0, minutes), VALUES, {}, 1.24)
+    state = climate.initial_state(np, begin, inputs_over(0, minutes), VALUES, active, 1.24)
     rows = []
     for first in range(0, MINUTES, minutes):
         now = inputs_over(first, minutes)
-        state = climate.advance(np, state, now, VALUES, {}, seconds=60.0 * minutes, lamp_efficacy=1.24)
+        state = climate.advance(np, state, now, VALUES, active, seconds=60.0 * minutes, lamp_efficacy=1.24)
         if (first + minutes) % 30 == 0:
             drivers = climate.derive(np, state, now, VALUES, 1.24)
             rows.append([float(drivers[name][0]) for name in start])
@@ -62,3 +68,11 @@ def test_a_day_in_longer_steps_is_the_day_in_steps_of_a_minute(
     error = np.abs(half_hours(minutes) - half_hours(1)).mean(axis=0)
     print(f"{minutes} min: {error[0]:.3f} K, {error[1]:.3f} %, {error[2]:.2f} ppm")
     assert (error < limits).all(), error
+
+
+def test_pulses_within_a_step_are_felt_in_it() -> None:
+    """What an effect with a memory does to humidity is the same in steps of fifteen minutes and of one."""
+    short, long = (half_hours(minutes, WET)[:, 1] - half_hours(minutes)[:, 1] for minutes in (1, 15))
+    error, size = np.abs(long - short).mean(), np.abs(short).mean()
+    print(f"{error:.2f} of {size:.2f} %")
+    assert error < 0.15 * size

@@ -2,12 +2,13 @@
 
 Every effect and every pattern is scored against what the history of this very greenhouse leads to expect. A beginning
 has a price. What a hypothesis gained in windows of the calibration log, where nothing had changed, is taken off its
-gain, so that the bound is this greenhouse's own; and it must gain as much by the scatter of its day scores as by the
-noise, or a few odd days would speak for all.
+gain, so that the bound is this greenhouse's own; and the scatter of its day scores must bear out a part of what the
+noise says, or a few odd days would speak for all.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -77,10 +78,16 @@ def net_gain(design: Design, one: Hypothesis) -> float:
 
 
 def proven_gain(design: Design, one: Hypothesis) -> float:
-    """Return the net gain, or the same by the scatter of day scores where that is less."""
+    """Return the net gain, or its geometric mean with the same by the scatter of day scores where that is less.
+
+    Alone the scatter says too little of what comes on few days: a drizzle, a cold night.
+    """
     price = 0.0 if one.term.onset is None else design.onset_price
-    by_days = 0.5 * one.statistic**2 - price
-    return net_gain(design, replace(one, gain=min(one.gain, by_days)))
+    by_noise = net_gain(design, one)
+    by_days = net_gain(design, replace(one, gain=0.5 * one.statistic**2 - price))
+    if by_days >= by_noise or by_days <= 0.0:
+        return min(by_noise, by_days)
+    return math.sqrt(by_noise * by_days)
 
 
 def _round(design: Design, null: Fit, cause: Hypothesis, rng: np.random.Generator) -> Round:

@@ -146,8 +146,9 @@ def is_proven_change(one: Estimated, kept: Sequence[Estimated], rules: DecisionR
         return True
     large = one.effect_to_noise >= rules.least_effect_to_noise and same_in_all_regimes(one.regimes, rules)
     if not kept:
-        # A few held-out days are no second test of a gain that all others bear out: they must not speak against it.
-        return large and one.skill >= 0.0 and one.bootstrap_p <= rules.largest_bootstrap_p
+        # A few held-out days are no second test of a gain that all others bear out: they must not
+        # clearly speak against it.
+        return large and one.skill >= rules.least_change_skill and one.bootstrap_p <= rules.largest_bootstrap_p
     return (
         large
         and one.bootstrap_p <= rules.further_bootstrap_p
