@@ -11,10 +11,15 @@ import numpy as np
 import pytest
 
 from igrow.core.errors import IgrowError
+from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import Log, prepare_log
 from igrow.trainer.diagnosis import Diagnosis, diagnose
+from igrow.trainer.diagnosis.diagnose import newest_weeks
 from igrow.trainer.diagnosis.evidence import errors_with
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
+from igrow.trainer.diagnosis.rules import DEFAULT
+from igrow.trainer.fit.discrepancy import Discrepancy
+from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.report import render_report, write_diagnosis
 from tests.diagnosis.conftest import DAYS, STEP, greenhouse_log, model_in_force
 from tests.virtual_log import SITE
@@ -213,3 +218,18 @@ def test_a_correction_that_makes_a_quantity_worse_says_so(leak: Diagnosis) -> No
     assert len(worse.worsened) == 1
     assert "air temperature gets worse by it: 0.3 to 0.34 K" in worse.summary()
     assert worse.to_json()["worsened"] == list(worse.worsened)
+
+
+def test_of_a_long_log_the_newest_six_weeks_are_asked_what_has_changed(quiet_log: Log) -> None:
+    middle = quiet_log.telemetry.time[0] - np.timedelta64(80, "D")
+    known = Discrepancy({}, Gaussian((), np.zeros(0), np.zeros((0, 0))), {}, STEP, {}, middle)
+    model = model_in_force()
+    remembering = replace(model, history=known)
+    long = replace(
+        quiet_log, telemetry=Telemetry(quiet_log.telemetry.time[0] + np.arange(60) * np.timedelta64(1, "D"), {})
+    )
+    assert newest_weeks(long, model, DEFAULT) is long
+    assert newest_weeks(quiet_log, remembering, DEFAULT) is quiet_log
+    newest = newest_weeks(long, remembering, DEFAULT)
+    assert newest.telemetry.time[-1] == long.telemetry.time[-1]
+    assert newest.days == 41.0

@@ -37,6 +37,10 @@ NOT_CALIBRATED = N_(
     "What the model misses of this greenhouse when all is well is not known, so only large causes can be told from a "
     "greenhouse that is another: calibrate it on weeks that are known to be good (igrow-trainer calibrate)."
 )
+NEWEST = N_(
+    "Within more than six weeks a crop changes: what has changed since the calibration was looked for in the newest "
+    "six."
+)
 
 
 def diagnose(
@@ -70,6 +74,7 @@ def diagnose(
     if log.faults:
         return _data_fault(log, model)
     log.require("a diagnosis", rules.least_days)
+    given, log = log, newest_weeks(log, model, rules)
     say = progress or (lambda _line: None)
     say("completing the log")
     knowledge = knowledge_of(model, site, rules)
@@ -91,6 +96,7 @@ def diagnose(
     runs = {name: day for name, (stage, seen) in stages.items() if (day := seen.run(stage)) is not None}
     notes = (
         *((NOT_CALIBRATED,) if knowledge.transferred else ()),
+        *((NEWEST,) if log is not given else ()),
         *((opened.sentence,) if opened is not None and off else ()),
     )
     return Diagnosis(
@@ -111,6 +117,15 @@ def diagnose(
         Evidence(days, knowledge, first, result.estimates, {name: stage for name, (stage, _) in stages.items()}, runs),
         log,
     )
+
+
+def newest_weeks(log: Log, model: FittedModel, rules: DecisionRules) -> Log:
+    """Return the newest weeks of a long log where its greenhouse's history can be asked what has changed, else all."""
+    known = rules.history and model.history is not None and model.calibrated_on == log.known_site.name
+    if not known or log.days <= rules.long_days:
+        return log
+    # So many local days at most, the first and the last of them cut.
+    return log.select(log.telemetry.time[-1] - np.timedelta64(round((rules.long_days - 1.0) * 86_400.0), "s"))
 
 
 def discrepancy_of(log: Log, model: FittedModel, rules: DecisionRules = DEFAULT) -> dict[str, float]:
