@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from igrow.core.simulator.hybrid.nominal import nominal, site_record
-from igrow.trainer.research.forecasts.disturbance import DisturbanceModel, expected_fluxes, missing_fluxes
+from igrow.trainer.research.forecasts.disturbance import (
+    CHANNELS,
+    DisturbanceModel,
+    expected_fluxes,
+    helpful_channels,
+    missing_fluxes,
+)
 from tests.virtual_log import SITE, virtual_log
 
 DAY = 288
@@ -54,3 +60,24 @@ def test_what_was_missing_at_an_hour_is_expected_again_at_that_hour(parameters: 
     hour = ((5 * DAY - 1 + np.arange(DAY)) // 12) % 24
     assert expected[hour == 12].mean() < -20.0
     assert abs(expected[hour == 2].mean()) < 5.0
+
+
+def test_a_channel_whose_expectation_makes_a_quantity_worse_is_left_out(parameters: dict[str, float]) -> None:
+    def errors_with(channels: frozenset[str]) -> dict[str, float]:
+        errors = {"air_temperature": 1.0, "air_humidity": 1.0, "air_co2": 1.0}
+        errors["air_temperature"] -= 0.4 * ("heat" in channels)
+        errors["air_humidity"] += 1.0 * ("vapour" in channels) - 0.1 * ("heat" in channels)
+        errors["air_co2"] -= 0.2 * ("co2" in channels)
+        return errors
+
+    chosen = helpful_channels(errors_with)
+    assert chosen == {"heat", "co2"}
+    record = site_record(virtual_log(4), SITE, 300.0)
+    expected = expected_fluxes(
+        record, missing_fluxes(record, parameters, {}), [3 * DAY], DAY, DisturbanceModel().restricted(chosen)
+    )
+    assert [channel for channel in CHANNELS if np.any(expected[channel])] == ["heat", "co2"]
+
+
+def test_where_nothing_helps_nothing_is_expected() -> None:
+    assert helpful_channels(lambda channels: {"air_temperature": 1.0 + 0.1 * len(channels)}) == frozenset()

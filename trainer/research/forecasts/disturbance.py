@@ -9,7 +9,8 @@ Only what was known at the start of a forecast enters it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -52,6 +53,14 @@ class DisturbanceModel:
     """Part of the present departure that is still there as the forecast begins, by channel."""
     decay_hours: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys(CHANNELS, 4.0))
     """Hours in which the departure loses 63 %, by channel."""
+
+    def restricted(self, channels: Collection[str]) -> DisturbanceModel:
+        """Return the model that expects something of these channels alone."""
+        daily, recent = (
+            {channel: share if channel in channels else 0.0 for channel, share in shares.items()}
+            for shares in (self.daily_share, self.recent_share)
+        )
+        return replace(self, daily_share=daily, recent_share=recent)
 
 
 def missing_fluxes(
@@ -242,6 +251,23 @@ def fit_disturbance(
         if best is None or total < best[0]:
             best = (total, replace(trial, daily_share=daily, recent_share=recent, decay_hours=decay))
     assert best is not None
+    return best[1]
+
+
+def helpful_channels(errors_with: Callable[[frozenset[str]], Mapping[str, float]]) -> frozenset[str]:
+    """Return the channels whose expected disturbance makes predictions best, none of which it makes worse.
+
+    Args:
+        errors_with: returns the error of every quantity, on selection weeks, when these channels are expected to go on.
+    """
+    plain = errors_with(frozenset())
+    best: tuple[float, frozenset[str]] = (float(len(plain)), frozenset())
+    for count in range(1, len(CHANNELS) + 1):
+        for chosen in itertools.combinations(CHANNELS, count):
+            channels = frozenset(chosen)
+            ratios = [error / plain[quantity] for quantity, error in errors_with(channels).items()]
+            if all(ratio <= 1.0 for ratio in ratios) and sum(ratios) < best[0]:
+                best = sum(ratios), channels
     return best[1]
 
 

@@ -20,8 +20,10 @@ from igrow.trainer.fit.scales import ERROR_SCALES
 from igrow.trainer.research.forecasts.closed_loop import refine_actuation
 from igrow.trainer.research.forecasts.combination import Combination, fit_combination, remembering
 from igrow.trainer.research.forecasts.disturbance import (
+    CHANNELS,
     DisturbanceModel,
     fit_disturbance,
+    helpful_channels,
     missing_fluxes,
     observed_runs,
     run_fluxes,
@@ -143,6 +145,11 @@ def fit_forecaster(
             for (record, _, fit, _), added in zip(parts, known, strict=True)
         ]
     )
+    chosen = helpful_channels(
+        lambda channels: _selection_errors(parts, posterior, effects, known, disturbance.restricted(channels))
+    )
+    disturbance = disturbance.restricted(chosen)
+    say(f"observed disturbance goes on in: {', '.join(one for one in CHANNELS if one in chosen) or 'nothing'}")
     rules: dict[str, float] = {}
     if actuation:
         rules = fit_actuation([(record, setpoints, fit) for record, setpoints, fit, _ in parts], values)
@@ -237,20 +244,30 @@ def _choose_residual_model(
     usual = DisturbanceModel()
 
     def score(residual_model: ResidualModel | None) -> float:
-        total = 0.0
-        for record, _, _, selection in parts:
-            added = residual_model.fluxes(record) if residual_model is not None else None
-            predict = observed_runs(record, posterior.values, effects, added, usual)
-            errors = summarise([errors_of(record, predict, ("24_h",), selection, every=18_900.0)])
-            total += sum(
-                by_horizon["24_h"].mae / ERROR_SCALES[quantity]
-                for quantity, by_horizon in errors.items()
-                if not (quantity == "air_co2" and "co2_dosing" in record.missing)
-            )
-        return total
+        added = [residual_model.fluxes(record) if residual_model is not None else {} for record, _, _, _ in parts]
+        return sum(_selection_errors(parts, posterior, effects, added, usual).values())
 
     candidates: list[ResidualModel | None] = [None, *(fit_residual_model(lacking, penalty) for penalty in _PENALTIES)]
     return min(candidates, key=score)
+
+
+def _selection_errors(
+    parts: Sequence[tuple[Record, Mapping[str, Floats], Mask, Mask]],
+    posterior: Gaussian,
+    effects: ActiveEffects,
+    added: Sequence[Mapping[str, Floats]],
+    disturbance: DisturbanceModel,
+) -> dict[str, float]:
+    """Return the 24 h error of every quantity on selection weeks, in `ERROR_SCALES`, the sum of all parts."""
+    total: dict[str, float] = {}
+    for (record, _, _, selection), known in zip(parts, added, strict=True):
+        predict = observed_runs(record, posterior.values, effects, known, disturbance)
+        errors = summarise([errors_of(record, predict, ("24_h",), selection, every=18_900.0)])
+        for quantity, by_horizon in errors.items():
+            # Without the dose CO2 tells nothing.
+            if not (quantity == "air_co2" and "co2_dosing" in record.missing):
+                total[quantity] = total.get(quantity, 0.0) + by_horizon["24_h"].mae / ERROR_SCALES[quantity]
+    return total
 
 
 def _driver(record: Record, setpoints: Mapping[str, Floats], name: str) -> Floats:
