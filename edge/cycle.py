@@ -119,9 +119,8 @@ class ControlCycle:
         verdict = await self._guard_and_write(requests, image)
         self._log(image, decision, verdict)
         await self._beat(image)
-        held = self.readback.held(image.monotonic)
-        if self._manual:
-            held = dict.fromkeys(self._rules.points, self._respect_hand)
+        everything = dict.fromkeys(self._rules.points, self._respect_hand)
+        held = everything if self._manual else self.readback.held(image.monotonic)
         statuses = setpoint_statuses(self._rules.points, decision.choices, image, verdict, self.state, held)
         return CycleResult(image, decision, verdict, statuses, time.perf_counter() - began)
 
@@ -288,6 +287,7 @@ class ControlCycle:
             error = await self._writer.heartbeat()
             if error is None:
                 self.readback.beat(image.monotonic)
+        self._journal.alarm("second gateway", self._writer.beats.problem)
         self._journal.alarm("heartbeat", "" if error is None else f"the heartbeat could not be written: {error}")
 
     def _log(self, image: Image, decision: Decision, verdict: Verdict) -> None:

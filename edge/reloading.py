@@ -23,11 +23,15 @@ class Reloading:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._task: asyncio.Task[Configuration] | None = None
+        self._asked_again = False
+        """What is being read may be older than what was asked for last."""
 
     def start(self) -> bool:
         """Begin to read; tell whether nobody was at it already."""
         if self._task is not None:
+            self._asked_again = True
             return False
+        self._asked_again = False
         self._task = asyncio.get_running_loop().create_task(self._read())
         return True
 
@@ -39,6 +43,8 @@ class Reloading:
         if self._task is None or not self._task.done():
             return None
         task, self._task = self._task, None
+        if self._asked_again:
+            self.start()
         return task.result()
 
     def close(self) -> None:

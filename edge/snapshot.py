@@ -17,7 +17,7 @@ def snapshot_of(
     image, schedule, plan = result.image, control.schedule, control.keeper.plan
     found = [
         services.store.health,
-        services.state_files.problem,
+        control.override.problem,
         services.planning.health if services.planning is not None else "",
         schedule.problem if schedule is not None else "",
         plan.problem if plan is not None else "",

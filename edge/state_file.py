@@ -60,15 +60,34 @@ class StateFile:
         self.path = path
         self._aside = aside
         self._problem = ""
+        self._unread = ""
 
     @property
     def problem(self) -> str:
-        """Empty while it can be written, else one line."""
-        return self._aside.problem or self._problem
+        """Empty while it can be read and written, else one line."""
+        return self._aside.problem or self._unread or self._problem
 
     def read(self) -> dict[str, object]:
         """Return what the file holds; raises LateError."""
         return self._aside.ask(lambda: read_state(self.path))
+
+    def content(self) -> dict[str, object] | None:
+        """Return what the file holds, nothing where it is absent; None where it cannot be read, and `problem` says so.
+
+        To be called aside.
+        """
+        try:
+            content = json.loads(self.path.read_text("utf-8"))
+            if not isinstance(content, dict):
+                raise ValueError("no JSON object")
+        except FileNotFoundError:
+            content = {}
+        except (OSError, ValueError) as error:
+            why = error.strerror if isinstance(error, OSError) else error
+            self._unread = f"{self.path} cannot be read ({why}), so what it said before goes on"
+            return None
+        self._unread = ""
+        return content
 
     def do(self, work: Callable[[], T]) -> T:
         """Return what `work` with the file returns; raises LateError."""

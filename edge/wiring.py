@@ -115,6 +115,7 @@ class Control:
     """Names this start of the machine; empty where the plant's clock and not the machine's is followed."""
     climate_alarms: ClimateAlarms
     acknowledged: AcknowledgementWatch
+    override: GrowerOverride
 
     @property
     def lockstep(self) -> bool:
@@ -254,6 +255,7 @@ def build_control(
         AcknowledgementWatch(
             StateFile(configuration.state_folder / ACKNOWLEDGED_FILE, services.state_files), journal.event
         ),
+        override,
     )  # fmt: skip
 
 

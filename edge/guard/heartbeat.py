@@ -14,6 +14,8 @@ HIGHEST_BEAT = 65_535
 UNSURE_BEATS = 1000
 """Beats without an answer, of which any one may stand in the register."""
 KEPT = "heartbeat_kept"
+STRANGE_NUMBERS = 3
+"""Readings in a row with ever another number that is not ours, after which somebody else counts there."""
 
 
 class BeatCount:
@@ -29,11 +31,20 @@ class BeatCount:
         """The register showed our number when it was last read."""
         self._kept_before = False
         """It did so for the process before this one, of which only that is known."""
+        self._shown: int | None = None
+        self._strange = 0
 
     @property
     def kept(self) -> bool:
         """Tell whether the register is one that keeps our number."""
         return self._kept or self._kept_before
+
+    @property
+    def problem(self) -> str:
+        """Empty, or one line that says that somebody else counts in the register."""
+        if self._strange < STRANGE_NUMBERS:
+            return ""
+        return "somebody else writes the heartbeat's register: does another gateway control this PLC as well?"
 
     def next(self) -> int:
         """Return the number of the next beat."""
@@ -63,6 +74,8 @@ class BeatCount:
         if self._sure is None:
             # Nothing of ours stands there for certain yet: the next beat must differ from what does.
             self._beat = min(max(0, number), self._highest)
+        self._strange = 0 if number in (0, self._shown, *ours) else self._strange + 1
+        self._shown = number
         if number in ours:
             self._kept, self._kept_before = True, False
             return False
@@ -75,6 +88,7 @@ class BeatCount:
         """Go on where the count before a reload stood; the register is the same."""
         self._beat, self._sure, self._unsure = before._beat, before._sure, before._unsure
         self._kept, self._kept_before = before._kept, before._kept_before
+        self._shown, self._strange = before._shown, before._strange
 
     def note(self) -> dict[str, object]:
         """Return what a restart must not forget."""

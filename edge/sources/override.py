@@ -110,6 +110,11 @@ class GrowerOverride:
         self._leases: dict[str, Lease] = {}
         self._ends: dict[str, float] = {}
 
+    @property
+    def problem(self) -> str:
+        """Empty while the file can be read and written, else one line."""
+        return self._file.problem
+
     def offer(self, image: Image) -> Offer:
         """Return the setpoints whose lease runs."""
         self._look(image)
@@ -141,7 +146,7 @@ class GrowerOverride:
     def _changed(self) -> tuple[tuple[int, int] | None, dict[str, object] | None]:
         """Return the file's stamp, and its content where it has changed (aside)."""
         stamp = self._file_stamp()
-        return stamp, (read_state(self._file.path) if stamp else {}) if stamp != self._stamp else None
+        return stamp, None if stamp == self._stamp else self._file.content()
 
     def _say(self, leases: Mapping[str, Lease], given_back_by: str, image: Image) -> None:
         """Tell what is new, and what was given back before its time; what a restart finds again is neither."""
