@@ -41,11 +41,11 @@ def test_a_plc_that_is_busy_for_minutes_is_controlled_again_and_nothing_was_a_ha
         def busy(*_: object) -> None:
             raise AnswerWithExceptionError(BUSY)
 
-        unit.read = unit.write = busy  # type: ignore[method-assign,assignment]
+        unit.read = unit.write = busy  # type: ignore[assignment]
         beats = len(bench.received("heartbeat"))
         await cycles(12 * minutes)
         assert len(bench.received("heartbeat")) == beats
-        unit.read, unit.write = usual  # type: ignore[method-assign]
+        unit.read, unit.write = usual
         for name in unit.points.keys() & SAFE.keys():
             unit.set_value(name, SAFE[name])  # it has heard no heartbeat
         await cycles(12)

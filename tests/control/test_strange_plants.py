@@ -7,7 +7,7 @@ import pytest
 
 from igrow.core.errors import IgrowError
 from igrow.edge import reloading
-from igrow.edge.configuration import load_configuration
+from igrow.edge.configuration import Configuration, load_configuration
 from igrow.edge.hand_off import HandOff
 from igrow.edge.reloading import Reloading
 from igrow.edge.sources import GrowerOverride
@@ -65,7 +65,7 @@ async def test_a_reload_that_is_asked_for_while_one_is_under_way_is_not_lost(tmp
     write_files(tmp_path, 5020, heating=20.0)
     assert not one.start()
     go_on.set()
-    taken = []
+    taken: list[Configuration] = []
     while len(taken) < 2:
         found = one.take()
         taken += [found] if found is not None else []
