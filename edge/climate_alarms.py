@@ -85,8 +85,9 @@ class ClimateAlarms:
 
     @staticmethod
     def _text(rule: ClimateAlarm, value: float) -> str:
-        quantity = QUANTITIES[rule.quantity]
-        side, bound = ("above", rule.above) if rule.above is not None else ("below", rule.below)
-        lasting = f" for {rule.lasting.total_seconds() / 60:.0f} min" if rule.lasting else ""
-        words = rule.name.replace("_", " ")
-        return f"{words}: {quantity.meaning} {side} {bound:g} {quantity.unit}{lasting}, now {value:.3g}"
+        unit = QUANTITIES[rule.quantity].unit
+        bound, now = f"{rule.above if rule.above is not None else rule.below:g} {unit}", f"{value:.3g} {unit}"
+        side = f"above {bound}" if rule.above is not None else f"below {bound}"
+        if rule.lasting:
+            side = f"for {rule.lasting.total_seconds() / 60:.0f} min {side}"
+        return f"{rule.name.replace('_', ' ')}: {rule.quantity} {side}, now {now}"

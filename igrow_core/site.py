@@ -20,6 +20,7 @@ from itertools import pairwise
 from igrow.core import yaml_schema
 from igrow.core.agronomy.limits import Agronomy
 from igrow.core.errors import IgrowError
+from igrow.core.language.units import Units
 from igrow.core.local_time import zone
 from igrow.core.quantities import ACTUATORS, CLIMATE, QUANTITIES, SETPOINTS, WEATHER
 from igrow.core.yaml_schema import SettingError, setting
@@ -316,6 +317,7 @@ class Site:
     prices: Prices = setting(help="prices", default_factory=Prices)
     limits: Limits = setting(help="limits of the setpoints", default_factory=Limits)
     planning: Planning = setting(help="planning", default_factory=Planning)
+    units: Units = setting(default="metric", help="what people read and write: metric, or us (degF, mph, ft2)")
 
     def __repr__(self) -> str:
         return f"Site({self.name!r}, {self.latitude:g}, {self.longitude:g}, {self.time_zone})"

@@ -30,8 +30,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from igrow.core.arrays import Floats
+from igrow.core.language import Language
 from igrow.core.local_time import to_local
-from igrow.trainer.language import Language
 
 COLOURS: Mapping[str, str] = {
     "ink": "#1c2220",

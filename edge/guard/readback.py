@@ -231,7 +231,7 @@ class Readback:
         limited = not newest.urgent and memory.is_limited(rule, newest.value)
         if limited:
             memory.learn_limit(newest.value)
-            text += ": it seems to have a limit of its own there"
+            text = f"{text}: it seems to have a limit of its own there"
             memory.settled(rule, shown, newest.value)
             memory.limited_until = now + self._respect_hand
         else:

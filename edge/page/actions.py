@@ -7,10 +7,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from igrow.core.errors import IgrowError
+from igrow.core.language import N_
 from igrow.edge.configuration import Configuration
 from igrow.edge.notifications.acknowledged import ACKNOWLEDGED_FILE, acknowledge
 from igrow.edge.overriding import override
-from igrow.edge.page import words
+from igrow.edge.page.words import Words
 from igrow.edge.sources.override import RECIPE
 
 HOURS = (1, 2, 4, 8, 12, 24, 48)
@@ -23,6 +24,7 @@ class Actions:
 
     configuration: Configuration
     active_alarms: Sequence[str]
+    say: Words
     clock: Callable[[], float] = time.time
 
     def do(self, form: Mapping[str, str], who: str) -> str:
@@ -37,54 +39,56 @@ class Actions:
         }
         wanted = known.get(form.get("do", ""))
         if wanted is None:
-            raise IgrowError("the page asked for something that is not known")
+            raise IgrowError(self.say.text("the page asked for something that is not known"))
         return wanted(form, by)
 
     def _override(self, form: Mapping[str, str], by: str) -> str:
         name = form.get("setpoint", "")
-        seconds = _seconds(form)
+        seconds = self._seconds(form)
         try:
             value = float(form.get("value", "").replace(",", "."))
         except ValueError:
-            raise IgrowError(f"{words.title(name[:40])}: no number") from None
-        # NaN and infinities lie in no limits, and are refused there.
-        override(self.configuration, {name: value / words.scale(name)}, seconds, by=by)
-        said = f"{words.title(name)}: {words.shown(name, value / words.scale(name))} by hand"
-        return f"{said} for {words.lasting(seconds)}. The PLC shows it after the next cycles."
+            raise IgrowError(self.say.text("{setpoint}: no number", setpoint=self.say.title(name[:40]))) from None
+        # Rounded, as a limit that was shown and typed in must come back as the limit. NaN and infinities lie in none.
+        wanted = round(self.say.how(name).back(value), 6)
+        override(self.configuration, {name: wanted}, seconds, by=by)
+        said = N_("{setpoint}: {value} by hand for {time}. The PLC shows it after the next cycles.")
+        title, shown = self.say.title(name), self.say.shown(name, wanted)
+        return self.say.text(said, setpoint=title, value=shown, time=self.say.lasting(seconds))
 
     def _release(self, form: Mapping[str, str], by: str) -> str:
         name = self._setpoint(form)
         override(self.configuration, {}, 1.0, (name,), by=by)
-        return f"{words.title(name)} is given back."
+        return self.say.text("{setpoint} is given back.", setpoint=self.say.title(name))
 
     def _recipe(self, form: Mapping[str, str], by: str) -> str:
-        seconds = _seconds(form)
+        seconds = self._seconds(form)
         override(self.configuration, {}, seconds, by=by, recipe=True)
-        return f"Your recipe decides for {words.lasting(seconds)}. Plans are made, and wait."
+        said = N_("Your recipe decides for {time}. Plans are made, and wait.")
+        return self.say.text(said, time=self.say.lasting(seconds))
 
     def _plan(self, form: Mapping[str, str], by: str) -> str:
         override(self.configuration, {}, 1.0, (RECIPE,), by=by)
-        return "Plans decide again."
+        return self.say.text("Plans decide again.")
 
     def _acknowledge(self, form: Mapping[str, str], by: str) -> str:
         name = form.get("alarm", "")
         if name not in self.active_alarms:
-            raise IgrowError("that alarm is over already")
+            raise IgrowError(self.say.text("that alarm is over already"))
         path = self.configuration.state_folder / ACKNOWLEDGED_FILE
         problem = acknowledge(path, [name], by, self.clock(), self.active_alarms)
         if problem:
             raise IgrowError(problem)
-        return "Noted: you know of the alarm. It stays here until it is over."
+        return self.say.text("Noted: you know of the alarm. It stays here until it is over.")
 
     def _setpoint(self, form: Mapping[str, str]) -> str:
         name = form.get("setpoint", "")
         if name not in self.configuration.setpoints:
-            raise IgrowError(f"{name[:40]} is no setpoint of this site")
+            raise IgrowError(self.say.text("{name} is no setpoint of this site", name=name[:40]))
         return name
 
-
-def _seconds(form: Mapping[str, str]) -> float:
-    text = form.get("hours", "")
-    if text not in {str(hours) for hours in HOURS}:
-        raise IgrowError(f"for how long? {', '.join(map(str, HOURS))} hours are right")
-    return 3600.0 * float(text)
+    def _seconds(self, form: Mapping[str, str]) -> float:
+        text = form.get("hours", "")
+        if text not in {str(hours) for hours in HOURS}:
+            raise IgrowError(self.say.text("for how long? {hours} hours are right", hours=", ".join(map(str, HOURS))))
+        return 3600.0 * float(text)

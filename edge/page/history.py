@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from igrow.core.language import N_
 from igrow.core.telemetry import Telemetry
 from igrow.edge.store import read_telemetry
 
@@ -38,9 +39,9 @@ class Span:
 
 
 SPANS = {
-    "day": Span("24 hours", 86_400, 300),
-    "week": Span("7 days", 7 * 86_400, 1800),
-    "month": Span("30 days", 30 * 86_400, 7200),
+    "day": Span(N_("24 hours"), 86_400, 300),
+    "week": Span(N_("7 days"), 7 * 86_400, 1800),
+    "month": Span(N_("30 days"), 30 * 86_400, 7200),
 }
 
 

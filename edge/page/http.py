@@ -8,6 +8,7 @@ import ipaddress
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from http.cookies import CookieError, SimpleCookie
+from operator import itemgetter
 from urllib.parse import parse_qsl
 
 HEAD_BYTES = 8192
@@ -68,6 +69,19 @@ class Request:
         wanted = (one.partition(";")[0].strip() for one in self.headers.get("accept-encoding", "").split(","))
         return "gzip" in wanted
 
+    def language(self, known: Sequence[str]) -> str:
+        """Return which of the known languages the visitor likes best, the first of them where he names none."""
+        liked: list[tuple[float, str]] = []
+        for one in self.headers.get("accept-language", "").split(",")[:MOST_FIELDS]:
+            tag, _, weight = one.partition(";q=")
+            try:
+                liked.append((-float(weight or 1.0), tag.strip().lower().partition("-")[0]))
+            except ValueError:
+                continue
+        return next(
+            (code for weight, code in sorted(liked, key=itemgetter(0)) if code in known and weight < 0.0), known[0]
+        )
+
     def cookie(self, name: str) -> str | None:
         """Return one cookie, or None."""
         try:
@@ -97,7 +111,7 @@ class Response:
         return f"HTTP/1.1 {self.status}\r\n{head}\r\n".encode("latin-1") + (b"" if head_only else self.body)
 
 
-def text(status: str, line: str, headers: Mapping[str, str] | None = None) -> Response:
+def plain(status: str, line: str, headers: Mapping[str, str] | None = None) -> Response:
     """Return a line of text as an answer."""
     return Response(status, TEXT, f"{line}\n".encode(), headers or {})
 

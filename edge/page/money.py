@@ -11,12 +11,18 @@ from typing import Any
 import numpy as np
 
 from igrow.core.economics import running_costs
+from igrow.core.language import N_
 from igrow.core.planner.recent_use import co2_since_planting, used_in
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
-from igrow.edge.page import words
+from igrow.edge.page.words import Words
 
-ROWS = (("income", "Growth, when it is sold"), ("heat", "Heat"), ("electricity", "Electricity"), ("co2", "CO₂"))
+ROWS = (
+    ("income", N_("Growth, when it is sold")),
+    ("heat", N_("Heat")),
+    ("electricity", N_("Electricity")),
+    ("co2", N_("CO2")),
+)
 KINDS = ("heat", "electricity", "co2")
 TOLD = ("income", *KINDS, "profit")
 """What an explanation holds of plan and recipe."""
@@ -33,7 +39,7 @@ class Expected:
     better: bool
 
 
-def expected(plan: Mapping[str, Any], area: float) -> Expected | None:
+def expected(plan: Mapping[str, Any], area: float, say: Words) -> Expected | None:
     """Return the plan's money over its horizon; None where the daemon has no explanation. `area` is in m2."""
     explained = plan.get("explanation")
     if not explained:
@@ -45,19 +51,21 @@ def expected(plan: Mapping[str, Any], area: float) -> Expected | None:
         for column, growth in enumerate(amounts["income"])
     )
     rows = [
-        (title, words.euro(ours), words.euro(usual), words.euro(ours - usual, sign=True))
-        for name, title in (*ROWS, ("upkeep", "Upkeep of the crop"), ("profit", "What is left"))
+        (say.text(title), say.euro(ours), say.euro(usual), say.euro(ours - usual, sign=True))
+        for name, title in (*ROWS, ("upkeep", N_("Upkeep of the crop")), ("profit", N_("What is left")))
         for ours, usual in (amounts[name],)
     ]
     mean, deviation = (explained["gain"][key] * area for key in ("mean", "deviation"))
     low, high = mean - 1.96 * deviation, mean + 1.96 * deviation
-    sure = "" if high - low < 0.01 else f", between {words.euro(low, sign=True)} and {words.euro(high, sign=True)}"
+    ends = {"low": say.euro(low, sign=True), "high": say.euro(high, sign=True)}
+    sure = "" if high - low < 0.01 else say.text(", between {low} and {high}", **ends)
     # Rounded as it is shown: what would be said as nothing is no gain.
     if abs(mean) < 0.005:
-        text = "The plan and your recipe are expected to bring the same."
+        text = say.text("The plan and your recipe are expected to bring the same.")
     else:
-        side = "more" if mean > 0 else "less"
-        text = f"The plan is expected to bring {words.euro(abs(mean))} {side} than your recipe{sure}."
+        more = N_("The plan is expected to bring {amount} more than your recipe{sure}.")
+        less = N_("The plan is expected to bring {amount} less than your recipe{sure}.")
+        text = say.text(more if mean > 0 else less, amount=say.euro(abs(mean)), sure=sure)
     return Expected(tuple(rows), text, mean >= 0.005)
 
 

@@ -5,24 +5,33 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import tzinfo
 from typing import Any
 
+from igrow.core.language import N_
 from igrow.core.quantities import CLIMATE, WEATHER
 from igrow.core.site import Site
 from igrow.edge.notifications.acknowledged import Acknowledgement
-from igrow.edge.page import words
 from igrow.edge.page.state import Heard
+from igrow.edge.page.words import Words
 from igrow.edge.planning_schedule import FIRST_PLAN_WAITS
 
 HEADLINES = {
-    "override": "You decide",
-    "plan": "The plan decides",
-    "last_plan": "The last plan decides",
-    "recipe": "Your recipe decides",
-    "hands_off": "The PLC's safe settings rule",
+    "override": N_("You decide"),
+    "plan": N_("The plan decides"),
+    "last_plan": N_("The last plan decides"),
+    "recipe": N_("Your recipe decides"),
+    "hands_off": N_("The PLC's safe settings rule"),
 }
-LEVELS = ("critical", "warning", "notice")
+LEVELS = {"critical": N_("critical"), "warning": N_("warning"), "notice": N_("notice")}
+"""What an alarm asks, the most first."""
+QUALITIES = {
+    "frozen": N_("frozen"),
+    "missing": N_("missing"),
+    "out_of_range": N_("out of range"),
+    "spike": N_("spike"),
+    "stale": N_("old"),
+    "good": N_("good"),
+}
 COLD = 1.0
 """Kelvin below the heating setpoint from which air counts as too cold: heating swings a little."""
 _ROUTINE = re.compile(r"slew of |the crop's temperature_drift|written .* s ago, at least ")
@@ -45,6 +54,9 @@ class Alarm:
 
     name: str
     level: str
+    """One of `LEVELS`."""
+    called: str
+    """The same in words."""
     text: str
     since: str
     known: str
@@ -64,61 +76,70 @@ class Card:
     verdict: str
 
 
-def headline(heard: Heard) -> Headline:
+def headline(heard: Heard, say: Words, now: float = 0.0) -> Headline:
     """Return what matters most. Red while the plant, or the daemon, is not heard."""
-    state = heard.state
+    state, text = heard.state, say.text
+    last = text("What follows is the last that is known.")
     if heard.silence:
-        since = f" for {words.lasting(heard.since)}" if heard.since is not None and heard.since >= 60.0 else ""
-        then = "What follows is the last that is known. The PLC falls back to its own safe settings."
-        return Headline("bad", "✕", "The controller is not heard", f"Nothing new{since}: {heard.silence}. {then}")
+        told = say.told(heard.silence, now)
+        nothing = text("Nothing new: {why}", why=told)
+        if heard.since is not None and heard.since >= 60.0:
+            nothing = text("Nothing new for {time}: {why}", time=say.lasting(heard.since), why=told)
+        then = text("The PLC falls back to its own safe settings.")
+        detail = f"{say.whole(nothing)} {last} {then}"
+        return Headline("bad", "✕", text("The controller is not heard"), detail)
     if state is None:
-        return Headline("bad", "✕", "The controller is not heard", "It has not completed its first cycle yet.")
+        detail = text("It has not completed its first cycle yet.")
+        return Headline("bad", "✕", text("The controller is not heard"), detail)
     if not state["link_ok"]:
-        then = "What follows is the last that is known. The PLC goes on by itself."
-        return Headline("bad", "✕", "The plant is not heard", f"The PLC does not answer. {then}")
-    worst = sorted((alarm["level"] for alarm in state["alarms"]), key=LEVELS.index)
+        silent, then = text("The PLC does not answer."), text("The PLC goes on by itself.")
+        detail = f"{silent} {last} {then}"
+        return Headline("bad", "✕", text("The plant is not heard"), detail)
+    worst = sorted((alarm["level"] for alarm in state["alarms"]), key=list(LEVELS).index)
     if worst and worst[0] == "critical":
-        return Headline("bad", "✕", "Go and look now", "An alarm is critical.")
-    if "warning" in worst or problems(state):
-        return Headline("warn", "!", "Running, with something to look at", "")
-    return Headline("good", "✓", "All is well", "")
+        return Headline("bad", "✕", text("Go and look now"), text("An alarm is critical."))
+    if "warning" in worst or problems(state, say, now):
+        return Headline("warn", "!", text("Running, with something to look at"), "")
+    return Headline("good", "✓", text("All is well"), "")
 
 
-def problems(state: Mapping[str, Any]) -> list[str]:
+def problems(state: Mapping[str, Any], say: Words, now: float) -> list[str]:
     """Return what does not work as it should beside the alarms; a plan that only waits for its log is none."""
-    found = [words.sentence(problem) for problem in state["problems"] if not problem.startswith(FIRST_PLAN_WAITS)]
-    clock = "The date cannot be trusted: plans and updates wait until it can."
+    found = [say.sentence(problem, now) for problem in state["problems"] if not problem.startswith(FIRST_PLAN_WAITS)]
+    clock = say.text("The date cannot be trusted: plans and updates wait until it can.")
     return found if state["clock_ok"] else [*found, clock]
 
 
-def waiting(state: Mapping[str, Any]) -> str:
+def waiting(state: Mapping[str, Any], say: Words, now: float) -> str:
     """Return what the first plan waits for; empty where it does not."""
     waits = [problem for problem in state["problems"] if problem.startswith(FIRST_PLAN_WAITS)]
-    return words.sentence(waits[0]) if waits else ""
+    return say.sentence(waits[0], now) if waits else ""
 
 
-def decides(state: Mapping[str, Any], now: float, zone: tzinfo) -> tuple[str, str]:
+def decides(state: Mapping[str, Any], now: float, say: Words) -> tuple[str, str]:
     """Return who decides, and why."""
-    who = HEADLINES.get(state["source"], words.sentence(str(state["source"]).replace("_", " ")).rstrip("."))
-    return who, words.sentence(words.in_local_time(state["why"], now, zone))
+    source = str(state["source"])
+    who = say.text(HEADLINES[source]) if source in HEADLINES else say.title(source)
+    return who, say.sentence(state["why"], now)
 
 
-def alarms(state: Mapping[str, Any], known: Mapping[str, Acknowledgement], now: float, zone: tzinfo) -> list[Alarm]:
+def alarms(state: Mapping[str, Any], known: Mapping[str, Acknowledgement], now: float, say: Words) -> list[Alarm]:
     """Return the active alarms, the worst first."""
     found = []
-    for alarm in sorted(state["alarms"], key=lambda one: LEVELS.index(one["level"])):
+    for alarm in sorted(state["alarms"], key=lambda one: list(LEVELS).index(one["level"])):
         knows = known.get(alarm["name"])
         found.append(
             Alarm(
-                alarm["name"], alarm["level"], words.sentence(alarm["text"]),
-                "" if alarm["time"] is None else words.when(alarm["time"], now, zone),
-                "" if knows is None else f"known to {knows.by} since {words.when(knows.time, now, zone)}",
+                alarm["name"], alarm["level"], say.text(LEVELS[alarm["level"]]), say.sentence(alarm["text"], now),
+                "" if alarm["time"] is None else say.when(alarm["time"], now),
+                "" if knows is None
+                else say.text("known to {who} since {time}", who=knows.by, time=say.when(knows.time, now)),
             )
         )  # fmt: skip
     return found
 
 
-def cards(state: Mapping[str, Any], site: Site, *, old: bool = False) -> list[Card]:
+def cards(state: Mapping[str, Any], site: Site, say: Words, now: float, *, old: bool = False) -> list[Card]:
     """Return the climate, and the weather that drives it, each with whether it is as wanted.
 
     Of `old` values nothing is judged: the plant, or the daemon, is not heard.
@@ -127,50 +148,61 @@ def cards(state: Mapping[str, Any], site: Site, *, old: bool = False) -> list[Ca
     for name in (*CLIMATE, "outdoor_temperature", "global_radiation"):
         value = state["values"].get(name)
         if value is not None:
-            tone, verdict = ("warn", "! the last that is known") if old else judge(name, value, state, site)
-            number = words.number(name, value["value"])
-            found.append(Card(name, words.title(name), number, words.unit(name), tone, verdict))
+            known = "warn", "! " + say.text("the last that is known")
+            tone, verdict = known if old else judge(name, value, state, site, say, now)
+            number = say.number(name, value["value"])
+            found.append(Card(name, say.title(name), number, say.how(name).unit, tone, verdict))
     return found
 
 
-def judge(name: str, value: Mapping[str, Any], state: Mapping[str, Any], site: Site) -> tuple[str, str]:
+def judge(
+    name: str, value: Mapping[str, Any], state: Mapping[str, Any], site: Site, say: Words, now: float
+) -> tuple[str, str]:
     """Return tone and words on one measured value: against its setpoint and what the crop bears."""
     if value["quality"] != "good" or value["value"] is None:
-        return "warn", f"! {value['quality'].replace('_', ' ')}: {value['why']}".rstrip(": ")
+        return "warn", f"! {quality(value, say, now)}"
     measured, crop = float(value["value"]), site.crop
     if name == "air_temperature":
-        return _air(measured, _standing(state, "heating_setpoint"), site)
+        return _air(measured, _standing(state, "heating_setpoint"), site, say)
     if name == "air_humidity":
-        limit = words.shown(name, crop.humidity_high)
-        damp = measured > crop.humidity_high
-        return ("warn", f"▲ damper than the {limit} the crop bears") if damp else ("good", f"✓ below {limit}")
+        limit = say.shown(name, crop.humidity_high)
+        if measured > crop.humidity_high:
+            return "warn", "▲ " + say.text("damper than the {limit} the crop bears", limit=limit)
+        return "good", "✓ " + say.text("below {limit}", limit=limit)
     if name == "air_co2":
         wanted = _standing(state, "co2_setpoint")
         if wanted is None:
             return "plain", ""
-        short = wanted - measured
-        text = words.shown(name, wanted)
-        return (
-            ("plain", f"▼ {short:.0f} below the setpoint of {text}")
-            if short > 0.1 * wanted
-            else ("good", f"✓ at or above {text}")
-        )
+        short, setpoint = wanted - measured, say.shown(name, wanted)
+        if short > 0.1 * wanted:
+            below = say.text("{away} below the setpoint of {setpoint}", away=say.number(name, short), setpoint=setpoint)
+            return "plain", f"▼ {below}"
+        return "good", "✓ " + say.text("at or above {setpoint}", setpoint=setpoint)
     return "plain", ""
 
 
-def _air(measured: float, wanted: float | None, site: Site) -> tuple[str, str]:
-    crop = site.crop
-    if measured < crop.temperature_low:
-        return "bad", f"▼ colder than the {crop.temperature_low:g} °C the crop bears"
-    if measured > crop.temperature_high:
-        return "bad", f"▲ hotter than the {crop.temperature_high:g} °C the crop bears"
+def quality(value: Mapping[str, Any], say: Words, now: float) -> str:
+    """Return the quality of a value in words, with its reason."""
+    called, reason = value["quality"], value["why"]
+    called = say.text(QUALITIES[called]) if called in QUALITIES else say.spoken(called)
+    return f"{called}: {say.told(reason, now)}" if reason else called
+
+
+def _air(measured: float, wanted: float | None, site: Site, say: Words) -> tuple[str, str]:
+    low, high = site.crop.temperature_low, site.crop.temperature_high
+    if measured < low:
+        return "bad", "▼ " + say.text("colder than the {limit} the crop bears", limit=say.amount(low, "degC"))
+    if measured > high:
+        return "bad", "▲ " + say.text("hotter than the {limit} the crop bears", limit=say.amount(high, "degC"))
     if wanted is None:
         return "plain", ""
+    setpoint = say.shown("heating_setpoint", wanted)
     if measured < wanted - COLD:
-        return "warn", f"▼ {wanted - measured:.1f} K below the heating setpoint"
+        away = say.language.amount(wanted - measured, "K", 2)
+        return "warn", "▼ " + say.text("{away} below the heating setpoint", away=away)
     if measured > wanted + COLD:
-        return "good", f"✓ above the heating setpoint of {wanted:.1f} °C"
-    return "good", f"✓ at the heating setpoint of {wanted:.1f} °C"
+        return "good", "✓ " + say.text("above the heating setpoint of {setpoint}", setpoint=setpoint)
+    return "good", "✓ " + say.text("at the heating setpoint of {setpoint}", setpoint=setpoint)
 
 
 def _standing(state: Mapping[str, Any], setpoint: str) -> float | None:
@@ -189,17 +221,17 @@ class Held:
     reason: str
 
 
-def held_back(clamps: Sequence[Mapping[str, Any]], now: float, zone: tzinfo) -> tuple[list[Held], list[Held]]:
+def held_back(clamps: Sequence[Mapping[str, Any]], now: float, say: Words) -> tuple[list[Held], list[Held]]:
     """Return what the guard held back, newest first: what matters, and apart from it the routine of ramps."""
     kinds: tuple[list[Held], list[Held]] = ([], [])
     for clamp in clamps:
         name, reason = clamp["point"], clamp["reason"]
         kinds[is_routine(reason)].append(
             Held(
-                "" if clamp["time"] is None else words.when(clamp["time"], now, zone),
-                words.title(name), words.shown(name, clamp["requested"]),
-                "nothing" if clamp["applied"] is None else words.shown(name, clamp["applied"]),
-                words.sentence(words.in_local_time(reason, now, zone)),
+                "" if clamp["time"] is None else say.when(clamp["time"], now),
+                say.title(name), say.shown(name, clamp["requested"]),
+                say.text("nothing") if clamp["applied"] is None else say.shown(name, clamp["applied"]),
+                say.sentence(reason, now),
             )
         )  # fmt: skip
     return kinds
@@ -210,13 +242,12 @@ def is_routine(reason: str) -> bool:
     return all(_ROUTINE.match(part.strip()) for part in reason.split(";"))
 
 
-def points(state: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
+def points(state: Mapping[str, Any], say: Words, now: float) -> list[tuple[str, str, str, str]]:
     """Return every point: title, value, quality with its reason, age."""
     return [
         (
-            words.title(name), words.shown(name, value["value"]),
-            " ".join(filter(None, (value["quality"].replace("_", " "), value["why"]))),
-            "" if value["age"] is None else words.lasting(value["age"]),
+            say.title(name), say.shown(name, value["value"]), quality(value, say, now),
+            "" if value["age"] is None else say.lasting(value["age"]),
         )
         for name, value in sorted(state["values"].items(), key=lambda item: item[0] not in (*CLIMATE, *WEATHER))
     ]  # fmt: skip

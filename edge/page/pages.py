@@ -14,17 +14,19 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from igrow.core.errors import IgrowError
+from igrow.core.language import LANGUAGES
 from igrow.edge.configuration import Configuration, load_configuration
 from igrow.edge.daemon_file import ClockSource
 from igrow.edge.notifications.acknowledged import ACKNOWLEDGED_FILE, read_acknowledged
 from igrow.edge.overriding import override_file
 from igrow.edge.page.actions import Actions
 from igrow.edge.page.history import SPANS, History
-from igrow.edge.page.http import HTML, Response
+from igrow.edge.page.http import HTML, Request, Response
 from igrow.edge.page.password import Password, read_password
 from igrow.edge.page.sessions import Session
 from igrow.edge.page.state import Daemon
-from igrow.edge.page.view import Known, compose
+from igrow.edge.page.view import Known, compose, said_by
+from igrow.edge.page.words import Words
 from igrow.edge.sources.override import read_leases
 from igrow.edge.status.client import STATUS_FILE
 from igrow.edge.store import StoreError
@@ -112,24 +114,37 @@ class Pages:
         kind, content = found
         return Response("200 OK", f"{kind}; charset=utf-8", content, {"Cache-Control": "no-cache"})
 
-    def sign_in(self, *, has_password: bool, who: str = "", problem: str = "", status: str = "200 OK") -> Response:
-        """Return the page on which one signs in."""
-        content = {"site": self.configuration().site.name, "has_password": has_password, "who": who, "problem": problem}
+    def words(self, request: Request) -> Words:
+        """Return the language of a visitor: the configured one, else what the browser asks for."""
+        configuration = self.configuration()
+        return Words.of(configuration.site, configuration.file.page.language or request.language(LANGUAGES))
+
+    def sign_in(
+        self, say: Words, *, has_password: bool, who: str = "", problem: str = "", status: str = "200 OK"
+    ) -> Response:
+        """Return the page on which one signs in; `problem` is a text that is told in the visitor's language."""
+        site = self.configuration().site.name
+        content = {"site": site, "has_password": has_password, "who": who, "problem": problem, **said_by(say)}
         return render("sign_in.html", content, status)
 
-    def page(self, span: str, session: Session | None, said: tuple[str, bool], *, has_password: bool) -> Response:
+    def page(
+        self, say: Words, span: str, session: Session | None, said: tuple[str, bool], *, has_password: bool
+    ) -> Response:
         """Return the page over a span of `SPANS`; another one is a day."""
-        known = self._known(span if span in SPANS else "day", has_password=has_password)
+        known = self._known(span if span in SPANS else "day", say.language.code, has_password=has_password)
         text, well = said
         return render("page.html", {**compose(known), "session": session, "said": text, "said_well": well})
 
-    def act(self, form: Mapping[str, str], who: str) -> str:
-        """Do what a form asks for; returns one line. Raises IgrowError."""
+    def act(self, form: Mapping[str, str], who: str, say: Words) -> str:
+        """Do what a form asks for; returns one line. Raises IgrowError, its line in the visitor's language."""
         state = self._daemon.hear().state
         active = [] if state is None else [str(alarm["name"]) for alarm in state["alarms"]]
-        return Actions(self._configured.look(), active).do(form, who)
+        try:
+            return Actions(self._configured.look(), active, say).do(form, who)
+        except IgrowError as error:
+            raise IgrowError(say.told(str(error), time.time())) from None
 
-    def _known(self, span: str, *, has_password: bool) -> Known:
+    def _known(self, span: str, language: str, *, has_password: bool) -> Known:
         configuration, heard = self._configured.look(), self._daemon.hear()
         told = None if heard.state is None else heard.state["time"]
         # A real plant's time goes on while nobody tells it.
@@ -144,7 +159,7 @@ class Pages:
         state = configuration.state_folder
         return Known(
             configuration, heard, now, span, courses, day, problem,
-            read_leases(override_file(state)), read_acknowledged(state / ACKNOWLEDGED_FILE), has_password,
+            read_leases(override_file(state)), read_acknowledged(state / ACKNOWLEDGED_FILE), has_password, language,
         )  # fmt: skip
 
 

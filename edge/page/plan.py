@@ -4,22 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import tzinfo
 from typing import Any
 
 import numpy as np
 
 from igrow.core.agronomy.limits import Agronomy
+from igrow.core.language import N_
 from igrow.core.planner.explain import PARTS, SAME, Amount, Change, limits_in_force
 from igrow.core.quantities import SETPOINTS
-from igrow.edge.page import words
 from igrow.edge.page.svg import Stretch
+from igrow.edge.page.words import Words
 
 MORE = {
-    "heating_setpoint": ("Warmer", "Cooler"),
-    "co2_setpoint": ("More CO₂", "Less CO₂"),
-    "lamp_on": ("More lamp light", "Less lamp light"),
-    "irrigation_on": ("More water", "Less water"),
+    "heating_setpoint": (N_("Warmer than your recipe ({usual})"), N_("Cooler than your recipe ({usual})")),
+    "co2_setpoint": (N_("More CO2 than your recipe ({usual})"), N_("Less CO2 than your recipe ({usual})")),
+    "lamp_on": (N_("More lamp light than your recipe ({usual})"), N_("Less lamp light than your recipe ({usual})")),
+    "irrigation_on": (N_("More water than your recipe ({usual})"), N_("Less water than your recipe ({usual})")),
+}
+PART_TEXTS = {
+    "income": (N_("growth worth {amount} more"), N_("growth worth {amount} less")),
+    "heat": (N_("{amount} more for heat"), N_("{amount} less for heat")),
+    "electricity": (N_("{amount} more for electricity"), N_("{amount} less for electricity")),
+    "co2": (N_("{amount} more for CO2"), N_("{amount} less for CO2")),
 }
 TOLD = 0.005
 """Amounts of money that would be shown as nothing are not told, EUR."""
@@ -67,7 +73,7 @@ def change_of(plain: Mapping[str, Any]) -> Change:
 
 
 def blocks(
-    plan: Mapping[str, Any], recipe: Mapping[str, Sequence[float]], area: float, limits: Agronomy
+    plan: Mapping[str, Any], recipe: Mapping[str, Sequence[float]], area: float, limits: Agronomy, say: Words
 ) -> list[Block]:
     """Return the stretches of a plan, by setpoint and time.
 
@@ -76,6 +82,7 @@ def blocks(
         recipe: what the grower's recipe would ask over the plan's steps, by setpoint.
         area: growing area in m2, by which money is for the whole greenhouse.
         limits: of the crop.
+        say: the language.
     """
     explained = plan.get("explanation") or {}
     changes = [change_of(change) for change in explained.get("changes", ())]
@@ -97,77 +104,89 @@ def blocks(
             )
             found.append(
                 Block(
-                    name, start, end, span(name, values[rows]), side[first] == 0.0,
-                    why(name, float(side[first]), span(name, usual[rows]), change, area, explained=bool(explained)),
-                    tuple(limit_words(limit, limits) for limit in named),
+                    name, start, end, span(name, values[rows], say), side[first] == 0.0,
+                    why(name, float(side[first]), usual[rows], change, area, say, explained=bool(explained)),
+                    tuple(limit_words(limit, limits, say) for limit in named),
                 )
             )  # fmt: skip
     return found
 
 
-def span(name: str, values: np.ndarray[Any, Any]) -> str:
+def span(name: str, values: np.ndarray[Any, Any], say: Words) -> str:
     """Return one value, or the least and the greatest, with their unit."""
-    low, high = words.number(name, float(values.min())), words.number(name, float(values.max()))
-    return words.shown(name, float(values[0])) if low == high else f"{low} to {high} {words.unit(name)}"
+    low, high = say.number(name, float(values.min())), say.number(name, float(values.max()))
+    if low == high:
+        return say.shown(name, float(values[0]))
+    return say.text("{low} to {high}", low=low, high=say.shown(name, float(values.max())))
 
 
-def why(name: str, side: float, usual: str, change: Change | None, area: float, *, explained: bool) -> str:
+def why(
+    name: str,
+    side: float,
+    usual: np.ndarray[Any, Any],
+    change: Change | None,
+    area: float,
+    say: Words,
+    *,
+    explained: bool,
+) -> str:
     """Return one sentence on a stretch: how it differs from the recipe, and what that is for."""
     if side == 0.0:
-        return "As your recipe." if explained else "As your recipe, or close to it."
-    differs = f"{MORE[name][0 if side > 0 else 1]} than your recipe ({usual})"
+        return say.text("As your recipe.") if explained else say.text("As your recipe, or close to it.")
+    differs = say.text(MORE[name][0 if side > 0 else 1], usual=span(name, usual, say))
     if change is None:
-        return f"{differs}: a small change, not among those that matter most." if explained else f"{differs}."
-    told = [part(kind, change.parts[kind] * area) for kind in PARTS]
+        small = N_("{change}: a small change, not among those that matter most.")
+        return say.text(small, change=differs) if explained else say.whole(differs)
+    told = [part(kind, change.parts[kind] * area, say) for kind in PARTS]
     gain = change.gain.mean * area
     low, high = (bound * area for bound in change.gain.interval)
-    total = f"together {words.euro(gain, sign=True)}"
+    total = say.text("together {amount}", amount=say.euro(gain, sign=True))
     if abs(high - low) >= 2 * TOLD:
-        total += f", between {words.euro(low, sign=True)} and {words.euro(high, sign=True)}"
-    reasons = "; ".join(filter(None, told)) or "it changes next to nothing in money"
-    return f"{differs}: {reasons}; {total}."
+        total += say.text(", between {low} and {high}", low=say.euro(low, sign=True), high=say.euro(high, sign=True))
+    reasons = "; ".join(filter(None, told)) or say.text("it changes next to nothing in money")
+    return say.text("{change}: {reasons}; {total}.", change=differs, reasons=reasons, total=total)
 
 
-def part(kind: str, amount: float) -> str:
+def part(kind: str, amount: float, say: Words) -> str:
     """Return what a change adds to growth or to a cost, EUR for the greenhouse; empty where it is next to none."""
     if abs(amount) < TOLD:
         return ""
-    size = words.euro(abs(amount))
-    if kind == "income":
-        return f"growth worth {size} {'more' if amount > 0 else 'less'}"
-    cost = {"heat": "heat", "electricity": "electricity", "co2": "CO₂"}[kind]
-    return f"{size} {'more' if amount > 0 else 'less'} for {cost}"
+    return say.text(PART_TEXTS[kind][0 if amount > 0 else 1], amount=say.euro(abs(amount)))
 
 
-def limit_words(limit: str, limits: Agronomy) -> str:
+def limit_words(limit: str, limits: Agronomy, say: Words) -> str:
     """Return a limit of the crop in words, with its value in the site's file."""
     bands = {
-        "day_temperature": ("temperature by day", limits.day_temperature),
-        "night_temperature": ("temperature at night", limits.night_temperature),
-        "mean_temperature": ("mean temperature of a day", limits.mean_temperature),
+        "day_temperature": (N_("temperature by day, {low} to {high}"), limits.day_temperature),
+        "night_temperature": (N_("temperature at night, {low} to {high}"), limits.night_temperature),
+        "mean_temperature": (N_("mean temperature of a day, {low} to {high}"), limits.mean_temperature),
     }
     if limit in bands:
         text, band = bands[limit]
-        return f"{text}, {band.low:g} to {band.high:g} °C"
+        low = say.language.number(say.language.shown("degC").of(band.low), 4)
+        return say.text(text, low=low, high=say.amount(band.high, "degC"))
+    least = (N_("at most {value} of light a day"), limits.light_sum_high, "mol m-2")
     values = {
-        "temperature_difference": f"at most {limits.temperature_difference:g} K within a day",
-        "temperature_drift": f"at most {limits.temperature_drift:g} K an hour",
-        "dark_hours": f"{limits.dark_hours:g} dark hours a night",
-        "light_sum": f"at most {limits.light_sum_high:g} mol/m² of light a day",
-        "light_sum_high": f"at most {limits.light_sum_high:g} mol/m² of light a day",
-        "co2_with_people": f"at most {limits.co2_with_people:g} ppm while people are inside",
-        "rest": "least times between switching",
+        "temperature_difference": (N_("at most {value} within a day"), limits.temperature_difference, "K"),
+        "temperature_drift": (N_("at most {value} an hour"), limits.temperature_drift, "K"),
+        "dark_hours": (N_("{value} dark hours a night"), limits.dark_hours, "1"),
+        "light_sum": least,
+        "light_sum_high": least,
+        "co2_with_people": (N_("at most {value} while people are inside"), limits.co2_with_people, "ppm"),
     }
-    return values.get(limit, limit.replace("_", " "))
+    if limit in values:
+        text, value, unit = values[limit]
+        return say.text(text, value=say.amount(value, unit))
+    return say.text("least times between switching") if limit == "rest" else say.spoken(limit)
 
 
-def binding(plan: Mapping[str, Any] | None, setpoint: str, limits: Agronomy) -> list[Stretch]:
+def binding(plan: Mapping[str, Any] | None, setpoint: str, limits: Agronomy, say: Words) -> list[Stretch]:
     """Return when a limit of the crop stands in the way of a setpoint's plan."""
     if plan is None:
         return []
     return [
         Stretch(
-            limit_words(limit, limits),
+            limit_words(limit, limits, say),
             plan["start"] + first * plan["step_seconds"],
             plan["start"] + (last + 1) * plan["step_seconds"],
         )
@@ -176,7 +195,7 @@ def binding(plan: Mapping[str, Any] | None, setpoint: str, limits: Agronomy) -> 
     ]
 
 
-def next_change(plan: Mapping[str, Any] | None, name: str, now: float, zone: tzinfo) -> str:
+def next_change(plan: Mapping[str, Any] | None, name: str, now: float, say: Words) -> str:
     """Return what the plan asks for next of a setpoint, and when; nothing where it stays as it is."""
     if plan is None or name not in plan["setpoints"]:
         return ""
@@ -186,5 +205,6 @@ def next_change(plan: Mapping[str, Any] | None, name: str, now: float, zone: tzi
         return ""
     for number in range(present + 1, len(course)):
         if abs(course[number] - course[present]) > SAME[name]:
-            return f"{words.shown(name, course[number])} from {words.when(plan['start'] + number * step, now, zone)}"
+            from_then = say.when(plan["start"] + number * step, now)
+            return say.text("{value} from {time}", value=say.shown(name, course[number]), time=from_then)
     return ""

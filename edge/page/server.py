@@ -17,10 +17,10 @@ from igrow.edge.page.http import (
     Request,
     Response,
     own_name,
+    plain,
     read_request,
     same_origin,
     see,
-    text,
 )
 from igrow.edge.page.pages import Pages
 from igrow.edge.page.sessions import Session, Sessions, Tries
@@ -101,7 +101,7 @@ class PageServer:
             async with asyncio.timeout(REQUEST_SECONDS):
                 request = await read_request(reader, address)
         except RefusedError as refused:
-            response, head_only = text(refused.status, str(refused)), False
+            response, head_only = plain(refused.status, str(refused)), False
         else:
             response, head_only = await self._answer_any(request), request.method == "HEAD"
         async with asyncio.timeout(SEND_SECONDS):
@@ -115,15 +115,15 @@ class PageServer:
         try:
             return await self._answer(request)
         except RefusedError as refused:
-            return text(refused.status, str(refused))
+            return plain(refused.status, str(refused))
         except TimeoutError:
-            return text("503 Service Unavailable", "a disk, or the daemon, takes too long; try again")
+            return plain("503 Service Unavailable", "a disk, or the daemon, takes too long; try again")
         except Exception:
             _log.exception("a page could not be made")
-            return text("500 Internal Server Error", "the page could not be made; the journal says why")
+            return plain("500 Internal Server Error", "the page could not be made; the journal says why")
 
     async def _answer(self, request: Request) -> Response:
-        configuration = self._pages.configuration()
+        configuration, say = self._pages.configuration(), self._pages.words(request)
         if not own_name(request.headers.get("host"), configuration.file.page.names):
             raise RefusedError("421 Misdirected Request", "this page is for its own names: localhost, or page.names")
         if request.method == "POST":
@@ -134,7 +134,7 @@ class PageServer:
         password = await self._aside(self._pages.password)
         session = self._sessions.find(request.cookie(COOKIE), None if password is None else password.digest)
         if request.path == "/sign-in":
-            return self._pages.sign_in(has_password=password is not None)
+            return self._pages.sign_in(say, has_password=password is not None)
         if request.path != "/":
             raise RefusedError("404 Not Found", "there is only /")
         # The flash is taken here, in the one thread that sessions belong to.
@@ -142,7 +142,7 @@ class PageServer:
         span = request.query.get("span", "day")
 
         def make() -> Response:
-            made = self._pages.page(span, session, said, has_password=password is not None)
+            made = self._pages.page(say, span, session, said, has_password=password is not None)
             return made.packed() if request.takes_gzip else made
 
         return await self._aside(make)
@@ -167,9 +167,9 @@ class PageServer:
         return await self._act(request, session)
 
     async def _act(self, request: Request, session: Session) -> Response:
-        form, who = request.form, session.who
+        form, who, say = request.form, session.who, self._pages.words(request)
         try:
-            said = await self._aside(lambda: self._pages.act(form, who))
+            said = await self._aside(lambda: self._pages.act(form, who, say))
         except IgrowError as error:
             session.said = (str(error), False)
         else:
@@ -178,19 +178,21 @@ class PageServer:
         return see("/")
 
     async def _sign_in(self, request: Request) -> Response:
-        form = request.form
+        form, say = request.form, self._pages.words(request)
         who = " ".join("".join(c for c in form.get("who", "") if c.isprintable()).split())[:40]
         password = await self._aside(self._pages.password)
         if password is None:
-            return self._pages.sign_in(has_password=False)
+            return self._pages.sign_in(say, has_password=False)
         if not who:
-            return self._pages.sign_in(has_password=True, problem="Your name is missing: it is written down.")
+            missing = say.text("Your name is missing: it is written down.")
+            return self._pages.sign_in(say, has_password=True, problem=missing)
         wait = self._tries.wait(request.address)
         if wait > 0.0:
             refusal = self._pages.sign_in(
+                say,
                 has_password=True,
                 who=who,
-                problem=f"Too many tries: again in {wait:.0f} s.",
+                problem=say.text("Too many tries: again in {seconds} s.", seconds=f"{wait:.0f}"),
                 status="429 Too Many Requests",
             )
             return Response(refusal.status, refusal.kind, refusal.body, {"Retry-After": f"{wait + 1:.0f}"})
@@ -200,7 +202,7 @@ class PageServer:
             self._tries.failed(request.address)
             _log.warning("a password for the page did not fit (%s)", request.address)
             return self._pages.sign_in(
-                has_password=True, who=who, problem="That is not the password.", status="403 Forbidden"
+                say, has_password=True, who=who, problem=say.text("That is not the password."), status="403 Forbidden"
             )
         self._tries.succeeded(request.address)
         _log.info("%s has signed in (%s)", who, request.address)

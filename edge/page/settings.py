@@ -7,6 +7,7 @@ from __future__ import annotations
 import datetime
 import ipaddress
 from dataclasses import dataclass
+from typing import Literal
 
 from igrow.core.yaml_schema import SettingError, setting
 
@@ -25,6 +26,9 @@ class PageSettings:
     port: int = setting(low=0, high=65535, default=PAGE_PORT, help="TCP port; 0 takes a free one")
     names: tuple[str, ...] = setting(
         default=(), help="names that browsers call this machine by, beside localhost and its addresses"
+    )
+    language: Literal["", "en", "nl", "de", "es", "zh"] = setting(
+        default="", help="of the page: en, nl, de, es or zh; empty: what each browser asks for"
     )
     session: datetime.timedelta = setting(
         low=_HOUR, high=30 * 24 * _HOUR, default=12 * _HOUR, help="how long a sign-in lasts"

@@ -9,11 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from datetime import datetime, timedelta, tzinfo
+from datetime import timedelta
 from html import escape
 
 import numpy as np
 from numpy.typing import NDArray
+
+from igrow.edge.page.words import Words
 
 Values = NDArray[np.float64]
 
@@ -69,7 +71,7 @@ class Frame:
     start: float
     end: float
     now: float
-    zone: tzinfo
+    say: Words
     least_span: float = 1.0
     """The scale spans at least so much, so that noise looks like noise."""
 
@@ -181,14 +183,14 @@ def ticks(low: float, high: float) -> list[float]:
     return [round(index * step, 10) for index in range(math.ceil(low / step), math.floor(high / step) + 1)]
 
 
-def time_ticks(start: float, end: float, zone: tzinfo, most: int) -> Iterator[tuple[float, str]]:
+def time_ticks(start: float, end: float, say: Words, most: int) -> Iterator[tuple[float, str]]:
     """Yield at most so many round local times of a range with their names; midnights are named by their day."""
     hours = (end - start) / 3600.0
     step = next((step for step in (3, 6, 12, 24, 48, 120, 240) if hours / step <= most), 480)
-    moment = datetime.fromtimestamp(start, zone).replace(hour=0, minute=0, second=0, microsecond=0)
+    moment = say.local(start).replace(hour=0, minute=0, second=0, microsecond=0)
     while (time := moment.timestamp()) <= end:
         if time >= start:
-            name = f"{moment:%H:%M}" if moment.hour else f"{moment:%a %d}" if step <= 48 else f"{moment:%d %b}"
+            name = f"{moment:%H:%M}" if moment.hour else say.date(time, "weekday" if step <= 48 else "short_day")
             yield time, name
         # On the wall's clock, so that midnight stays midnight over a change of the clocks.
         moment = moment + timedelta(hours=step)
@@ -197,11 +199,12 @@ def time_ticks(start: float, end: float, zone: tzinfo, most: int) -> Iterator[tu
 def _grid(frame: Frame, size: Size, x: Place, y: Place, ends: tuple[float, float]) -> Iterator[str]:
     right, floor = size.width - RIGHT, size.height - BOTTOM
     for tick in ticks(*ends):
+        value = frame.say.language.number(tick, 6)
         yield (
             f'<path class="grid" d="M{LEFT} {y(tick):.1f}H{right}"/>'
-            f'<text class="axis" x="{LEFT - 6}" y="{y(tick) + 4:.1f}" text-anchor="end">{tick:g}</text>'
+            f'<text class="axis" x="{LEFT - 6}" y="{y(tick) + 4:.1f}" text-anchor="end">{value}</text>'
         )
-    for time, name in time_ticks(frame.start, frame.end, frame.zone, size.width // 75):
+    for time, name in time_ticks(frame.start, frame.end, frame.say, size.width // 75):
         yield f'<path class="grid" d="M{x(time):.1f} {TOP}V{floor}"/>'
         if LEFT + 14 <= x(time) <= right - 14:
             at = f'x="{x(time):.1f}" y="{size.height - 6}"'
@@ -215,7 +218,7 @@ def _ahead(frame: Frame, size: Size, x: Place) -> Iterator[str]:
         yield f'<rect class="ahead" x="{at:.1f}" y="{TOP}" width="{width:.1f}" height="{floor - TOP}"/>'
         yield f'<path class="present" d="M{at:.1f} {TOP}V{floor}"/>'
         if width > 44:
-            yield f'<text class="present" x="{at + 4:.1f}" y="{TOP - 4}">ahead</text>'
+            yield f'<text class="present" x="{at + 4:.1f}" y="{TOP - 4}">{escape(frame.say.text("ahead"))}</text>'
 
 
 def _corners(time: Values, value: Values, end: float) -> list[tuple[float, float]]:

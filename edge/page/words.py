@@ -1,143 +1,168 @@
-"""How names, numbers and times are said on the page: in the grower's units, in the time of the site."""
+"""How names, numbers and times are said on the page: in the grower's language and units, in the time of the site."""
 
 from __future__ import annotations
 
 import math
 import re
+from dataclasses import dataclass
 from datetime import datetime, timedelta, tzinfo
+from zoneinfo import ZoneInfo
 
+from igrow.core.language import LANGUAGES, N_, Language, speak
+from igrow.core.language.units import Shown
 from igrow.core.quantities import QUANTITIES
+from igrow.core.site import Site
 
-UNITS = {
-    "degC": "°C",
-    "umol m-2 s-1": "µmol/m²s",
-    "W m-2": "W/m²",
-    "m s-1": "m/s",
-    "kg m-2": "kg/m²",
-    "kg m-2 h-1": "kg/m²h",
-    "L m-2 h-1": "l/m²h",
-    "m2 m-2": "m²/m²",
-    "fruits m-2": "fruits/m²",
-    "deg": "°",
-    "1": "%",
-}
-"""By the registry's unit; fractions are said in per cent."""
 DIGITS = {"degC": 1, "%": 0, "ppm": 0, "W m-2": 0, "m s-1": 1, "1": 0, "deg": 0, "kg m-2 h-1": 4, "umol m-2 s-1": 0}
-TITLES = {
-    "lamp_on": "Lamps",
-    "irrigation_on": "Irrigation",
-    "par": "Light at the crop",
-    "global_radiation": "Sun outside",
-    "lamp_power": "Power of the lamps",
-}
 DECIDERS = {
-    "override": "You",
-    "plan": "The plan",
-    "last_plan": "The last plan",
-    "recipe": "Your recipe",
-    "hands_off": "The PLC",
-    "interlock": "An interlock",
-    "hand": "A hand at the PLC",
-    "": "Nobody",
+    "override": N_("You"),
+    "plan": N_("The plan"),
+    "last_plan": N_("The last plan"),
+    "recipe": N_("Your recipe"),
+    "hands_off": N_("The PLC"),
+    "interlock": N_("An interlock"),
+    "hand": N_("A hand at the PLC"),
+    "": N_("Nobody"),
 }
-_NAME = re.compile(r"\b[a-z0-9]+(?:_[a-z0-9]+)+\b")
-_UTC = re.compile(r"\b(\d{2} [A-Z][a-z]{2} \d{2}:\d{2}) UTC\b")
+LASTING = (
+    (172_800.0, 86_400.0, N_("{count} days")),
+    (5400.0, 3600.0, N_("{count} h")),
+    (90.0, 60.0, N_("{count} min")),
+)
+_UTC = r"\d{2} [A-Z][a-z]{2} \d{2}:\d{2} UTC|\d{4}-\d{2}-\d{2} \d{2}:\d{2} UTC"
+_NAME = r"[a-z0-9]+(?:_[a-z0-9]+)+"
+_NUMBER = r"[-−]?\d+(?:\.\d+)?"
+_PART = re.compile(
+    rf"(?P<time>{_UTC})|(?<![\w./-])(?:(?P<name>{_NAME})|(?P<number>{_NUMBER})(?: (?P<unit>degC|K|W m-2|m s-1|g m-3|"
+    r"umol m-2 s-1|kg m-2 h-1))?)(?![\w/-]|[.:]\w)"
+)
 
 
-def title(name: str) -> str:
-    """Return the name of a point for people, such as "CO₂ setpoint"."""
-    text = TITLES.get(name) or spoken(name)
+@dataclass(frozen=True)
+class Words:
+    """One language, with the clock and the units of a site."""
+
+    language: Language
+    zone: tzinfo
+
+    @classmethod
+    def of(cls, site: Site, code: str = LANGUAGES[0]) -> Words:
+        """Return a language as a site speaks it."""
+        return cls(speak(code, site.time_zone, site.units), ZoneInfo(site.time_zone))
+
+    def text(self, message: str, **values: object) -> str:
+        """Return a text of the page, `values` put in for what stands in braces."""
+        return self.language.text(message, **values).replace("CO2", "CO₂")
+
+    def spoken(self, name: str) -> str:
+        """Return a name as it is said within a sentence, such as "CO₂ setpoint"."""
+        return self.language.name(name).replace("co2", "CO2").replace("CO2", "CO₂")
+
+    def title(self, name: str) -> str:
+        """Return the name of a point for people, such as "Air temperature"."""
+        return _upper(self.spoken(name))
+
+    def how(self, name: str) -> Shown:
+        """Return how a quantity is shown: fractions in per cent."""
+        known = QUANTITIES.get(name)
+        if known is None:
+            return Shown("")
+        return Shown("%", 100.0) if known.unit == "1" else self.language.shown(known.unit)
+
+    def number(self, name: str, value: float | None) -> str:
+        """Return a value as it is shown, without its unit; a dash for none."""
+        if value is None or not math.isfinite(value):
+            return "–"
+        registry = QUANTITIES[name].unit if name in QUANTITIES else ""
+        return self.language.fixed(self.how(name).of(value), DIGITS.get(registry, 1))
+
+    def shown(self, name: str, value: float | None) -> str:
+        """Return a value with its unit, such as "19.4 °C"."""
+        text, unit = self.number(name, value), self.how(name).unit
+        return text if text == "–" or not unit else f"{text} {unit}"
+
+    def amount(self, value: float, unit: str) -> str:
+        """Return a number of a file with its unit of the registry, as it stands there: "5 K", "28 °C"."""
+        return self.language.amount(value, unit, 4)
+
+    def euro(self, value: float, *, sign: bool = False) -> str:
+        """Return an amount of money for the whole greenhouse."""
+        if not math.isfinite(value):
+            return "–"
+        decimals = 0 if abs(value) >= 1000.0 else 2
+        mark = "−" if round(value, decimals) < 0 else "+" if sign and round(value, decimals) > 0 else ""
+        return mark + self.text("{amount} €", amount=self.language.fixed(abs(value), decimals))
+
+    def date(self, time: float, pattern: str) -> str:
+        """Return a time, seconds since 1970 UTC, as a calendar at the site shows it (`igrow.core.language.locales`)."""
+        return self.language.locale.date(self.local(time), pattern)
+
+    def local(self, time: float) -> datetime:
+        """Return a time, seconds since 1970 UTC, by the clock of the site."""
+        return datetime.fromtimestamp(time, self.zone)
+
+    def when(self, time: float, now: float) -> str:
+        """Return a time near `now` as people say it: "07:00", "tomorrow 07:00", "Fri 20 Mar 07:00"."""
+        moment, today = self.local(time), self.local(now).date()
+        clock = f"{moment:%H:%M}"
+        if moment.date() == today:
+            return clock
+        if moment.date() == today + timedelta(days=1):
+            return self.text("tomorrow {time}", time=clock)
+        if moment.date() == today - timedelta(days=1):
+            return self.text("yesterday {time}", time=clock)
+        return f"{self.date(time, 'date')} {clock}"
+
+    def lasting(self, seconds: float) -> str:
+        """Return a length of time, roughly: "40 s", "12 min", "3 h", "2 days"."""
+        for least, size, text in LASTING:
+            if seconds >= least:
+                return self.text(text, count=f"{seconds / size:.0f}")
+        return f"{max(seconds, 0.0):.0f} s"
+
+    def told(self, line: str, now: float) -> str:
+        """Return a line of the daemon: its texts in this language, its names, numbers and times as people say them."""
+        return self.language.told(line, lambda part: self._value(part, now)).replace("CO2", "CO₂")
+
+    def sentence(self, line: str, now: float) -> str:
+        """Return the same as a sentence: a capital letter, a full stop."""
+        return self.whole(self.told(line.strip(), now))
+
+    def whole(self, text: str) -> str:
+        """Return a text as a sentence."""
+        stop = "。" if self.language.code == "zh" else "."
+        return text and _upper(text) + ("" if text.endswith((".", "!", "?", "。", "？")) else stop)
+
+    def _value(self, part: str, now: float) -> str:
+        """Return what is no text of ours: names, numbers with their units and times are found in it."""
+        return _PART.sub(lambda found: self._found(found, now), part)
+
+    def _found(self, found: re.Match[str], now: float) -> str:
+        if found["time"]:
+            time = _nearest(found["time"], now)
+            return found[0] if time is None else self.when(time, now)
+        if found["name"]:
+            return self.spoken(found["name"])
+        number = float(found["number"].replace("−", "-"))
+        if found["unit"]:
+            return self.amount(number, found["unit"])
+        return found["number"].replace(".", self.language.locale.decimal)
+
+
+def _upper(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def spoken(name: str) -> str:
-    """Return a name as it is said within a sentence, such as "air CO₂"."""
-    return name.replace("_", " ").replace("co2", "CO₂")
-
-
-def registry_unit(name: str) -> str:
-    """Return the unit of the registry; nothing for what is no quantity."""
-    return QUANTITIES[name].unit if name in QUANTITIES else ""
-
-
-def unit(name: str) -> str:
-    """Return the unit in which a quantity is shown."""
-    return UNITS.get(registry_unit(name), registry_unit(name))
-
-
-def scale(name: str) -> float:
-    """Return by what a value of the registry is multiplied to be shown."""
-    return 100.0 if registry_unit(name) == "1" else 1.0
-
-
-def number(name: str, value: float | None) -> str:
-    """Return a value as it is shown, without its unit; a dash for none."""
-    if value is None or not math.isfinite(value):
-        return "–"
-    # 0.0 added to a negative zero makes it plain.
-    return f"{round(value * scale(name), DIGITS.get(registry_unit(name), 1)) + 0.0:.{digits(name)}f}"
-
-
-def digits(name: str) -> int:
-    """Return the decimals that a quantity is shown with."""
-    return DIGITS.get(registry_unit(name), 1)
-
-
-def shown(name: str, value: float | None) -> str:
-    """Return a value with its unit, such as "19.4 °C"."""
-    text = number(name, value)
-    return text if text == "–" or not unit(name) else f"{text} {unit(name)}"
-
-
-def euro(value: float, *, sign: bool = False) -> str:
-    """Return an amount of money for the whole greenhouse."""
-    if not math.isfinite(value):
-        return "–"
-    decimals = 0 if abs(value) >= 1000.0 else 2
-    mark = "−" if round(value, decimals) < 0 else "+" if sign and round(value, decimals) > 0 else ""
-    return f"{mark}{abs(value):,.{decimals}f} €"
-
-
-def local(time: float, zone: tzinfo, form: str = "%a %d %b %H:%M") -> str:
-    """Return a time, seconds since 1970 UTC, as a clock at the site shows it."""
-    return f"{datetime.fromtimestamp(time, zone):{form}}"
-
-
-def when(time: float, now: float, zone: tzinfo) -> str:
-    """Return a time near `now` as people say it: "07:00", "tomorrow 07:00", "yesterday 22:15", "Fri 20 Mar 07:00"."""
-    moment, today = datetime.fromtimestamp(time, zone), datetime.fromtimestamp(now, zone).date()
-    days = {today: "", today + timedelta(days=1): "tomorrow ", today - timedelta(days=1): "yesterday "}
-    prefix = days.get(moment.date())
-    return f"{moment:%a %d %b %H:%M}" if prefix is None else f"{prefix}{moment:%H:%M}"
-
-
-def lasting(seconds: float) -> str:
-    """Return a length of time, roughly: "40 s", "12 min", "3 h", "2 days"."""
-    for size, word in ((172_800.0, "days"), (5400.0, "h"), (90.0, "min")):
-        if seconds >= size:
-            return f"{seconds / {'days': 86_400.0, 'h': 3600.0, 'min': 60.0}[word]:.0f} {word}"
-    return f"{max(seconds, 0.0):.0f} s"
-
-
-def in_local_time(text: str, now: float, zone: tzinfo) -> str:
-    """Return a line of the daemon with its times, such as "16 Mar 00:00 UTC", as a clock at the site shows them."""
-
-    def said(found: re.Match[str]) -> str:
-        year = datetime.fromtimestamp(now, zone).year
-        try:
-            # The year nearest to now: such a line never speaks of another half year.
-            times = [
-                datetime.strptime(f"{one} {found[1]} +0000", "%Y %d %b %H:%M %z").timestamp()
-                for one in (year - 1, year, year + 1)
-            ]
-        except ValueError:
-            return found[0]
-        return when(min(times, key=lambda time: abs(time - now)), now, zone)
-
-    return _UTC.sub(said, text)
-
-
-def sentence(text: str) -> str:
-    """Return a line of the daemon as a sentence: names as people say them, a capital letter, a full stop."""
-    text = _NAME.sub(lambda found: spoken(found[0]), text.strip())
-    return text and text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
+def _nearest(text: str, now: float) -> float | None:
+    """Return a time of the daemon, such as "16 Mar 00:00 UTC", in seconds since 1970; of the year nearest to now."""
+    if text[4] == "-":
+        years, form = [text], "%Y-%m-%d %H:%M UTC %z"
+    else:
+        # Such a line never speaks of another half year.
+        year, form = datetime.fromtimestamp(now).year, "%Y %d %b %H:%M UTC %z"
+        years = [f"{one} {text}" for one in (year - 1, year, year + 1)]
+    try:
+        times = [datetime.strptime(f"{one} +0000", form).timestamp() for one in years]
+    except ValueError:
+        return None
+    return min(times, key=lambda time: abs(time - now))

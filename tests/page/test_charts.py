@@ -9,6 +9,7 @@ from zoneinfo import ZoneInfo
 import numpy as np
 import pytest
 
+from igrow.core.language import ENGLISH
 from igrow.edge.page.svg import (
     Band,
     Frame,
@@ -23,8 +24,9 @@ from igrow.edge.page.svg import (
     time_ticks,
     value_range,
 )
+from igrow.edge.page.words import Words
 
-AMSTERDAM = ZoneInfo("Europe/Amsterdam")
+AMSTERDAM = Words(ENGLISH, ZoneInfo("Europe/Amsterdam"))
 T0 = 1_773_500_400.0
 FRAME = Frame(T0 - 7200.0, T0 + 7200.0, T0, AMSTERDAM)
 SIZE = Size(500, 200)

@@ -63,7 +63,7 @@ async def test_the_growers_word_reaches_the_plc_and_the_ledger_with_his_name(hou
         with served(Pages(path)) as server:
             browser = Browser(server.port)
             page = await asyncio.to_thread(browser.look)
-            assert "Sunday 01 March 2026, 1" in page
+            assert "Sunday, 1 March 2026, 1" in page
             await asyncio.to_thread(browser.fill, "/sign-in", who="Anna", password=PASSWORD)
             wish = {"do": "override", "setpoint": "heating_setpoint", "value": "16.5", "hours": "48"}
             page = await asyncio.to_thread(lambda: browser.fill("/act", **wish))

@@ -134,7 +134,7 @@ def test_every_state_of_the_page_passes_the_rules_of_accessibility_and_fits_its_
         link_ok=False,
         alarms=[
             alarm("link", "no point of the PLC can be read: check cable, address and power", "critical"),
-            alarm("sensor wind_speed", "wind_speed is frozen: unchanged for 42 min", "warning", 7200.0),
+            alarm("sensor wind_speed", "wind_speed is frozen: exactly 4.1 for 0.7 h", "warning", 7200.0),
             alarm("service planning", "planning failed", "notice"),
         ],
         problems=["the disk is full"],
@@ -187,14 +187,14 @@ def test_the_page_renews_itself_and_leaves_a_form_in_use_alone(visit, house):
     page.clock.install()
     page.reload()
     page.locator("#change-co2_setpoint summary").click()
-    page.get_by_label("CO₂ setpoint, 400 to 1000 ppm").fill("640")
+    page.get_by_label("CO₂ setpoint, 400 to 1,000 ppm").fill("640")
     said = state()
     said["values"]["air_temperature"]["value"] = 23.7
     said["setpoints"]["co2_setpoint"]["shown"] = 555.0
     house.told.said = said
     page.clock.fast_forward(16_000)
     page.get_by_text("23.7").first.wait_for()
-    assert page.get_by_label("CO₂ setpoint, 400 to 1000 ppm").input_value() == "640"
+    assert page.get_by_label("CO₂ setpoint, 400 to 1,000 ppm").input_value() == "640"
     assert not page.locator("#stale").is_visible()
 
 

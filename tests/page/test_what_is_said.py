@@ -11,20 +11,23 @@ from zoneinfo import ZoneInfo
 import numpy as np
 import pytest
 
+from igrow.core.language import ENGLISH
 from igrow.core.site import load_site
 from igrow.edge.configuration import load_configuration
 from igrow.edge.notifications.acknowledged import Acknowledgement
-from igrow.edge.page import money, now, setpoints, words
+from igrow.edge.page import money, now, setpoints
 from igrow.edge.page.history import Course
 from igrow.edge.page.pages import render
 from igrow.edge.page.plan import Block, blocks, limit_words, next_change
 from igrow.edge.page.state import Heard
 from igrow.edge.page.view import Known, as_log, compose
+from igrow.edge.page.words import Words
 from igrow.edge.sources.override import Lease
 from igrow.edge.sources.recipe import Recipe, recipe_course
 from tests.page.page_bench import NOW, alarm, amount, change, clamp, plan, state, write_house
 
 ZONE = ZoneInfo("Europe/Amsterdam")
+SAY = Words(ENGLISH, ZONE)
 
 
 @pytest.fixture
@@ -41,7 +44,7 @@ def site(tmp_path):
     ],
 )  # fmt: skip
 def test_values_are_said_in_the_growers_units(name, value, said):
-    assert words.shown(name, value) == said
+    assert SAY.shown(name, value) == said
 
 
 @pytest.mark.parametrize(
@@ -49,7 +52,7 @@ def test_values_are_said_in_the_growers_units(name, value, said):
     [(1.234, "+1.23 €"), (-1.239, "−1.24 €"), (0.001, "0.00 €"), (12345.6, "+12,346 €"), (float("nan"), "–")],
 )
 def test_money_is_said_for_the_whole_greenhouse(amount, said):
-    assert words.euro(amount, sign=True) == said
+    assert SAY.euro(amount, sign=True) == said
 
 
 @pytest.mark.parametrize(
@@ -58,18 +61,18 @@ def test_money_is_said_for_the_whole_greenhouse(amount, said):
      (5 * 86_400.0, "Thu 19 Mar 16:00")],
 )  # fmt: skip
 def test_times_are_said_as_people_do(away, said):
-    assert words.when(NOW + away, NOW, ZONE) == said
+    assert SAY.when(NOW + away, NOW) == said
 
 
 def test_the_daemons_times_become_those_of_the_site():
-    assert words.in_local_time("the plan of 14 Mar 15:00 UTC", NOW, ZONE) == "the plan of 16:00"
-    assert words.in_local_time("until 31 Dec 23:30 UTC", 1_767_225_000.0, ZONE) == "until 00:30"
-    assert words.in_local_time("99 Foo 25:00 UTC", NOW, ZONE) == "99 Foo 25:00 UTC"
+    assert SAY.told("the plan of 14 Mar 15:00 UTC", NOW) == "the plan of 16:00"
+    assert SAY.told("until 31 Dec 23:30 UTC", 1_767_225_000.0) == "until 00:30"
+    assert SAY.told("99 Foo 25:00 UTC", NOW) == "99 Foo 25:00 UTC"
 
 
 def test_names_of_points_are_said_as_words():
-    assert words.sentence("air_co2 is frozen") == "Air CO₂ is frozen."
-    assert words.title("co2_setpoint") == "CO₂ setpoint"
+    assert SAY.sentence("air_co2 is frozen", NOW) == "CO₂ is frozen."
+    assert SAY.title("co2_setpoint") == "CO₂ setpoint"
 
 
 @pytest.mark.parametrize(
@@ -89,12 +92,12 @@ def test_names_of_points_are_said_as_words():
     ],
 )
 def test_the_headline_is_the_worst_that_is(heard, tone, said):
-    headline = now.headline(heard)
+    headline = now.headline(heard, SAY, NOW)
     assert (headline.tone, headline.text) == (tone, said)
 
 
 def test_old_values_are_not_called_well(site):
-    assert {card.tone for card in now.cards(state(), site, old=True)} == {"warn"}
+    assert {card.tone for card in now.cards(state(), site, SAY, NOW, old=True)} == {"warn"}
 
 
 @pytest.mark.parametrize(
@@ -109,18 +112,18 @@ def test_old_values_are_not_called_well(site):
 )  # fmt: skip
 def test_what_is_measured_is_judged_in_words_and_marks(site, name, value, tone, mark):
     measured = {"value": value, "quality": "good", "age": 1.0, "why": ""}
-    found, said = now.judge(name, measured, state(), site)
+    found, said = now.judge(name, measured, state(), site, SAY, NOW)
     assert (found, said[:1]) == (tone, mark)
 
 
 def test_a_value_that_is_not_good_says_why(site):
     value = {"value": 4.1, "quality": "out_of_range", "age": 1.0, "why": "above 60"}
-    assert now.judge("air_temperature", value, state(), site) == ("warn", "! out of range: above 60")
+    assert now.judge("air_temperature", value, state(), site, SAY, NOW) == ("warn", "! out of range: above 60")
 
 
 def test_alarms_stand_in_the_order_of_what_they_ask_and_say_who_knows():
     said = state(alarms=[alarm("a", "x", "notice"), alarm("b", "y", "critical"), alarm("c", "z", "warning")])
-    found = now.alarms(said, {"b": Acknowledgement("Anna", NOW - 60.0)}, NOW, ZONE)
+    found = now.alarms(said, {"b": Acknowledgement("Anna", NOW - 60.0)}, NOW, SAY)
     assert [one.level for one in found] == ["critical", "warning", "notice"]
     assert found[0].known == "known to Anna since 15:59"
 
@@ -134,44 +137,44 @@ def test_routine_ramps_are_apart_from_what_matters():
         clamp("heating_setpoint", 31.0, 27.0, "above the limit of 28; slew of 4 per hour on the way to 28"),
         clamp("co2_setpoint", 900.0, 400.0, "interlock wind: too much"),
     ]
-    matters, routine = now.held_back(clamps, NOW, ZONE)
+    matters, routine = now.held_back(clamps, NOW, SAY)
     assert (len(matters), len(routine)) == (3, 3)
 
 
 def test_a_setpoint_says_who_has_taken_it_and_until_when(site):
     leases = {"heating_setpoint": Lease(18.0, 7200.0, NOW + 3600.0, by="Anna (page)")}
-    found = {one.name: one for one in setpoints.setpoints(state(), leases, site, NOW, ZONE)}
+    found = {one.name: one for one in setpoints.setpoints(state(), leases, site, NOW, SAY)}
     assert found["heating_setpoint"].lease == "until 17:00, by Anna (page)"
     assert found["co2_setpoint"].wanted == "on its way to 900 ppm"
     assert found["lamp_on"].next == "0 % from 17:00"
     over = {"heating_setpoint": Lease(18.0, 7200.0, NOW - 1.0)}
-    assert setpoints.setpoints(state(), over, site, NOW, ZONE)[0].lease == ""
+    assert setpoints.setpoints(state(), over, site, NOW, SAY)[0].lease == ""
 
 
 def test_a_plan_that_waits_for_its_log_is_no_problem_and_is_told():
     said = state(problems=["the first plan needs a day of log: 4 h more", "the disk is full"])
-    assert now.problems(said) == ["The disk is full."]
-    assert now.waiting(said) == "The first plan needs a day of log: 4 h more."
-    assert now.waiting(state()) == ""
+    assert now.problems(said, SAY, NOW) == ["The disk is full."]
+    assert now.waiting(said, SAY, NOW) == "The first plan needs a day of log: 4 h more."
+    assert now.waiting(state(), SAY, NOW) == ""
 
 
 def test_a_setpoint_that_a_hand_at_the_plc_has_set_says_so(site):
     said = state()
     said["setpoints"]["lamp_on"]["held_until"] = said["monotonic"] + 5400.0
-    found = {one.name: one for one in setpoints.setpoints(said, {}, site, NOW, ZONE)}
+    found = {one.name: one for one in setpoints.setpoints(said, {}, site, NOW, SAY)}
     assert (found["lamp_on"].decider, found["lamp_on"].why) == ("A hand at the PLC", "respected for 2 h more")
 
 
 def test_what_the_plan_asks_for_next():
-    assert next_change(plan(), "heating_setpoint", NOW, ZONE) == "19.0 °C from 17:00"
-    assert next_change(None, "heating_setpoint", NOW, ZONE) == ""
-    assert next_change(plan(), "heating_setpoint", NOW + 1e6, ZONE) == ""
+    assert next_change(plan(), "heating_setpoint", NOW, SAY) == "19.0 °C from 17:00"
+    assert next_change(None, "heating_setpoint", NOW, SAY) == ""
+    assert next_change(plan(), "heating_setpoint", NOW + 1e6, SAY) == ""
 
 
 def explained(site, made=None) -> list[Block]:
     made = made or plan()
     recipe = recipe_course(Recipe(), ZONE, made["start"], made["step_seconds"], 24)
-    return blocks(made, recipe, site.greenhouse.floor_area, site.crop.agronomy)
+    return blocks(made, recipe, site.greenhouse.floor_area, site.crop.agronomy, SAY)
 
 
 def test_each_hour_of_each_setpoint_is_in_one_block_with_a_sentence(site):
@@ -209,11 +212,11 @@ def test_a_plan_without_an_explanation_is_told_all_the_same(site):
      "dark_hours", "light_sum_high", "co2_with_people", "rest"],
 )  # fmt: skip
 def test_every_limit_of_the_crop_has_its_words(site, limit):
-    assert limit_words(limit, site.crop.agronomy) != limit.replace("_", " ") or limit == "rest"
+    assert limit_words(limit, site.crop.agronomy, SAY) != limit.replace("_", " ") or limit == "rest"
 
 
 def test_the_gain_is_said_with_its_doubt_and_the_rows_add_up(site):
-    found = money.expected(plan(), 1000.0)
+    found = money.expected(plan(), 1000.0, SAY)
     assert found is not None
     assert found.gain == "The plan is expected to bring 38.00 € more than your recipe, between +30.16 € and +45.84 €."
     rows = {title: ours for title, ours, *_ in found.rows}
@@ -224,7 +227,7 @@ def test_the_gain_is_said_with_its_doubt_and_the_rows_add_up(site):
 
 
 def gain_of(plan: dict) -> str:
-    found = money.expected(plan, 100.0)
+    found = money.expected(plan, 100.0, SAY)
     assert found is not None
     return found.gain
 
@@ -235,7 +238,7 @@ def test_a_plan_that_loses_or_changes_nothing_is_not_called_a_gain():
     assert gain_of(worse) == "The plan is expected to bring 1.00 € less than your recipe."
     worse["explanation"] = worse["explanation"] | {"gain": amount(0.0)}
     assert gain_of(worse) == "The plan and your recipe are expected to bring the same."
-    assert money.expected(plan(explanation=None), 100.0) is None
+    assert money.expected(plan(explanation=None), 100.0, SAY) is None
 
 
 def test_what_today_has_cost_is_told_from_the_actuators(site):

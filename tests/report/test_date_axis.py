@@ -7,8 +7,8 @@ import warnings
 import numpy as np
 import pytest
 
+from igrow.core.language import ENGLISH
 from igrow.trainer.figure_style import date_axis, panels, svg
-from igrow.trainer.language import ENGLISH
 
 
 @pytest.mark.parametrize(

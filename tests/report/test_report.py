@@ -13,13 +13,13 @@ import pytest
 
 from igrow.core.effects import EFFECTS
 from igrow.core.errors import IgrowError
+from igrow.core.language import LANGUAGES, speak
+from igrow.core.language.units import written
 from igrow.core.quantities import QUANTITIES
 from igrow.trainer.data import Log
 from igrow.trainer.diagnosis import Diagnosis
 from igrow.trainer.diagnosis.persistence import misfits, persistence_errors
 from igrow.trainer.diagnosis.result import Interval
-from igrow.trainer.language import LANGUAGES, speak
-from igrow.trainer.language.units import written
 from igrow.trainer.report import render_report, sentences, write_diagnosis
 from igrow.trainer.report.page import error_rows
 from igrow.trainer.report.worth import Worth, worth

@@ -14,6 +14,7 @@ import numpy as np
 from igrow.core.bundle import Bundle, default_bundle_folder, read_bundle
 from igrow.core.greenhouse import HiddenEffect
 from igrow.core.greenhouse.described import parse_effect
+from igrow.core.language import LANGUAGES
 from igrow.trainer.cli.log_arguments import add_log_arguments, log_of
 from igrow.trainer.cli.progress import progress
 from igrow.trainer.data.log import LEAST_DAYS, Log
@@ -23,7 +24,6 @@ from igrow.trainer.diagnosis.knowledge import ActiveTerm
 from igrow.trainer.exporting import export, read_model
 from igrow.trainer.fit import FittedModel
 from igrow.trainer.fit.scoring import calibrated_until
-from igrow.trainer.language import LANGUAGES
 from igrow.trainer.report import write_diagnosis
 
 EXAMPLE = "igrow-trainer diagnose logs/ --bundle bundle/ --site site.yaml --out diagnosis/"

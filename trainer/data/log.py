@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from igrow.core.errors import IgrowError
+from igrow.core.language import speak
 from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
@@ -18,7 +19,6 @@ from igrow.trainer.data.fault import DataFault
 from igrow.trainer.data.record import grid_record
 from igrow.trainer.data.screening import NEEDED, Screened
 from igrow.trainer.data.source import DailyTable
-from igrow.trainer.language import speak
 
 LEAST_DAYS = 7
 """Days that a log must span for anything to be fitted to it."""

@@ -10,9 +10,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from igrow.core.errors import IgrowError
+from igrow.core.language import ENGLISH, Language
 from igrow.core.quantities import QUANTITIES
 from igrow.trainer.figure_style import COLOURS, WIDTH, date_axis, few_ticks, local, name_above, panels, thinned
-from igrow.trainer.language import ENGLISH, Language
 
 if TYPE_CHECKING:
     from igrow.trainer.data.log import Log

@@ -13,6 +13,7 @@ import numpy as np
 
 from igrow.core.effects import EFFECTS
 from igrow.core.errors import IgrowError
+from igrow.core.language import N_
 from igrow.trainer.data.log import Log
 from igrow.trainer.data.splits import split_days
 from igrow.trainer.diagnosis import freerun, history, sensitivity, wording
@@ -30,7 +31,6 @@ from igrow.trainer.diagnosis.rounds import search_of
 from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.model import FittedModel
-from igrow.trainer.language.names import N_
 
 Report = Callable[[str], None]
 NOT_CALIBRATED = N_(

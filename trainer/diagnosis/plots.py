@@ -9,11 +9,11 @@ from matplotlib.figure import Figure
 
 from igrow.core.arrays import Floats, Mask
 from igrow.core.errors import IgrowError
+from igrow.core.language import ENGLISH, Language
 from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator.hybrid.measurement import PREDICTED
 from igrow.trainer.diagnosis.evidence import Evidence
 from igrow.trainer.figure_style import COLOURS, STROKES, date_axis, few_ticks, legend, local, name_above, panels
-from igrow.trainer.language import ENGLISH, Language
 
 _BINS = 12
 """Of a driver, each with as many samples."""

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from igrow.core.language import Language, speak
 from igrow.core.quantities import QUANTITIES
 from igrow.trainer.data.screening import Screened
 from igrow.trainer.diagnosis.persistence import misfits
-from igrow.trainer.language import Language, speak
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

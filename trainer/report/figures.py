@@ -11,11 +11,11 @@ from matplotlib.figure import Figure
 
 from igrow.core.effects import EFFECTS
 from igrow.core.errors import IgrowError
+from igrow.core.language import Language
 from igrow.trainer.data.plot import plot_log
 from igrow.trainer.diagnosis import plots
 from igrow.trainer.diagnosis.result import Diagnosis, Finding
 from igrow.trainer.figure_style import WIDTH, svg
-from igrow.trainer.language import Language
 
 OVERVIEW = ("air_temperature", "air_humidity", "air_co2", "outdoor_temperature", "global_radiation")
 """What the overview of a log shows."""

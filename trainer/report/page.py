@@ -12,10 +12,10 @@ from jinja2 import Environment, PackageLoader, select_autoescape
 
 from igrow.core.effects import EFFECTS
 from igrow.core.errors import IgrowError
+from igrow.core.language import Language, speak
 from igrow.core.quantities import QUANTITIES
 from igrow.trainer.diagnosis.result import STAGES, Diagnosis, Finding
 from igrow.trainer.figure_style import COLOURS, DARK
-from igrow.trainer.language import Language, speak
 from igrow.trainer.report import figures, sentences
 from igrow.trainer.report.worth import worth
 
@@ -76,13 +76,13 @@ def priced(result: Diagnosis) -> dict[str, Any]:
 
 
 def render_report(result: Diagnosis, language: str = "en") -> str:
-    """Return the page's HTML in a language (`igrow.trainer.language.LANGUAGES`), by the greenhouse's clock.
+    """Return the page's HTML in a language (`igrow.core.language.LANGUAGES`), by the greenhouse's clock.
 
     Raises:
         IgrowError: the language is not known.
     """
     site = result.model.site if result.log is None else result.log.known_site
-    spoken = speak(language, site.time_zone)
+    spoken = speak(language, site.time_zone, site.units)
     environment = Environment(
         loader=PackageLoader("igrow.trainer.report"),
         autoescape=select_autoescape(),

@@ -6,16 +6,14 @@ import re
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from babel.dates import get_day_names
 
 from igrow.core.effects import EFFECTS
+from igrow.core.language import N_, Language
 from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator.hybrid.measurement import PREDICTED
 from igrow.trainer.data.fault import DataFault
 from igrow.trainer.diagnosis.persistence import misfits
 from igrow.trainer.diagnosis.result import DISCREPANCY, WORSE, Diagnosis, Finding
-from igrow.trainer.language import Language
-from igrow.trainer.language.names import N_
 from igrow.trainer.report.worth import Worth
 
 _VERDICTS: Mapping[str, str] = {
@@ -119,7 +117,7 @@ def _course(course: str, language: Language) -> str:
     if found is None:
         day = course.removeprefix("on ").removesuffix("s")
         if day in _WEEKDAYS:
-            name = get_day_names("wide", locale=language.locale)[_WEEKDAYS.index(day)]
+            name = language.locale.weekdays[_WEEKDAYS.index(day)]
             return language.text("on {weekday}", weekday=name)
         return language.text(_WHEN[course]) if course in _WHEN else course
     hours = language.text("{first} to {last} h", first=found["first"], last=found["last"])

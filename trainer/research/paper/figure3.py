@@ -87,8 +87,8 @@ def run(folder: Path, books: Path, out: Path, report: Callable[[str], None] = pr
 
 def plot(path: Path, measured: Champion, curves: dict[str, Floats]) -> None:
     """Draw measured and predicted net profit over the season, and below how their distance adds up from day to day."""
+    from igrow.core.language import ENGLISH  # noqa: PLC0415
     from igrow.trainer.figure_style import COLOURS, date_axis, name_above, panels  # noqa: PLC0415, only this draws
-    from igrow.trainer.language import ENGLISH  # noqa: PLC0415
 
     figure, (profit, distance) = panels(2, 6.4, width=6.0)
     profit.plot(measured.day, measured.measured, color=COLOURS["measured"], linewidth=2.2, label="measured")

@@ -74,6 +74,10 @@ NAMES: Mapping[str, str] = {
     "spike": N_("spike"),
     "stuck": N_("stuck"),
     "outage": N_("outage"),
+    # the usual alarms of the climate
+    "too_cold": N_("too cold"),
+    "too_hot": N_("too hot"),
+    "too_damp": N_("too damp"),
     # regimes
     "day": N_("day"),
     "night": N_("night"),

@@ -1,0 +1,117 @@
+"""One language: what it makes of a text, a number, a date, a unit, a line of the daemon."""
+
+from __future__ import annotations
+
+import gettext
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from datetime import datetime
+from functools import cache
+from importlib import resources
+from zoneinfo import ZoneInfo
+
+import numpy as np
+
+from igrow.core.errors import IgrowError
+from igrow.core.language import sentences
+from igrow.core.language.locales import Locale, locale_of
+from igrow.core.language.names import NAMES
+from igrow.core.language.units import US, Shown, Units, written
+
+LANGUAGES = ("en", "nl", "de", "es", "zh")
+"""Codes of the languages; texts are written in the first."""
+
+
+@dataclass(frozen=True)
+class Language:
+    """A language, the place whose clock people read, and the units that they use."""
+
+    code: str
+    translations: gettext.NullTranslations = field(repr=False)
+    time_zone: str = "UTC"
+    units: Units = "metric"
+
+    @property
+    def locale(self) -> Locale:
+        """How numbers and dates are written."""
+        return locale_of(self.code)
+
+    def text(self, message: str, **values: object) -> str:
+        """Return a text in this language, `values` put in for what stands in braces."""
+        told = self.translations.gettext(message) if message else ""
+        return told.format(**values) if values else told
+
+    def told(self, line: str, value: Callable[[str], str] = str) -> str:
+        """Return a line that was made of a known text and values, such as the daemon's, in this language.
+
+        `value` says what becomes of a part that is no text of ours: a name, a number, words from elsewhere.
+        """
+        return sentences.told(line, self.translations.gettext, value)
+
+    def name(self, word: str) -> str:
+        """Return what people call a quantity, parameter, balance or reason of the program."""
+        known = NAMES.get(word)
+        return word.replace("_", " ") if known is None else self.text(known)
+
+    def number(self, value: float, digits: int = 2) -> str:
+        """Return a number with so many significant digits."""
+        if not np.isfinite(value):
+            return "–"
+        plain = f"{float(f'{value:.{digits}g}'):,.10f}"
+        return self.locale.number(plain.rstrip("0").rstrip("."))
+
+    def fixed(self, value: float, decimals: int) -> str:
+        """Return a number with so many decimals; a negative zero is none."""
+        return self.locale.number(f"{round(value, decimals) + 0.0:,.{decimals}f}") if np.isfinite(value) else "–"
+
+    def shown(self, unit: str) -> Shown:
+        """Return how a quantity in a unit of the registry is shown: its unit as people write it, and the way there."""
+        known = US.get(unit) if self.units == "us" else None
+        return known or Shown(written(unit))
+
+    def unit(self, unit: str) -> str:
+        """Return a unit of the registry as people write it."""
+        return self.text(self.shown(unit).unit)
+
+    def amount(self, value: float, unit: str, digits: int = 2) -> str:
+        """Return a number with its unit."""
+        shown = self.shown(unit)
+        return f"{self.number(shown.of(value), digits)} {shown.unit}".strip()
+
+    def day(self, time: np.datetime64) -> str:
+        """Return the local day of an instant, with its year."""
+        return self.locale.date(self._local(time), "day")
+
+    def short_day(self, time: np.datetime64) -> str:
+        """Return the local day of an instant as an axis shows it."""
+        return self.locale.date(self._local(time), "short_day")
+
+    def moment(self, time: np.datetime64) -> str:
+        """Return the local day and time of an instant."""
+        return self.locale.date(self._local(time), "moment")
+
+    def listed(self, words: list[str]) -> str:
+        """Return words one after the other."""
+        return ("、" if self.code == "zh" else ", ").join(words)
+
+    def _local(self, time: np.datetime64) -> datetime:
+        seconds = int(time.astype("datetime64[s]").astype(np.int64))
+        return datetime.fromtimestamp(seconds, ZoneInfo(self.time_zone))
+
+
+def speak(code: str, time_zone: str = "UTC", units: Units = "metric") -> Language:
+    """Return a language; raises IgrowError with those that there are."""
+    if code not in LANGUAGES:
+        raise IgrowError(f"language {code!r} is not known: one of {', '.join(LANGUAGES)} is needed")
+    return Language(code, _translations(code), time_zone, units)
+
+
+@cache
+def _translations(code: str) -> gettext.NullTranslations:
+    if code == LANGUAGES[0]:
+        return gettext.NullTranslations()
+    with resources.files(__package__).joinpath(f"{code}.mo").open("rb") as file:
+        return gettext.GNUTranslations(file)
+
+
+ENGLISH = speak("en")
