@@ -79,6 +79,9 @@ class Memory:
 
     start: Callable[[Any, Drivers, Values], Array]
     advance: Callable[[Any, Array, Drivers, Values, float], Array]
+    within_step: bool = False
+    """Its drivers are actuators, whose means over the step are given: it acts as it is in the step's middle. A memory
+    of states, which are given at the step's beginning, acts as it is then."""
 
 
 @dataclass(frozen=True)
@@ -132,13 +135,16 @@ class Effect:
         return {parameter.name: parameter.typical for parameter in self.parameters} | given
 
 
-def lagged(driver: Callable[[Any, Drivers], Array], time_constant: str, unit_seconds: float) -> Memory:
+def lagged(
+    driver: Callable[[Any, Drivers], Array], time_constant: str, unit_seconds: float, *, within_step: bool = False
+) -> Memory:
     """Return the memory of a first-order lag.
 
     Args:
         driver: what is lagged, a function of (xp, drivers).
         time_constant: name of the parameter with the time constant.
         unit_seconds: seconds in one unit of that parameter.
+        within_step: see `Memory`.
     """
 
     def start(xp: Any, drivers: Drivers, _parameters: Values) -> Array:
@@ -148,7 +154,7 @@ def lagged(driver: Callable[[Any, Drivers], Array], time_constant: str, unit_sec
         decay = decay_factor(xp, parameters[time_constant], seconds / unit_seconds)
         return driver(xp, drivers) + (memory - driver(xp, drivers)) * decay
 
-    return Memory(start, advance)
+    return Memory(start, advance, within_step)
 
 
 def decay_factor(xp: Any, time_constant: Array, elapsed: float) -> Array:

@@ -192,13 +192,13 @@ def _flux_batch(line: Linearisation, fluxes: Sequence[tuple[Mapping[str, Array],
 
 
 def run_memory(effect: Effect, values: Mapping[str, float], drivers: Mapping[str, Array], step: float) -> Floats:
-    """Return the memory of an effect in the middle of every step along the drivers, (n,)."""
+    """Return the memory of an effect as it acts in every step along the drivers, (n,)."""
     memory = effect.memory
     assert memory is not None
     count = max(np.size(drivers[name]) for name in effect.drivers)
     columns = [np.broadcast_to(drivers[name], (count,)).tolist() for name in effect.drivers]
     substeps = max(1, round(step / SUBSTEP))
-    course = np.empty(count)
+    course, part = np.empty(count), step / substeps
     names = effect.drivers
     now = dict(zip(names, (column[0] for column in columns), strict=True))
     value = float(memory.start(_Scalars, now, values))
@@ -206,8 +206,9 @@ def run_memory(effect: Effect, values: Mapping[str, float], drivers: Mapping[str
         now = dict(zip(names, cells, strict=True))
         total = 0.0
         for _ in range(substeps):
-            total += memory.advance(_Scalars, value, now, values, 0.5 * step / substeps)
-            value = memory.advance(_Scalars, value, now, values, step / substeps)
+            acts = memory.advance(_Scalars, value, now, values, 0.5 * part) if memory.within_step else value
+            total += acts
+            value = memory.advance(_Scalars, value, now, values, part)
         course[k] = total / substeps
     return course
 

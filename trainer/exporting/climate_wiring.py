@@ -79,14 +79,14 @@ class ClimateWiring:
     def effects(self, drivers: Tensors, state: Tensors, seconds: str) -> tuple[dict[str, str], dict[str, str]]:
         """Return what the active effects add, as ``added:channel``, and their memories after a step.
 
-        A memory counts as it is in the middle of the step.
+        A memory of what actuators do counts as it is in the middle of the step.
         """
         added: dict[str, list[str]] = {}
         memories: dict[str, str] = {}
         for one in self.blocks.effects:
             tensors = self._effect_tensors(one, drivers, state)
             if one.effect.kind == "process":
-                if one.memory:
+                if one.memory and one.effect.memory is not None and one.effect.memory.within_step:
                     (half,) = self.wiring.add("Mul", [seconds, self.wiring.constant("half", [0.5])])
                     tensors |= self.wiring.call(one.memory, tensors | {"seconds": half})
                 for channel, tensor in self.wiring.call(one.contribution, tensors).items():

@@ -30,5 +30,5 @@ EFFECT = Effect(
     title="irrigation water that evaporates from the floor",
     sentence="irrigation water evaporates from the floor: {value} of it",
     source="mass balance of wet surfaces",
-    memory=lagged(lambda _xp, drivers: drivers["irrigation"], "time_constant", 60.0),
+    memory=lagged(lambda _xp, drivers: drivers["irrigation"], "time_constant", 60.0, within_step=True),
 )

@@ -43,5 +43,5 @@ EFFECT = Effect(
     title="vents that answer late when they turn back",
     sentence="the vents answer late when they turn back (share {value})",
     source="general practice: play of rack-and-pinion vent drives",
-    memory=Memory(_start, _advance),
+    memory=Memory(_start, _advance, within_step=True),
 )

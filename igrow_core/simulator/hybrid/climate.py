@@ -156,8 +156,8 @@ def derive(xp: Any, state: Values, inputs: Drivers, parameters: Values, lamp_eff
 def contributions(xp: Any, drivers: Drivers, state: Values, effects: ActiveEffects, seconds: float) -> dict[str, Array]:
     """Return the sum over the active process effects of what they add to each channel they enter, within a step.
 
-    A memory counts as it is in the middle of the step: pulses of irrigation or moves of a vent within it are felt
-    within it, and not a step later.
+    A memory of what actuators do counts as it is in the middle of the step: pulses of irrigation or moves of a vent
+    within it are felt within it, and not a step later.
     """
     total: dict[str, Array] = {}
     for name, values in effects.items():
@@ -165,7 +165,9 @@ def contributions(xp: Any, drivers: Drivers, state: Values, effects: ActiveEffec
         if effect.kind == "process":
             memory = None
             if effect.memory is not None:
-                memory = effect.memory.advance(xp, state[memory_name(name)], drivers, values, 0.5 * seconds)
+                memory = state[memory_name(name)]
+                if effect.memory.within_step:
+                    memory = effect.memory.advance(xp, memory, drivers, values, 0.5 * seconds)
             for channel, flux in effect.contribution(xp, drivers, values, memory).items():
                 total[channel] = total[channel] + flux if channel in total else flux
     return total
