@@ -9,15 +9,16 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from igrow.core.greenhouse import GreenhouseParameters, generate_weather, recipe, simulate_many
 from igrow.core.site import Greenhouse, Lamps, Site
 from igrow.trainer.data import Log, prepare_log
-from igrow.trainer.fit import FittedModel, calibrate, evaluate
-from igrow.trainer.fit.population import learn_population, learned_of
+from igrow.trainer.diagnosis import learned_from
+from igrow.trainer.fit import calibrate, evaluate
+from igrow.trainer.fit.population import Population, learn_population
 
 START = np.datetime64("2020-02-10T00:00:00")
 BUILDER, OWN = 0.2, 0.06
@@ -50,10 +51,10 @@ def site_of(plant: GreenhouseParameters) -> Site:
     return Site(name="new", latitude=plant.latitude, longitude=plant.longitude, greenhouse=described)
 
 
-def judge(log: Log, days: int, prior: FittedModel) -> dict[str, float]:
+def judge(log: Log, days: int, population: Population | None) -> dict[str, float]:
     """Calibrate on the first days of a log; returns the errors a day ahead on its last two weeks."""
     end = START + np.timedelta64(days, "D")
-    model = calibrate(log.select(None, end), prior_model=prior)
+    model = calibrate(log.select(None, end), population=population)
     later = log.select(log.telemetry.time[-1] - np.timedelta64(JUDGED_DAYS, "D")).record(model.alignment or 0.0)
     errors = evaluate(later, model.posterior.values, {}, ("24_h",))
     return {name: errors[name]["24_h"].mae for name in QUANTITIES}
@@ -69,12 +70,10 @@ def main() -> None:
     builder = GreenhouseParameters().varied(rng, BUILDER)
     plants = [builder.varied(rng, OWN) for _ in range(options.shared + options.new)]
     shared = simulate(plants[: options.shared], SHARED_DAYS, options.seed + 1)
-    population = learn_population([learned_of(one.known_site, calibrate(one).posterior) for one in shared])
+    population = learn_population([learned_from(calibrate(one)) for one in shared])
     found = []
     for log in simulate(plants[options.shared :], max(FIRST_DAYS) + JUDGED_DAYS, options.seed + 2):
-        described = FittedModel.described(log.known_site)
-        prior = replace(described, posterior=population.prior(log.known_site))
-        found += [Error(days, judge(log, days, described), judge(log, days, prior)) for days in FIRST_DAYS]
+        found += [Error(days, judge(log, days, None), judge(log, days, population)) for days in FIRST_DAYS]
     print(f"{options.new} new greenhouses, {options.shared} that shared; error a day ahead, median (better in)")
     print(f"{'days of log':>12}" + "".join(f"{name:>34}" for name in QUANTITIES))
     for days in FIRST_DAYS:

@@ -110,6 +110,33 @@ RESULTS = {
         "0 and on",
         long=True,
     ),
+    "fleet": Result(
+        "What a fleet costs",
+        ("benchmarks.fleet",),
+        "A day of each of a thousand sites collected, a year of history behind one, and a weekly diagnosis.",
+        "0 to 19; of the diagnosed log 1",
+        long=True,
+    ),
+    "fleet-cluster": Result(
+        "A local Ray of two workers, one of which is killed, beside two processes",
+        ("benchmarks.cluster",),
+        "The day of each of 50 sites collected; no cluster beyond one machine was measured.",
+        "0 to 49",
+    ),
+    "fleet-population": Result(
+        "What a new greenhouse gains by the parameters that others have shared",
+        ("benchmarks.population",),
+        "Errors a day ahead of a model of its first 8 or 14 days, on the two weeks that follow.",
+        "44000 to 44002",
+        long=True,
+    ),
+    "fleet-changes": Result(
+        "What it gains by their discrepancy, and by how they change",
+        ("benchmarks.shared_changes",),
+        "Later logs with nothing missing, and with a cause hidden; by what came with the trainer, and what was shared.",
+        "45000 to 45004",
+        long=True,
+    ),
     "diagnosis-same": Result(
         "The same greenhouse later",
         ("benchmarks.diagnosis", "same", "--greenhouses", "3", "--cases", "90"),

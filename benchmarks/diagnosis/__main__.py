@@ -15,16 +15,15 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, replace
 from pathlib import Path
 
 from benchmarks.diagnosis import drift, matched, nuisance, real, rules, same
-from benchmarks.diagnosis.cases import SEASONS, Case, draw
+from benchmarks.diagnosis.cases import SEASONS, draw
 from benchmarks.diagnosis.greenhouses import of_seasons, others
-from benchmarks.diagnosis.logs import Reference, built_in, reference, simulate_cases
-from benchmarks.diagnosis.scoring import Outcome, judge, show, table
-from igrow.core.telemetry import Telemetry
+from benchmarks.diagnosis.logs import built_in, reference, simulated_cases
+from benchmarks.diagnosis.scoring import Outcome, judged, show, table
+from benchmarks.jobs import Jobs
 
 WHAT = (
     "scoring",
@@ -41,10 +40,6 @@ WHAT = (
 )
 OTHER_GREENHOUSES = 8
 SEASONS_USED = ("winter", "spring")
-
-
-def _judge(job: tuple[Case, Telemetry, Reference]) -> Outcome:
-    return judge(*job)
 
 
 def main() -> int:
@@ -88,34 +83,29 @@ def main() -> int:
         others(OTHER_GREENHOUSES) if away else {name: seasons[name] for name in options.season or SEASONS_USED}
     )
     outcomes: list[Outcome] = []
-    with ProcessPoolExecutor(options.processes) as pool:
+    with Jobs(f"diagnosis {options.what}", options.processes) as jobs:
         print(f"calibrating on the reference logs of {', '.join(greenhouses)}", file=sys.stderr)
         references = {}
-        for name, one in zip(greenhouses, pool.map(reference, greenhouses.values()), strict=True):
+        for name, one in zip(greenhouses, jobs.each(reference, greenhouses.values()), strict=True):
             references[name] = one
             print(f"{len(references)} of {len(greenhouses)}: {name}", file=sys.stderr)
         units = {name: one.unit for name, one in references.items()}
         cases = draw("scoring" if away else options.what, count, units, options.seed)
         own = {name: [case for case in cases if case.greenhouse == name] for name in greenhouses}
         print(f"simulating {len(cases)} logs", file=sys.stderr)
-        simulated = pool.map(
-            simulate_cases,
-            references.values(),
-            own.values(),
-            [options.days] * len(greenhouses),
-        )
+        simulated = jobs.each(simulated_cases, [(one, own[name], options.days) for name, one in references.items()])
         if options.what == "transferred":
             references = {name: replace(one, model=built_in(one.greenhouse.site)) for name, one in references.items()}
-        jobs = [
+        wanted = [
             (case, log, references[name])
             for name, logs in zip(greenhouses, simulated, strict=True)
             for case, log in zip(own[name], logs, strict=True)
         ]
-        for number, outcome in enumerate(pool.map(_judge, jobs), 1):
+        for number, outcome in enumerate(jobs.each(judged, wanted), 1):
             outcomes.append(outcome)
             case = outcome.case
             said = f"{case.name}: {case.causes} -> {outcome.verdict} {outcome.found}"
-            print(f"{number} of {len(jobs)}: {said}", file=sys.stderr)
+            print(f"{number} of {len(wanted)}: {said}", file=sys.stderr)
     if options.json:
         options.json.write_text("".join(json.dumps(asdict(one)) + "\n" for one in outcomes), encoding="utf-8")
     print(f"{len(outcomes)} cases, {options.days} days, {options.what}")

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
@@ -19,16 +18,16 @@ import numpy as np
 from benchmarks.diagnosis.cases import Case
 from benchmarks.diagnosis.logs import Reference
 from benchmarks.diagnosis.nurseries import calibrated, calibration_logs, later_logs, nursery
+from benchmarks.jobs import Jobs
 from benchmarks.provenance import provenance
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import prepare_log
-from igrow.trainer.diagnosis import change, drift, history, linear, search
+from igrow.trainer.diagnosis import change, drift, history, linear, search, sharing
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.diagnose import log_days
 from igrow.trainer.diagnosis.drift import Drift, Pair
 from igrow.trainer.diagnosis.rounds import laid_out
 from igrow.trainer.diagnosis.rules import DEFAULT
-from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
 
 COMMAND = "python -m benchmarks.diagnosis drift"
@@ -78,23 +77,12 @@ def null_log(job: tuple[Reference, Case, Telemetry]) -> NullLog:
     design = history.expected(known, plain, history.expected_misfit(known, plain))
     # What the search needs is in the products; the columns themselves would fill the memory.
     light = replace(design, values=design.values[:, :0], grams=_single(design))
-    return NullLog(
-        reference.greenhouse.site.name.split("-")[0], site.name, case.group, light, _pair(known, plain, light)
-    )
+    pair = sharing.pair(known, plain, light, BETWEEN)
+    return NullLog(reference.greenhouse.site.name.split("-")[0], site.name, case.group, light, pair)
 
 
 def _single(design: Design) -> linear.DailyGrams:
     return linear.DailyGrams(design.grams.products.astype(np.float32), design.grams.fit)
-
-
-def _pair(known: Discrepancy, plain: Design, design: Design) -> Pair:
-    none = Drift({}, BETWEEN)
-    columns = [column for name in ("parameter", "effect", "pattern") for column in design.block(name).columns]
-    total = design.grams.of(columns, ())[design.grams.fit].sum(axis=0, dtype=np.float64)
-    unit = history.units(plain)
-    change_, within = history.change_of(known, plain, none), history.drift_within(plain)
-    covariance = history.drifted(known, plain, none).covariance - np.diag(change_**2)
-    return Pair(history.rate_keys(plain), unit, within / unit, covariance, total[1:, 1:], -total[1:, 0])
 
 
 def gains_under(log: NullLog, learned: Drift) -> dict[str, float]:
@@ -157,8 +145,8 @@ def learn(logs: Sequence[NullLog]) -> Drift:
 def main(processes: int) -> int:
     """Write the drift into the package."""
     logs: list[NullLog] = []
-    with ProcessPoolExecutor(processes) as pool:
-        for found_logs in pool.map(season_logs, SEEDS.items()):
+    with Jobs("diagnosis drift", processes) as jobs:
+        for found_logs in jobs.each(season_logs, SEEDS.items()):
             logs += found_logs
     gains: list[dict[str, float]] = []
     for season in SEEDS:

@@ -106,6 +106,11 @@ def simulate_cases(known: Reference, cases: Sequence[Case], days: int) -> list[T
     return [one.measured for one in seasons]
 
 
+def simulated_cases(job: tuple[Reference, Sequence[Case], int]) -> list[Telemetry]:
+    """Return the same for a greenhouse, its cases and days, as one job."""
+    return simulate_cases(*job)
+
+
 def disturbances(case: Case) -> Disturbances:
     """Return what disturbs the greenhouse of a case."""
     usual = Disturbances(degrees_of_freedom=4.0 if case.heavy_tails else None)

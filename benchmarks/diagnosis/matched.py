@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +16,7 @@ import numpy as np
 from benchmarks.diagnosis.cases import REACHABLE, Case
 from benchmarks.diagnosis.greenhouses import of_seasons
 from benchmarks.diagnosis.logs import MISMATCH, Reference, reference, simulate_cases
+from benchmarks.jobs import Jobs
 from igrow.core.arrays import Floats
 from igrow.core.effects import EFFECTS
 from igrow.core.simulator.hybrid.nominal import site_record
@@ -108,13 +108,13 @@ def _jobs(known: Reference) -> list[tuple[int, Telemetry, FittedModel, str, floa
 def main(processes: int) -> int:
     """Print the table."""
     known = reference(of_seasons()[SEASON])
-    jobs = _jobs(known)
+    wanted = _jobs(known)
     outcomes = []
-    with ProcessPoolExecutor(processes) as pool:
-        for number, outcome in enumerate(pool.map(_judge, jobs), 1):
+    with Jobs("diagnosis matched", processes) as jobs:
+        for number, outcome in enumerate(jobs.each(_judge, wanted), 1):
             outcomes.append(outcome)
             cause, _, verdict, found = outcome
-            print(f"{number} of {len(jobs)}: {cause or 'nothing'} -> {verdict} {found}", file=sys.stderr)
+            print(f"{number} of {len(wanted)}: {cause or 'nothing'} -> {verdict} {found}", file=sys.stderr)
     print(f"{len(outcomes)} greenhouses of the simulator's own structure, {DAYS} days, {SEASON}, seeds from {SEED}")
     claims = [verdict != "nothing" for cause, _, verdict, _ in outcomes if not cause]
     print(f"{'false claims on nothing':28} {np.mean(claims):5.2f} {len(claims):5d}")

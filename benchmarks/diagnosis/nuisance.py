@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from importlib.resources import files
@@ -21,6 +20,7 @@ from benchmarks.diagnosis.greenhouses import (
     others,
 )
 from benchmarks.diagnosis.logs import MISMATCH, built_in, reference
+from benchmarks.jobs import Jobs
 from benchmarks.provenance import provenance
 from igrow.core.bundle import BUILT_IN
 from igrow.core.greenhouse import Disturbances, recipe, simulate_many
@@ -70,8 +70,8 @@ def families(processes: int) -> list[Family]:
     known = [own["winter"], own["spring"], *learned]
     seeds = [20_000, 30_000, *(81_000 + 100 * number for number in range(KINDS))]
     found: list[Family] = []
-    with ProcessPoolExecutor(processes) as pool:
-        for one, seed in zip(pool.map(reference, known), seeds, strict=True):
+    with Jobs("diagnosis families", processes) as jobs:
+        for one, seed in zip(jobs.each(reference, known), seeds, strict=True):
             found.append(Family(one.greenhouse, one.model, seed))
             print(f"calibrated {len(found)} of {len(known)}: {one.greenhouse.site.name}", file=sys.stderr)
     default = VirtualGreenhouse(DEFAULT_SITE, parameters_of(DEFAULT_SITE), np.datetime64("2020-02-01T00:00:00"), 40_000)
@@ -168,13 +168,13 @@ def carried(known: Sequence[Sequence[LogLikelihood]], count: int) -> list[float]
 
 def learn(known: Sequence[Family], processes: int) -> NuisanceSubspace:
     """Return what greenhouses of families show though nothing is missing."""
-    with ProcessPoolExecutor(processes) as pool:
-        home = _directions("at home", pool.map(at_home, known), len(known), DEFAULT.nuisance_directions)
+    with Jobs("diagnosis nuisance", processes) as jobs:
+        home = _directions("at home", jobs.each(at_home, known), len(known), DEFAULT.nuisance_directions)
         places = others(PLACES, PLACES_SEED).values()
         count = DEFAULT.nuisance_directions_transferred
-        away = _directions("transferred", pool.map(transferred, places), PLACES, count)
+        away = _directions("transferred", jobs.each(transferred, places), PLACES, count)
         shown: list[dict[str, float]] = []
-        for number, seen in enumerate(pool.map(partial(_amplitudes, home), known[:SEASONS_FROM]), 1):
+        for number, seen in enumerate(jobs.each(partial(_amplitudes, home), known[:SEASONS_FROM]), 1):
             shown += seen
             print(f"seasons of {number} of {SEASONS_FROM} families", file=sys.stderr)
     seeds = {"home": [one.seed for one in known], "transferred": PLACES_SEED}

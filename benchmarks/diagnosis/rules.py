@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
@@ -29,6 +28,7 @@ from benchmarks.diagnosis.nuisance import (
     transferred,
     transferred_logs,
 )
+from benchmarks.jobs import Jobs
 from benchmarks.provenance import provenance
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.diagnosis import DEFAULT, compare, linear, nuisance, rules, search
@@ -145,18 +145,18 @@ def main(processes: int) -> int:
     """Print the bounds beside those in force, and write them into the package."""
     known = families(processes)
     places: list[VirtualGreenhouse] = list(others(PLACES, PLACES_SEED).values())
-    with ProcessPoolExecutor(processes) as pool:
-        home = _folded(list(pool.map(_home_logs, known)), list(pool.map(at_home, known)), DEFAULT.nuisance_directions)
+    with Jobs("diagnosis rules", processes) as jobs:
+        home = _folded(list(jobs.each(_home_logs, known)), list(jobs.each(at_home, known)), DEFAULT.nuisance_directions)
         away = _folded(
-            list(pool.map(transferred_logs, places)),
-            list(pool.map(transferred, places)),
+            list(jobs.each(transferred_logs, places)),
+            list(jobs.each(transferred, places)),
             DEFAULT.nuisance_directions_transferred,
         )
         own_structure = [(known[0], log, MATCHED_SEED + number) for number, (_, log, _) in enumerate(home[:40])]
         print(f"{len(home)}, {len(away)} and {len(own_structure)} logs", file=sys.stderr)
-        own = _told("at home", pool.map(gains_of, home))
-        other = _told("transferred", pool.map(gains_of, away))
-        matched = _told("of the simulator's structure", pool.map(matched_gains, own_structure))
+        own = _told("at home", jobs.each(gains_of, home))
+        other = _told("transferred", jobs.each(gains_of, away))
+        matched = _told("of the simulator's structure", jobs.each(matched_gains, own_structure))
     fitted = bounds(own, other, matched)
     for name, value in fitted.items():
         print(f"{name:28} {getattr(DEFAULT, name):8g} -> {value:8g}   {DEFAULT.meaning(name)}")

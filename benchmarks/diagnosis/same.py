@@ -13,7 +13,6 @@ import json
 import sys
 from argparse import Namespace
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, replace
 from functools import partial
 
@@ -23,6 +22,7 @@ from benchmarks.diagnosis.cases import FORMS, SEASONS, Case, Turn
 from benchmarks.diagnosis.logs import Reference
 from benchmarks.diagnosis.nurseries import calibrated, calibration_logs, later_logs, nursery
 from benchmarks.diagnosis.scoring import Outcome, judge
+from benchmarks.jobs import Jobs
 from igrow.core.effects import EFFECTS
 from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
 from igrow.core.telemetry import Telemetry
@@ -147,16 +147,16 @@ def main(options: Namespace) -> int:
     greenhouses, count = options.greenhouses or GREENHOUSES, (options.cases or CASES) // len(seasons)
     names = ["history"] if options.history_only else list(RULES)
     outcomes: list[dict[str, Outcome]] = []
-    with ProcessPoolExecutor(options.processes) as pool:
+    with Jobs("diagnosis same", options.processes) as jobs:
         wanted = [(kind, season, greenhouses, count, options.days) for season in seasons]
-        jobs = [job for own in pool.map(prepared, wanted) for job in own]
-        for number, one in enumerate(pool.map(partial(_judge, names=names), jobs), 1):
+        cases = [case for own in jobs.each(prepared, wanted) for case in own]
+        for number, one in enumerate(jobs.each(partial(_judge, names=names), cases), 1):
             outcomes.append(one)
             case = one["history"].case
             said = "; ".join(f"{name}: {told.verdict} {told.found}" for name, told in one.items())
             where = f"{case.name} in {case.greenhouse}"
             print(
-                f"{number} of {len(jobs)}: {where} {case.causes} {case.size:g} -> {said}", file=sys.stderr, flush=True
+                f"{number} of {len(cases)}: {where} {case.causes} {case.size:g} -> {said}", file=sys.stderr, flush=True
             )
     if options.json:
         lines = [json.dumps({name: asdict(told) for name, told in one.items()}) + "\n" for one in outcomes]

@@ -59,6 +59,11 @@ class Outcome:
     seconds: float
 
 
+def judged(job: tuple[Case, Telemetry, Reference]) -> Outcome:
+    """Diagnose one case as one job."""
+    return judge(*job)
+
+
 def judge(case: Case, telemetry: Telemetry, reference: Reference, rules: DecisionRules = DEFAULT) -> Outcome:
     """Diagnose one case and compare with the truth."""
     begun = time.perf_counter()

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from igrow.core.arrays import Floats
+from igrow.core.errors import IgrowError
 from igrow.trainer.diagnosis import drift
 from igrow.trainer.diagnosis.drift import Drift, Pair
 
@@ -43,6 +45,35 @@ def test_what_was_learned_makes_its_logs_likelier() -> None:
     learned = np.array([found.rates[key] for key in KEYS])
     told = [sum(drift.evidence(one, rates * one.unit) for one in logs) for rates in (learned, np.full(4, 0.02))]
     assert told[0] > told[1]
+
+
+def test_a_fleet_moves_what_came_with_the_trainer_the_more_the_more_sites_share() -> None:
+    rates = {"parameter:respiration": 0.1, "rain_cooling": 0.1, "soil_respiration": 0.3}
+    came = Drift(rates, 42.0, {"co2_drift": 20.0}, 9.0)
+    true = np.array([0.4, 0.05, 0.1, 0.1])
+    few, many = (drift.learn(pairs(true, count), 42.0, came) for count in (3, 150))
+    assert 0.1 < few.rates["parameter:respiration"] < many.rates["parameter:respiration"]
+    assert many.rates["parameter:respiration"] == pytest.approx(0.4, rel=0.2)
+    assert few.rates["soil_respiration"] == 0.3, "what no site shows stays"
+    assert (few.null_gains, few.least_gain) == (came.null_gains, came.least_gain)
+
+
+def test_a_change_is_read_back_and_another_file_refused_in_one_line(tmp_path: Path) -> None:
+    (one,) = pairs(np.full(4, 0.1), 1)
+    back = Pair.from_bytes(one.to_bytes(), where="x")
+    assert back.keys == one.keys
+    for name in ("unit", "expected", "known", "information", "score"):
+        np.testing.assert_array_equal(getattr(back, name), getattr(one, name))
+    for content in (b"", b"PK", one.to_bytes()[:-40], replace(one, score=np.full(4, np.nan)).to_bytes(),
+                    replace(one, unit=np.ones(3)).to_bytes()):  # fmt: skip
+        with pytest.raises(IgrowError, match=r"^change\.npz: holds no change of a greenhouse: [^\n]+$"):
+            Pair.from_bytes(content, where="change.npz")
+    for text in ("", "[]", "{}", '{"rates": 3}', '{"rates": 3, "days": 42}', '{"rates": {"x": "y"}, "days": 42}'):
+        (tmp_path / "drift.json").write_text(text)
+        with pytest.raises(IgrowError, match=r"drift\.json: no drift as"):
+            drift.read_drift(tmp_path / "drift.json")
+    with pytest.raises(IgrowError, match=r"none\.json: No such file"):
+        drift.read_drift(tmp_path / "none.json")
 
 
 def test_a_rate_lies_between_physics_and_what_was_learned_and_grows_with_time() -> None:

@@ -29,7 +29,7 @@ def posterior(shift: float, noise: float) -> Gaussian:
 
 
 def test_the_prior_of_a_fit_is_divided_out_again() -> None:
-    learned = learned_of(SITE, posterior(0.8, 0.5))
+    learned = learned_of(DESCRIBED, posterior(0.8, 0.5))
     assert learned.shift == {NAME: pytest.approx(0.8)}, "what no log saw is left out"
     assert learned.variance[NAME] == pytest.approx(0.25)
 

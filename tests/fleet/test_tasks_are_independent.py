@@ -62,7 +62,8 @@ def test_two_workers_give_the_digits_of_one() -> None:
 
 
 ON_RAY = """
-import json, os, signal, sys, threading, time
+import json, sys, threading
+from benchmarks.processes import kill_one
 from tests.fleet.test_tasks_are_independent import HERE, task
 from igrow.trainer.fleet.registry import Backend
 from igrow.trainer.fleet.runner import run_tasks
@@ -71,15 +72,8 @@ tasks = [task(f"site-{seed}", "compute", {"seed": seed, "marks": marks}) for see
 tasks += [task(f"slow-{number}", "sleep", {"seconds": 3}) for number in range(2)]
 
 def kill_a_worker():
-    import subprocess
-    while True:
-        time.sleep(0.2)
-        found = subprocess.run(["ps", "-eo", "pid,args"], capture_output=True, text=True).stdout.splitlines()
-        pids = [int(line.split()[0]) for line in found if "ray::run_limited" in line]
-        if pids:
-            os.kill(pids[0], signal.SIGKILL)
-            print("killed", file=sys.stderr)
-            return
+    kill_one("ray::run_limited")
+    print("killed", file=sys.stderr)
 
 threading.Thread(target=kill_a_worker, daemon=True).start()
 print(json.dumps({one.name: [one.ending.value, one.result] for one in run_tasks(tasks, Backend.RAY, workers=2)}))
@@ -91,7 +85,7 @@ def test_a_local_ray_of_two_workers_gives_the_same_digits_when_one_is_killed(tmp
         [sys.executable, "-c", ON_RAY, str(tmp_path / "marks")],
         capture_output=True,
         text=True,
-        timeout=300,
+        timeout=1800,
         check=False,
         cwd=Path(__file__).parents[2],
     )

@@ -39,7 +39,7 @@ def diagnosed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Put a diagnosis of no time in the place of the real one; collects the bundles that it is asked to build on."""
     asked: list[str] = []
 
-    def diagnose(site, log, bundle, target):
+    def diagnose(site, log, bundle, target, drift):
         asked.append(bundle.identity)
         offset = 10.0 + len(asked)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,7 @@ from igrow.core.errors import IgrowError
 from igrow.trainer.cli.log_arguments import add_log_arguments, log_of
 from igrow.trainer.cli.progress import progress
 from igrow.trainer.exporting import export, read_model
-from igrow.trainer.fit import FittedModel, calibrate
+from igrow.trainer.fit import calibrate
 from igrow.trainer.fit.population import read_population
 
 EXAMPLE = "igrow-trainer calibrate DATA/agc2019 --compartment Reference --out out/reference"
@@ -43,16 +42,12 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.fit_weeks < 1:
             raise IgrowError("--fit-weeks: one week at least")
         log = log.select(None, log.telemetry.time[0] + np.timedelta64(7 * arguments.fit_weeks, "D"))
-    before = None
     if arguments.bundle and arguments.population:
         raise IgrowError("--bundle and --population: one of them says what is known before, not both")
-    if arguments.bundle:
-        before = read_model(arguments.bundle, log.known_site)
-    elif arguments.population:
-        prior = read_population(arguments.population).prior(log.known_site)
-        before = replace(FittedModel.described(log.known_site), posterior=prior)
+    before = read_model(arguments.bundle, log.known_site) if arguments.bundle else None
+    population = read_population(arguments.population) if arguments.population else None
     with progress("calibrating") as say:
-        model = calibrate(log, prior_model=before, progress=say)
+        model = calibrate(log, prior_model=before, population=population, progress=say)
         say("writing the bundle")
         bundle = export(model, arguments.out)
     print(f"{model.summary()}\n")

@@ -13,7 +13,7 @@ from igrow.trainer.fleet.overview import SiteRow, overview, utc
 from igrow.trainer.fleet.registry import Entry, Registry, load_registry
 from igrow.trainer.fleet.runner import run_tasks
 from igrow.trainer.fleet.tasks import Ending, Outcome, Task
-from igrow.trainer.fleet.work import LEARNED
+from igrow.trainer.fleet.work import CHANGE, LATER_DAYS, LEARNED
 from igrow.trainer.service import history
 from igrow.trainer.service.recalibration import DAYS, site_folder, utc_now
 
@@ -32,14 +32,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     diagnose = actions.add_parser("diagnose", help="diagnose now, publish nothing")
     recalibrate = actions.add_parser("recalibrate", help="diagnose the sites that are due, and publish what is better")
     calibrate = actions.add_parser("calibrate", help="calibrate sites without a bundle of their own, and publish it")
-    learn = actions.add_parser("learn", help="learn from the sites that share it where greenhouses like these lie")
+    learn = actions.add_parser("learn", help="learn from the sites that share it where they lie and how they change")
     publish = actions.add_parser("publish", help="sign again what expires soon")
     for one in (status, collect, diagnose, recalibrate, calibrate, learn, publish):
         one.add_argument("fleet", type=Path, help="folder with fleet.yaml and sites/")
         one.add_argument("--site", action="append", default=[], metavar="NAME", help="only this one; may be repeated")
     status.add_argument("--page", type=Path, metavar="FOLDER", help="write the page and the reports into this folder")
-    for one in (diagnose, recalibrate, calibrate, learn):
-        one.add_argument("--days", type=int, default=DAYS, help=f"newest days of the log (default {DAYS})")
+    for one, days in ((diagnose, DAYS), (recalibrate, DAYS), (calibrate, DAYS), (learn, DAYS + LATER_DAYS)):
+        one.add_argument("--days", type=int, default=days, help=f"newest days of the log (default {days})")
     recalibrate.add_argument("--force", action="store_true", help="also the sites that are not due")
     publish.add_argument("--again", action="store_true", help="publish each site's bundle again, as after a new key")
 
@@ -69,7 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"[{number}/{len(tasks)}] {sentence(outcome)}", flush=True)
     print(f"{len(tasks) + len(registry.problems)} sites, {failed} failed", file=sys.stderr)
     if arguments.action == "learn":
-        print(write_population(registry, entries))
+        print(write_shared(registry, entries))
     return int(failed > 0)
 
 
@@ -88,18 +88,19 @@ def make_task(arguments: argparse.Namespace, registry: Registry, entry: Entry, n
         "publish": lambda: ("publish_site", {"site": entry.site.name, "keys": keys, "again": arguments.again}),
         "diagnose": lambda: (
             "recalibrate_site",
-            {"file": str(entry.file.resolve()), "keys": keys, "publish": False, "force": True, "days": arguments.days},
+            {"file": str(entry.file.resolve()), "keys": keys, "publish": False, "force": True, "days": arguments.days,
+             "drift": shared(entry, registry.drift)},
         ),
         "learn": lambda: ("learn_from_site", {"file": str(entry.file.resolve()), "days": arguments.days}),
         "calibrate": lambda: (
             "calibrate_site",
             {"file": str(entry.file.resolve()), "keys": keys, "days": arguments.days,
-             "population": str(registry.population.resolve()) if knows_others(registry, entry) else None},
+             "population": shared(entry, registry.population)},
         ),
         "recalibrate": lambda: (
             "recalibrate_site",
             {"file": str(entry.file.resolve()), "keys": keys, "publish": True, "force": arguments.force,
-             "days": arguments.days},
+             "days": arguments.days, "drift": shared(entry, registry.drift)},
         ),
     }  # fmt: skip
     function, own = given[arguments.action]()
@@ -119,19 +120,28 @@ def takes_part(entry: Entry, action: str) -> bool:
     return not entry.paused and (action != "learn" or entry.learning)
 
 
-def knows_others(registry: Registry, entry: Entry) -> bool:
-    """Tell whether what was learned from others is this site's prior."""
-    return entry.learning and registry.population.exists()
+def shared(entry: Entry, file: Path) -> str | None:
+    """Return a file of what sites share, where this one takes part and there is one."""
+    return str(file.resolve()) if entry.learning and file.exists() else None
 
 
-def write_population(registry: Registry, entries: Sequence[Entry]) -> str:
-    """Put together what sites have learned; returns a sentence. Raises IgrowError where too few have."""
-    from igrow.trainer.fit.population import learn_population, read_learned  # noqa: PLC0415  (status needs no scipy)
+def write_shared(registry: Registry, entries: Sequence[Entry]) -> str:
+    """Put together what sites have learned; returns a sentence a file. Raises IgrowError where too few have."""
+    from igrow.trainer.diagnosis import drift  # noqa: PLC0415  (status needs no scipy)
+    from igrow.trainer.fit.population import learn_population, read_learned  # noqa: PLC0415
 
-    files = [site_folder(registry.state, entry.site.name) / LEARNED for entry in entries]
-    population = learn_population([read_learned(file) for file in files if file.exists()])
+    folders = [site_folder(registry.state, entry.site.name) for entry in entries]
+    population = learn_population([read_learned(one / LEARNED) for one in folders if (one / LEARNED).exists()])
     population.write(registry.population)
-    return f"wrote {registry.population}: {len(population.mean)} parameters of {population.sites} sites"
+    lines = [f"wrote {registry.population}: {len(population.mean)} parameters, effects and patterns "
+             f"of {population.sites} sites"]  # fmt: skip
+    changes = [one / CHANGE for one in folders if (one / CHANGE).exists()]
+    if len(changes) >= drift.LEAST_PAIRS:
+        known = drift.read_drift()
+        pairs = [drift.Pair.from_bytes(one.read_bytes(), where=str(one)) for one in changes]
+        drift.write_drift(registry.drift, drift.learn(pairs, known.days, known))
+        lines.append(f"wrote {registry.drift}: how {len(pairs)} sites change")
+    return "\n".join(lines)
 
 
 def remember(registry: Registry, action: str, outcome: Outcome, now: datetime) -> None:

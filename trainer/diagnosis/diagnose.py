@@ -21,6 +21,7 @@ from igrow.trainer.diagnosis.actuators import Completed, complete
 from igrow.trainer.diagnosis.compare import Round
 from igrow.trainer.diagnosis.correction import Corrected, LogDays, Stage, correct, corrected_model
 from igrow.trainer.diagnosis.design import prepare
+from igrow.trainer.diagnosis.drift import Drift
 from igrow.trainer.diagnosis.estimate import Estimated
 from igrow.trainer.diagnosis.evidence import Evidence
 from igrow.trainer.diagnosis.knowledge import knowledge_of
@@ -31,6 +32,7 @@ from igrow.trainer.diagnosis.rounds import search_of
 from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.model import FittedModel
+from igrow.trainer.fit.population import Population
 
 Report = Callable[[str], None]
 NOT_CALIBRATED = N_(
@@ -51,6 +53,7 @@ def diagnose(
     seed: int = 0,
     rules: DecisionRules = DEFAULT,
     nuisance: NuisanceSubspace | None = None,
+    drift: Drift | None = None,
     progress: Report | None = None,
 ) -> Diagnosis:
     """Return the diagnosis of a log.
@@ -62,6 +65,7 @@ def diagnose(
         seed: of the random flips and bootstraps.
         rules: every threshold.
         nuisance: what greenhouses show though nothing is missing (None: what came with the trainer).
+        drift: how greenhouses like it change with time (None: what came with the trainer).
         progress: is told what is being done, in lines.
 
     Raises:
@@ -83,7 +87,7 @@ def diagnose(
     days, opened = completed.days, under_open_vents(logged.record, rules)
     off = opened is not None and opened.is_offset(rules)
     hidden = frozenset(without) | (frozenset({"co2_drift"}) if off else frozenset())
-    search = search_of(days, site, model, knowledge, hidden, rules, nuisance)
+    search = search_of(days, site, model, knowledge, hidden, rules, nuisance, drift)
     say("searching for causes")
     first, last, found = search.run(rng)
     say("correcting the model")
@@ -140,10 +144,12 @@ def discrepancy_of(log: Log, model: FittedModel, rules: DecisionRules = DEFAULT)
     return learn_discrepancy(design)
 
 
-def history_of(log: Log, model: FittedModel, rules: DecisionRules = DEFAULT) -> Discrepancy:
+def history_of(
+    log: Log, model: FittedModel, rules: DecisionRules = DEFAULT, *, population: Population | None = None
+) -> Discrepancy:
     """Return the same with covariance and the noise's colour, for `FittedModel.history`; raises as above does."""
     record = log_days(log, model).record
-    return history.learn(record, log.known_site, model.posterior, rules)
+    return history.learn(record, log.known_site, model.posterior, rules, population)
 
 
 def log_days(log: Log, model: FittedModel) -> LogDays:

@@ -9,10 +9,11 @@ Recognition and Machine Learning, sections 3.5 and 9.4).
 
 from __future__ import annotations
 
+import io
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -20,13 +21,16 @@ from typing import Any
 import numpy as np
 
 from igrow.core.arrays import Floats
+from igrow.core.errors import IgrowError
 from igrow.trainer.diagnosis.knowledge import CROP
 
 FILE = "learned/drift.json"
 ROUNDS = 40
 """Of expectation maximisation."""
 HELD = 6.0
-"""Logs that the usual rate of a group counts as."""
+"""Logs that the usual rate of a group counts as, or a rate that was learned before."""
+LEAST_PAIRS = 3
+"""From so many greenhouses on their own changes count beside those that came with the trainer."""
 LEARNED_SHARE, CO2_SHARE = 0.5, 0.85
 """Weight of a learned rate against the physically expected one, in logarithms. Where the structure is not the
 greenhouse's a likelihood takes its misfit for change, and what may change too much hides causes; a crop does change."""
@@ -93,11 +97,50 @@ class Pair:
     score: Floats
     """Its gradient at no change, (k,)."""
 
+    def to_bytes(self) -> bytes:
+        """Return the content of a file that holds it: plain arrays, never a pickle."""
+        buffer = io.BytesIO()
+        np.savez_compressed(buffer, allow_pickle=False, **{name: np.array(one) for name, one in vars(self).items()})
+        return buffer.getvalue()
+
+    @classmethod
+    def from_bytes(cls, content: bytes, *, where: str) -> Pair:
+        """Read a pair.
+
+        Raises:
+            IgrowError: it is not such a file; `where` names it.
+        """
+        try:
+            with np.load(io.BytesIO(content), allow_pickle=False) as file:
+                arrays = {one.name: file[one.name] for one in fields(cls)}
+            keys = tuple(map(str, arrays.pop("keys")))
+            for name, array in arrays.items():
+                shape = (len(keys),) * (2 if name in {"known", "information"} else 1)
+                if array.shape != shape or not np.all(np.isfinite(array)):
+                    raise ValueError(f"{name} is no finite array of {shape}")
+            return cls(keys, **arrays)
+        except Exception as error:
+            # A damaged archive raises from zipfile, zlib or numpy; for the user it is one fault.
+            raise IgrowError(f"{where}: holds no change of a greenhouse: {error}") from None
+
 
 def read_drift(path: Path | None = None) -> Drift:
-    """Return a stored drift (None: the one that came with the trainer)."""
+    """Return a stored drift (None: the one that came with the trainer).
+
+    Raises:
+        IgrowError: the file cannot be read, or is none; in one line.
+    """
     file = files("igrow.trainer.diagnosis").joinpath(FILE) if path is None else path
-    return Drift(**json.loads(file.read_text(encoding="utf-8")))
+    try:
+        known = Drift(**json.loads(file.read_text(encoding="utf-8")))
+        numbers = [*known.rates.values(), *known.null_gains.values(), known.days, known.least_gain]
+        if not np.all(np.isfinite(np.array(numbers, dtype=np.float64))):
+            raise ValueError("a number is none")
+        return known
+    except OSError as error:
+        raise IgrowError(f"{path}: {error.strerror}; `igrow-trainer fleet learn` writes it") from None
+    except (ValueError, TypeError, AttributeError, RecursionError):
+        raise IgrowError(f"{path}: no drift as `igrow-trainer fleet learn` writes it") from None
 
 
 def write_drift(path: Path, drift: Drift) -> None:
@@ -113,14 +156,18 @@ def group_of(key: str) -> str:
     return "crop" if kind == "parameter" and name in CROP else kind
 
 
-def learn(pairs: Sequence[Pair], days: float) -> Drift:
+def learn(pairs: Sequence[Pair], days: float, known: Drift | None = None) -> Drift:
     """Return the drift that makes later logs likeliest.
 
     Args:
         pairs: of greenhouses in which nothing is missing.
         days: from the middle of a calibration to that of a later log.
+        known: what was learned of other greenhouses; each rate is held to its own there, and not to its group's.
+            The gains that a change must have stay: logs in which something was found are none of the pairs.
     """
     rates = {key: rate for one in pairs for key, rate in zip(one.keys, one.expected.tolist(), strict=True)}
+    before = {} if known is None else {key: rate**2 for key, rate in known.rates.items()}
+    rates |= {key: rate for key, rate in (known.rates.items() if known else ()) if key in rates}
     for _ in range(ROUNDS):
         squares: dict[str, list[float]] = {key: [] for key in rates}
         for one in pairs:
@@ -129,8 +176,10 @@ def learn(pairs: Sequence[Pair], days: float) -> Drift:
                 squares[key].append(float(square))
         usual = _usual(squares)
         for key, own in squares.items():
-            rates[key] = float(np.sqrt((HELD * usual[group_of(key)] + sum(own)) / (HELD + len(own))))
-    return Drift({key: float(f"{rate:.3g}") for key, rate in sorted(rates.items())}, days)
+            held = before.get(key, usual[group_of(key)])
+            rates[key] = float(np.sqrt((HELD * held + sum(own)) / (HELD + len(own))))
+    learned = {key: float(f"{rate:.3g}") for key, rate in sorted(rates.items())}
+    return Drift(learned, days) if known is None else replace(known, rates={**known.rates, **learned})
 
 
 def expected_squares(pair: Pair, change: Floats) -> Floats:

@@ -8,7 +8,7 @@ what was learned and what may be expected now (`expected`).
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -28,15 +28,17 @@ from igrow.trainer.diagnosis.linear import DailyGrams, LinearModel
 from igrow.trainer.diagnosis.noise import Whitening
 from igrow.trainer.diagnosis.recalibration import averaging
 from igrow.trainer.diagnosis.rules import DecisionRules
-from igrow.trainer.fit.climate import site_prior
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
+from igrow.trainer.fit.population import Population
 
 PARTS = (2, 4)
 """Into so many windows a calibration log is cut, to see what gains in each though nothing has changed."""
 
 
-def learn(record: Record, site: Site, posterior: Gaussian, rules: DecisionRules) -> Discrepancy:
+def learn(
+    record: Record, site: Site, posterior: Gaussian, rules: DecisionRules, population: Population | None = None
+) -> Discrepancy:
     """Return what a calibrated model misses of its greenhouse, learned from all days of the calibration log.
 
     Args:
@@ -45,6 +47,7 @@ def learn(record: Record, site: Site, posterior: Gaussian, rules: DecisionRules)
         posterior: of the parameters; a change of them is held to the site's description, not to their calibration,
             which has used this log already.
         rules: how much of everything may be missing.
+        population: what other greenhouses of its owner have shown (None: the description and the rules alone).
 
     Raises:
         DivergenceError: the model runs out of all bounds on the log.
@@ -52,10 +55,11 @@ def learn(record: Record, site: Site, posterior: Gaussian, rules: DecisionRules)
     days = split_days(record, site.longitude)
     whole = DaySplit(days.day, np.ones(days.days, dtype=bool))
     plain = lay_out(record, whole, posterior, {}, site.longitude, rules)
-    described = site_prior(site).marginal(posterior.names)
-    deviation = np.concatenate([described.standard_deviation, _omission(plain)])
-    mean = np.zeros(len(deviation))
-    mean[: len(described.mean)] = described.mean - posterior.mean
+    shared = population or Population({}, {}, 0)
+    described, names = shared.prior(site).marginal(posterior.names), keys(plain)[len(posterior.names) :]
+    centre, spread = shared.scaled(names, omission(names, rules))
+    mean = np.concatenate([described.mean - posterior.mean, centre])
+    deviation = np.concatenate([described.standard_deviation, spread])
     prior = Gaussian(keys(plain), mean, np.diag(deviation**2))
     design = replace(plain, history=History(prior, np.zeros_like(plain.values[0]), (), {}))
     found, design = solve_jointly(design)
@@ -177,7 +181,7 @@ def drifted(known: Discrepancy, plain: Design, learned: Drift) -> Gaussian:
     seen = [row for row, key in enumerate(wanted) if key in place]
     rows = [place[wanted[row]] for row in seen]
     count = len(plain.prior.names)
-    prior = np.concatenate([plain.prior.standard_deviation, _omission(plain)])
+    prior = np.concatenate([plain.prior.standard_deviation, omission(wanted[count:], plain.rules)])
     assert all(row in seen for row in range(count))
     covariance = np.diag(prior**2)
     covariance[np.ix_(seen, seen)] = known.amplitudes.covariance[np.ix_(rows, rows)]
@@ -269,8 +273,12 @@ def _typical(design: Design) -> Floats:
     return np.array([abs(EFFECTS[one.effect].amplitude.typical) for one in design.candidates])
 
 
-def _omission(design: Design) -> Floats:
+def omission(names: Sequence[str], rules: DecisionRules) -> Floats:
     """Return the prior deviation of effects and patterns before any log, (k,)."""
-    rules = design.rules
-    patterns = np.full(len(design.patterns), rules.omission_pattern)
-    return np.concatenate([rules.omission_effect * _typical(design), patterns])
+    effects = [EFFECTS.get(name.partition(":")[0]) for name in names]
+    return np.array(
+        [
+            rules.omission_pattern if one is None else rules.omission_effect * abs(one.amplitude.typical)
+            for one in effects
+        ]
+    )

@@ -15,6 +15,7 @@ from igrow.trainer.diagnosis.change import changed
 from igrow.trainer.diagnosis.compare import Round, compare
 from igrow.trainer.diagnosis.correction import LogDays
 from igrow.trainer.diagnosis.design import Design, prepare
+from igrow.trainer.diagnosis.drift import Drift
 from igrow.trainer.diagnosis.estimate import Estimated, estimate, with_refitted, within_bounds
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, activate
 from igrow.trainer.diagnosis.nuisance import NuisanceSubspace, read_nuisance
@@ -114,6 +115,8 @@ class Change(Search):
     """The log without any cause, before any noise."""
     misfit: Floats
     """What the model is expected to miss in this log."""
+    drift: Drift | None
+    """How greenhouses like it change with time; None: what came with the trainer."""
 
     def judge(self, design: Design, explained: float, rng: np.random.Generator, *, causes: bool) -> Round:
         """Return what one round finds."""
@@ -122,7 +125,7 @@ class Change(Search):
     def design(self, terms: Sequence[ActiveTerm], interval: float) -> Design:
         """Return the design of a model with terms, about the calibrated parameters."""
         plain = laid_out(self.days, self.site, self.history, terms, self.rules) if terms else self.plain
-        return history.expected(self.history, plain, self.misfit, self.without)
+        return history.expected(self.history, plain, self.misfit, self.without, self.drift)
 
     def resolved(self) -> Design:
         """Return the first design: by the steps that the history was learned from."""
@@ -137,6 +140,7 @@ def search_of(
     without: frozenset[str],
     rules: DecisionRules,
     nuisance: NuisanceSubspace | None,
+    drift: Drift | None,
 ) -> Search:
     """Return the search that fits what is known: of changes where the greenhouse's history applies to the log."""
     common = (days, site, knowledge, without, rules, nuisance or read_nuisance())
@@ -146,7 +150,7 @@ def search_of(
     plain = laid_out(days, site, known, (), rules)
     if not history.applies(known, plain):
         return Search(*common)
-    return Change(*common, known, plain, history.expected_misfit(known, plain))
+    return Change(*common, known, plain, history.expected_misfit(known, plain), drift)
 
 
 def laid_out(

@@ -243,7 +243,7 @@ def _batched(shown: Mapping[str, Floats], count: int, line: Linearisation) -> Fl
 
 
 def is_measured(record: Record, effect: Effect) -> bool:
-    """Tell whether the log has any of what a sensor effect falsifies: a house may have rail pipes and no grow pipe."""
+    """Tell whether the log has any of what a sensor effect falsifies: there may be rail pipes and no grow pipe."""
     falsified = effect.measured
     return not falsified or any(
         bool(np.isfinite(record.measured[name]).any()) if name in record.measured else name not in record.missing

@@ -30,6 +30,7 @@ from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.growth import crop_of, growth_notes, growth_of_log
 from igrow.trainer.fit.holding import fit_holding
 from igrow.trainer.fit.model import FittedModel, training_envelope
+from igrow.trainer.fit.population import Population
 
 HORIZONS = ("1_h", "24_h")
 """Of the errors that a model carries."""
@@ -38,7 +39,12 @@ Report = Callable[[str], None]
 
 
 def calibrate(
-    log: Log, site: Site | None = None, *, prior_model: FittedModel | None = None, progress: Report | None = None
+    log: Log,
+    site: Site | None = None,
+    *,
+    prior_model: FittedModel | None = None,
+    population: Population | None = None,
+    progress: Report | None = None,
 ) -> FittedModel:
     """Return the simulator of a greenhouse fitted to its log.
 
@@ -49,6 +55,7 @@ def calibrate(
         site: the greenhouse; None: the log's own.
         prior_model: what is known of it before; None: its description alone. Causes that were found before are not
             carried over: they are looked for again.
+        population: what other greenhouses of its owner have shown; a prior in the place of the description's.
         progress: is told what is being done, in lines.
 
     Raises:
@@ -58,6 +65,8 @@ def calibrate(
     log.require("a calibration")
     site, say = log.known_site, progress or (lambda _line: None)
     before = prior_model or FittedModel.described(site)
+    if population is not None:
+        before = replace(before, posterior=population.prior(site))
     alignment = log.best_shift(before.posterior.values)
     record = log.record(alignment)
     posterior = fit_climate([(record, None)], before.posterior, progress=progress)
@@ -87,7 +96,7 @@ def calibrate(
         errors=held_out_errors(record, before.posterior, say),
         notes=(*_notes(record, inferred), *counted),
     )
-    return _with_discrepancy(model, log, say)
+    return _with_discrepancy(model, log, population, say)
 
 
 def held_out_errors(record: Record, prior: Gaussian, say: Report) -> tuple[HeldOutError, ...]:
@@ -118,13 +127,13 @@ def held_out_errors(record: Record, prior: Gaussian, say: Report) -> tuple[HeldO
     )
 
 
-def _with_discrepancy(model: FittedModel, log: Log, say: Report) -> FittedModel:
+def _with_discrepancy(model: FittedModel, log: Log, population: Population | None, say: Report) -> FittedModel:
     """Return the model with what it misses on its own log, and without it where that cannot be told."""
     from igrow.trainer.diagnosis import DEFAULT, discrepancy_of, history_of  # noqa: PLC0415  (a diagnosis needs fits in turn)
 
     say("learning what the model misses on its own log")
     try:
-        known = history_of(log, model) if DEFAULT.learns_history(log.days) else None
+        known = history_of(log, model, population=population) if DEFAULT.learns_history(log.days) else None
         return replace(model, discrepancy=discrepancy_of(log, model), history=known)
     except (IgrowError, np.linalg.LinAlgError) as error:
         note = (

@@ -1,10 +1,11 @@
-"""What is known of a greenhouse from others of its owner: how far they turned out to lie from their descriptions.
+"""What is known of a greenhouse from others of its owner: how they lie from their descriptions, what their models miss.
 
 Each greenhouse of a fleet was fitted by itself. A random-effects model (DerSimonian and Laird 1986, Controlled Clinical
 Trials 7:177-188, eq. 8 and 9) says by parameter where they lie together and how much they scatter, beyond what each
-fit leaves unknown. For a new greenhouse that is a prior. Only means and standard deviations enter, no row of any log.
+fit leaves unknown; the same by effect and pattern of the discrepancy that each calibration left. For a new greenhouse
+that is a prior. Only means and standard deviations enter, no row of any log.
 
-Everything is in units of the description's own standard deviation, so that greenhouses of other sizes compare.
+Everything is in units of the standard deviation before any log, so that greenhouses of other sizes compare.
 """
 
 from __future__ import annotations
@@ -35,17 +36,20 @@ LARGEST_SHARE = 0.98
 
 @dataclass(frozen=True)
 class Learned:
-    """What one greenhouse's own log says of its parameters, beyond its description."""
+    """What one greenhouse's own log says of its parameters and of its discrepancy, beyond its description."""
 
     shift: Mapping[str, float]
-    """From the description, in its standard deviations, by parameter."""
+    """From the description, in its standard deviations, by parameter; of an effect or a pattern from none of it."""
     variance: Mapping[str, float]
     """Of the shift."""
 
 
 @dataclass(frozen=True)
 class Population:
-    """Where the parameters of greenhouses of one owner lie, from the description and in its standard deviations."""
+    """Where greenhouses of one owner lie, from the description and in its standard deviations.
+
+    Keys are parameters, and effects and patterns as a `Discrepancy` has them.
+    """
 
     mean: Mapping[str, float]
     deviation: Mapping[str, float]
@@ -54,25 +58,28 @@ class Population:
     """How many it was learned from."""
 
     def prior(self, site: Site) -> Gaussian:
-        """Return what is known of a further greenhouse before its log."""
+        """Return what is known of the parameters of a further greenhouse before its log."""
         described = site_prior(site)
-        scale = described.standard_deviation
-        mean = described.mean + scale * np.array([self.mean.get(name, 0.0) for name in described.names])
-        deviation = scale * np.array([self.deviation.get(name, 1.0) for name in described.names])
-        return Gaussian(described.names, mean, np.diag(deviation**2))
+        shift, deviation = self.scaled(described.names, described.standard_deviation)
+        return Gaussian(described.names, described.mean + shift, np.diag(deviation**2))
+
+    def scaled(self, keys: Sequence[str], before: Floats) -> tuple[Floats, Floats]:
+        """Return mean and standard deviation of keys, (k,), from the standard deviation before anything was shared."""
+        mean = np.array([self.mean.get(key, 0.0) for key in keys])
+        return before * mean, before * np.array([self.deviation.get(key, 1.0) for key in keys])
 
     def write(self, path: Path) -> None:
         """Write it as JSON. Raises OSError."""
         write_whole(path, json.dumps(asdict(self), indent=1, sort_keys=True).encode())
 
 
-def learned_of(site: Site, posterior: Gaussian) -> Learned:
-    """Return what a log said of a greenhouse, given the posterior of a fit whose prior was the site's description.
+def learned_of(prior: Gaussian, posterior: Gaussian) -> Learned:
+    """Return what a log said of a greenhouse, given the prior and the posterior of a fit to it.
 
-    A normal posterior is prior times likelihood; dividing the prior out again leaves the log's own word, parameter by
-    parameter. What it hardly saw is left out.
+    A normal posterior is prior times likelihood; dividing the prior out again leaves the log's own word, amplitude by
+    amplitude. What it hardly saw is left out.
     """
-    described = site_prior(site).marginal(posterior.names)
+    described = prior.marginal(posterior.names)
     scale = described.standard_deviation
     left = np.minimum((posterior.standard_deviation / scale) ** 2, 1.0)
     moved = (posterior.mean - described.mean) / scale

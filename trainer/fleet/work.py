@@ -9,6 +9,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from igrow.core.errors import IgrowError
 from igrow.core.exchange import Below, Place
 from igrow.core.exchange.documents import LARGEST_DOCUMENT, parse_object
@@ -22,8 +24,10 @@ from igrow.trainer.service.places import open_place
 from igrow.trainer.service.recalibration import recalibrate, site_folder
 
 COLLECTED = "collected.json"
-LEARNED = "learned.json"
-"""What a site's own log said of its parameters; no row of the log."""
+LEARNED, CHANGE = "learned.json", "change.npz"
+"""What a site's own log said of its parameters and its discrepancy, and of how it changes; no row of the log."""
+LATER_DAYS = 28
+"""Newest days of a log that tell how a greenhouse changes, where a calibration can do without them."""
 REFRESH_BEFORE = timedelta(days=30)
 """Signatures that hold for less than this are made again."""
 
@@ -65,6 +69,7 @@ def recalibrate_site(
     publish: bool,
     force: bool,
     days: int,
+    drift: str | None = None,
 ) -> dict[str, Any]:
     """Diagnose one site, and publish what is better where `publish` says so."""
     from igrow.trainer.publishing import publish_in as publish_bundle  # noqa: PLC0415  (collecting needs no signatures)
@@ -78,6 +83,7 @@ def recalibrate_site(
         now=datetime.fromtimestamp(now, UTC),
         days=days,
         force=force,
+        drift=None if drift is None else Path(drift),
     )
     if turn.verdict == "error":
         raise IgrowError(turn.note)  # its line is in the history already
@@ -85,10 +91,15 @@ def recalibrate_site(
 
 
 def learn_from_site(file: str, state: str, exchange: dict[str, str | None], now: float, *, days: int) -> dict[str, Any]:
-    """Fit one site by itself, and keep what that says beyond its description: means and variances in `learned.json`."""
+    """Fit one site by itself, and keep what that says of it, means and variances in `learned.json`.
+
+    Where the log is long enough the newest four weeks are left out of the fit. If nothing is found in them they tell
+    how the greenhouse has changed, in `change.npz`.
+    """
     from igrow.trainer.data import prepare_log  # noqa: PLC0415  (collecting needs no fits)
+    from igrow.trainer.diagnosis import DEFAULT, change_since, diagnose, learned_from  # noqa: PLC0415
+    from igrow.trainer.diagnosis.drift import read_drift  # noqa: PLC0415
     from igrow.trainer.fit import calibrate  # noqa: PLC0415
-    from igrow.trainer.fit.population import learned_of  # noqa: PLC0415
 
     del exchange  # what was collected is enough
     site, moment = load_site(file), datetime.fromtimestamp(now, UTC)
@@ -96,11 +107,21 @@ def learn_from_site(file: str, state: str, exchange: dict[str, str | None], now:
     log = Archive(Path(state) / "archive").read(site.name, start, end)
     if len(log.telemetry) == 0:
         raise IgrowError(f"no telemetry of site {site.name} in the last {days} days: nothing was collected of it")
-    learned = learned_of(site, calibrate(prepare_log(log.telemetry, site, name=site.name)).posterior)
+    prepared = prepare_log(log.telemetry, site, name=site.name)
+    middle, later = prepared.telemetry.time[-1] - np.timedelta64(LATER_DAYS, "D"), None
+    if DEFAULT.learns_history(prepared.days - LATER_DAYS):
+        prepared, later = prepared.select(None, middle), prepared.select(middle)
+    model = calibrate(prepared)
+    learned, change = learned_from(model), None
+    if later is not None and diagnose(later, model).verdict == "nothing":
+        change = change_since(later, model, read_drift().days)
     folder = site_folder(Path(state), site.name)
     folder.mkdir(parents=True, exist_ok=True)
     write_whole(folder / LEARNED, json.dumps(asdict(learned)).encode())
-    return {"site": site.name, "note": f"{len(learned.shift)} parameters were seen in its log"}
+    if change is not None:
+        write_whole(folder / CHANGE, change.to_bytes())
+    seen = f"{len(learned.shift)} parameters, effects and patterns were seen in its log"
+    return {"site": site.name, "note": f"{seen}; {'' if change else 'not '}how it changes"}
 
 
 def calibrate_site(

@@ -6,7 +6,6 @@ that was calibrated on the site itself, `recalibration.py` goes on.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -81,14 +80,11 @@ def _calibrate(
 ) -> Turn:
     from igrow.trainer.data import prepare_log  # noqa: PLC0415  (scipy is slow to import)
     from igrow.trainer.exporting import export, read_model  # noqa: PLC0415
-    from igrow.trainer.fit import FittedModel, calibrate  # noqa: PLC0415
+    from igrow.trainer.fit import calibrate  # noqa: PLC0415
     from igrow.trainer.fit.population import read_population  # noqa: PLC0415
 
-    before = FittedModel.described(site)
-    if population is not None:
-        before = replace(before, posterior=read_population(population).prior(site))
     prepared = prepare_log(log.telemetry, site, name=site.name)
-    model = calibrate(prepared, prior_model=before)
+    model = calibrate(prepared, population=None if population is None else read_population(population))
     gain = _gain(prepared, model, read_model(bundle, site))
 
     def turn(note: str, *, published: bool = False) -> Turn:

@@ -85,6 +85,7 @@ def recalibrate(
     now: datetime,
     days: int = DAYS,
     force: bool = False,
+    drift: Path | None = None,
 ) -> Turn:
     """Diagnose one site and publish a better bundle; what happened goes into its history.
 
@@ -98,12 +99,13 @@ def recalibrate(
         now: the time, UTC.
         days: newest days of the log to look at.
         force: run also before the site's pace says so.
+        drift: file of how the fleet's greenhouses change; None: what came with the trainer.
     """
     due = next_run(site, folder)
     if due is not None and now < due and not force:
         return Turn(site.name, now, "waiting", False, f"next at {due:%Y-%m-%d %H:%M} UTC")
     try:
-        turn = _run(site, archive, folder, publish_bundle, now, days)
+        turn = _run(site, archive, folder, publish_bundle, now, days, drift)
     except (IgrowError, OSError) as error:
         turn = Turn(site.name, now, "error", False, str(error))
     except Exception as error:  # a fault of ours in one site's data must not cost the others
@@ -115,13 +117,21 @@ def recalibrate(
     return turn
 
 
-def _run(site: Site, archive: Archive, folder: Path, publish_bundle: Publish | None, now: datetime, days: int) -> Turn:
+def _run(
+    site: Site,
+    archive: Archive,
+    folder: Path,
+    publish_bundle: Publish | None,
+    now: datetime,
+    days: int,
+    drift: Path | None,
+) -> Turn:
     log = archive.read(site.name, (now - timedelta(days=days)).date(), now.date() + timedelta(days=2))
     notes = log.notes + tuple(_missing(log))
     if len(log.telemetry) == 0:
         raise IgrowError(f"no telemetry of site {site.name} in the last {days} days: nothing was collected of it")
     bundle, unreadable = bundle_in_force(folder, log.reports)
-    outcome = _diagnose(site, log, bundle, folder / "diagnosis")
+    outcome = _diagnose(site, log, bundle, folder / "diagnosis", drift)
     notes += unreadable + outcome.notes
 
     def turn(note: str, *, published: bool = False) -> Turn:
@@ -156,14 +166,16 @@ class Outcome:
     """Writes the corrected model as a bundle; None where there is none."""
 
 
-def _diagnose(site: Site, log: SiteLog, bundle: Bundle, target: Path) -> Outcome:
+def _diagnose(site: Site, log: SiteLog, bundle: Bundle, target: Path, drift: Path | None) -> Outcome:
     """Diagnose a log against a bundle, and write diagnosis and report to `target`."""
     from igrow.trainer.data import prepare_log  # noqa: PLC0415  (scipy is slow to import)
     from igrow.trainer.diagnosis import diagnose  # noqa: PLC0415
+    from igrow.trainer.diagnosis.drift import read_drift  # noqa: PLC0415
     from igrow.trainer.exporting import export, read_model  # noqa: PLC0415
     from igrow.trainer.report import write_diagnosis  # noqa: PLC0415
 
-    diagnosis = diagnose(prepare_log(log.telemetry, site, name=site.name), read_model(bundle, site))
+    prepared = prepare_log(log.telemetry, site, name=site.name)
+    diagnosis = diagnose(prepared, read_model(bundle, site), drift=None if drift is None else read_drift(drift))
     write_diagnosis(target, diagnosis)
     write_bundle = None
     if diagnosis.verdict != "data_fault":

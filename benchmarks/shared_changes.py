@@ -1,0 +1,137 @@
+"""What a new greenhouse gains when others of its builder share their discrepancy and how they change.
+
+`python -m benchmarks.shared_changes [--shared N] [--new N]` draws a builder as `benchmarks.population` does. Each
+greenhouse is calibrated on four weeks; then its crop has grown on and each parameter has drifted a little. N of them
+share what `igrow-trainer fleet learn` keeps of a site. The new ones are diagnosed on the four weeks that follow, once
+with nothing missing and once with something hidden: by what came with the trainer, and by what was shared.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from benchmarks.diagnosis.nurseries import DRIFT
+from benchmarks.population import BUILDER, OWN, QUANTITIES, SHARED_DAYS, START, site_of
+from igrow.core.greenhouse import GreenhouseParameters, HiddenEffect, generate_weather, recipe, simulate_many
+from igrow.core.greenhouse.tomato import Crop
+from igrow.trainer.data import Log, prepare_log
+from igrow.trainer.diagnosis import Diagnosis, change_since, diagnose, drift, learned_from
+from igrow.trainer.diagnosis.drift import Drift, Pair
+from igrow.trainer.fit import FittedModel, calibrate
+from igrow.trainer.fit.population import Population, learn_population
+
+LATER_DAYS = 28
+CAUSES = ("wind_infiltration", "night_transpiration", "co2_valve_leak", "structure_shade")
+
+
+@dataclass(frozen=True)
+class Told:
+    """What one diagnosis said."""
+
+    verdict: str
+    causes: tuple[str, ...]
+    errors: dict[str, float]
+    """Of the calibrated model a day ahead, by quantity."""
+
+
+def both(plants: Sequence[GreenhouseParameters], hidden: Sequence[str | None], seed: int) -> list[tuple[Log, Log]]:
+    """Return the calibration log and a later one of each greenhouse, which has drifted, with what is hidden in it."""
+    middle = START + np.timedelta64(SHARED_DAYS, "D")
+    end, count = middle + np.timedelta64(LATER_DAYS, "D"), len(plants)
+    weather = generate_weather(START, end, seed=seed)
+    first = simulate_many(plants, weather, recipe, START, middle, count=count, seed=seed)
+    rng = np.random.default_rng(seed)
+    later = simulate_many(
+        [one.varied(rng, DRIFT) for one in plants], weather, recipe, middle, end, count=count, seed=seed + 1,
+        effects=[[] if name is None else [HiddenEffect(name)] for name in hidden],
+        crop=Crop(*(np.concatenate(parts, axis=-1) for parts in zip(*(one.crop for one in first), strict=True))),
+    )  # fmt: skip
+    sites = [site_of(plant) for plant in plants]
+    return [
+        (prepare_log(one.measured, site), prepare_log(two.measured, site))
+        for one, two, site in zip(first, later, sites, strict=True)
+    ]
+
+
+def told(result: Diagnosis) -> Told:
+    """Return what counts of a diagnosis."""
+    errors = {name: horizons["24_h"]["deployed"] for name, horizons in result.errors.items()}
+    return Told(result.verdict, tuple(one.effect for one in result.findings), errors)
+
+
+def share(logs: Iterable[tuple[Log, Log]], days: float) -> tuple[Population, list[Pair]]:
+    """Return what greenhouses share: where they lie, what they miss, and how those change in which nothing is found."""
+    learned, pairs = [], []
+    for number, (first, later) in enumerate(logs, 1):
+        model = calibrate(first)
+        learned.append(learned_from(model))
+        verdict = diagnose(later, model).verdict
+        change = change_since(later, model, days) if verdict == "nothing" else None
+        pairs += [] if change is None else [change]
+        print(f"{number} shared: {verdict}", file=sys.stderr, flush=True)
+    return learn_population(learned), pairs
+
+
+def likelihood(pair: Pair, known: Drift) -> float:
+    """Return the log marginal likelihood of a later log under rates, over that of no change."""
+    rates = [known.rate(key, one, known.days) for key, one in zip(pair.keys, pair.expected.tolist(), strict=True)]
+    return drift.evidence(pair, pair.unit * np.array(rates))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--shared", type=int, default=6, help="greenhouses that share (default 6)")
+    parser.add_argument("--new", type=int, default=4, help="greenhouses that begin (default 4)")
+    parser.add_argument("--seed", type=int, default=45_000)
+    options = parser.parse_args()
+    rng = np.random.default_rng(options.seed)
+    builder = GreenhouseParameters().varied(rng, BUILDER)
+    plants = [builder.varied(rng, OWN) for _ in range(options.shared + options.new)]
+    came = drift.read_drift()
+    population, pairs = share(both(plants[: options.shared], [None] * options.shared, options.seed + 1), came.days)
+    fleet = drift.learn(pairs, came.days, came) if len(pairs) >= drift.LEAST_PAIRS else came
+    new = plants[options.shared :]
+    causes = [CAUSES[number % len(CAUSES)] for number in range(len(new))]
+    logs = both([*new, *new], [*(None for _ in new), *causes], options.seed + 3)
+    found: dict[str, list[tuple[str, Told, float]]] = {"alone": [], "shared": []}
+    for number in range(len(new)):
+        models: dict[str, FittedModel] = {
+            "alone": calibrate(logs[number][0]), "shared": calibrate(logs[number][0], population=population)
+        }  # fmt: skip
+        for name, model in models.items():
+            known = came if name == "alone" else fleet
+            for cause, place in (("", number), (causes[number], number + len(new))):
+                later = logs[place][1]
+                change = change_since(later, model, came.days) if not cause else None
+                likely = np.nan if change is None else likelihood(change, known)
+                found[name].append((cause, told(diagnose(later, model, drift=known)), likely))
+        print(f"{number + 1} of {len(new)} new", file=sys.stderr, flush=True)
+    moved = [fleet.rates[key] / came.rates[key] for key in fleet.rates if key in came.rates]
+    print(f"{options.shared} shared, of {len(pairs)} how they change; {len(new)} new greenhouses, two later logs each")
+    print(f"keys of the population {len(population.mean)}; rates of the fleet over those that came: "
+          f"{np.quantile(moved, 0.1):.2f} to {np.quantile(moved, 0.9):.2f} (80 %)")  # fmt: skip
+    print(f"{'':52}{'alone':>10}{'shared':>10}")
+    rows: list[tuple[str, Callable[[str, Told, float], float | None]]] = [
+        ("false claims where nothing is missing", lambda c, t, _: None if c else float(t.verdict != "nothing")),
+        ("right cause first", lambda c, t, _: float(t.causes[:1] == (c,)) if c else None),
+        ("another cause first", lambda c, t, _: float(bool(t.causes) and t.causes[0] != c) if c else None),
+        ("log likelihood of a later log, nothing missing", lambda c, _, likely: None if c else likely),
+    ]
+    cells: list[tuple[str, list[list[float]]]] = [
+        (what, [[one for case in found[name] if (one := value(*case)) is not None] for name in found])
+        for what, value in rows
+    ]
+    for quantity in QUANTITIES:
+        errors = [[one.errors[quantity] for cause, one, _ in found[name] if not cause] for name in found]
+        cells.append((f"error a day ahead, {quantity}", errors))
+    for what, values in cells:
+        print(f"{what:52}" + "".join(f"{np.mean(one):10.3g}" for one in values))
+
+
+if __name__ == "__main__":
+    main()

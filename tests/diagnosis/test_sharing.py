@@ -1,0 +1,67 @@
+"""What a greenhouse tells others: its log's own word on parameters, discrepancy and change, and no row of the log."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from igrow.trainer.diagnosis import DEFAULT, learned_from
+from igrow.trainer.diagnosis.drift import Drift
+from igrow.trainer.diagnosis.history import change_of, drift_within, omission, units
+from igrow.trainer.diagnosis.sharing import pair
+from igrow.trainer.fit import FittedModel
+from igrow.trainer.fit.discrepancy import Discrepancy
+from igrow.trainer.fit.gaussian import Gaussian
+from igrow.trainer.fit.population import Learned, learn_population
+from tests.diagnosis.synthetic_design import Truth, make_design
+from tests.diagnosis.test_history import in_real_parameters, with_history
+from tests.virtual_log import SITE
+
+EFFECT, PATTERN = "lamp_heat", "heat:cold weather"
+
+
+def model_that_misses(amount: float, left: float) -> FittedModel:
+    """A calibrated model whose log showed an effect, in the deviation before any log, and left a pattern unseen."""
+    names = ("parameter:respiration", EFFECT, PATTERN)
+    scale = np.array([1.0, *omission(names[1:], DEFAULT)])
+    known = Gaussian(names, scale * [0.0, amount, 0.0], np.diag(scale**2 * [0.5, left, 1.0]))
+    model = FittedModel.described(SITE)
+    return replace(
+        model, history=Discrepancy(model.posterior.values, known, {}, 900.0, {}, np.datetime64("2020-02-01"))
+    )
+
+
+def test_the_discrepancy_is_shared_with_what_was_known_before_divided_out() -> None:
+    told = learned_from(model_that_misses(0.6, 0.25))
+    assert told.shift == {EFFECT: pytest.approx(0.8)}, "neither the parameters nor the pattern was seen"
+    assert told.variance == {EFFECT: pytest.approx(1.0 / 3.0)}
+
+
+def test_what_several_greenhouses_miss_is_expected_of_a_further_one() -> None:
+    population = learn_population([Learned({EFFECT: 0.8}, {EFFECT: 0.05})] * 6)
+    before = omission((EFFECT, PATTERN), DEFAULT)
+    mean, deviation = population.scaled((EFFECT, PATTERN), before)
+    assert 0.5 < mean[0] / before[0] < 0.8
+    assert deviation[0] < before[0]
+    assert (mean[1], deviation[1]) == (0.0, before[1]), "of what nobody saw nothing is known"
+
+
+def test_a_change_is_shared_at_the_time_that_rates_count_for() -> None:
+    plain = in_real_parameters(make_design(Truth({EFFECT: 0.4}, {}), seed=2))
+    design = with_history(plain)
+    assert design.history is not None
+    time = plain.line.record.time
+    middle = time[0] + (time[-1] - time[0]) / 2
+    known = Discrepancy(
+        plain.prior.values, design.history.amplitudes, {}, 3600.0, {}, middle - np.timedelta64(168, "D")
+    )
+    told = pair(known, plain, design, 42.0)
+    np.testing.assert_allclose(told.unit, 2.0 * units(plain))  # four times as long: twice the walk
+    np.testing.assert_allclose(told.unit * told.expected, change_of(known, plain, Drift({}, 42.0)))
+    np.testing.assert_allclose(told.expected * units(plain), drift_within(plain))
+    np.testing.assert_allclose(told.known, known.amplitudes.covariance, atol=1e-12)
+    count = len(told.keys)
+    assert {one.shape for one in (told.unit, told.expected, told.score)} == {(count,)}
+    assert told.information.shape == (count, count), "products over all days, no row of the log"
