@@ -32,7 +32,7 @@ from igrow.trainer.training.crop import fit_net_growth, train_networks
 START = np.datetime64("2020-01-20T00:00:00")
 CREATED = datetime(2020, 6, 1, tzinfo=UTC)
 """Fixed, so that the same sources give the same bundle."""
-HOUSES, DAYS = 10, 56
+GREENHOUSES, DAYS = 10, 56
 SPREAD = 0.08
 """How far one greenhouse of this kind lies from the next, relative."""
 
@@ -52,9 +52,9 @@ def virtual_seasons(site: Site, count: int, days: int, seed: int) -> list[Season
     end = START + np.timedelta64(days, "D")
     weathers = [generate_weather(START, end, seed=seed * 1000 + number) for number in range(count)]
     plain = parameters_of(site)
-    houses = [plain, *(plain.varied(random, SPREAD / 2) for _ in range(count - 1))]
+    plants = [plain, *(plain.varied(random, SPREAD / 2) for _ in range(count - 1))]
     return simulate_many(
-        houses,
+        plants,
         weathers,
         [plain_recipe(START, end), *(varied_recipe(START, end, random) for _ in range(count - 1))],
         START,
@@ -93,8 +93,8 @@ def default_model(site: Site, *, seed: int = 0, report: Report = print) -> Fitte
         seed: of the virtual seasons and the training.
         report: is told of the progress in lines.
     """
-    report(f"simulating {HOUSES} virtual greenhouses for {DAYS} days")
-    seasons = virtual_seasons(site, HOUSES, DAYS, seed)
+    report(f"simulating {GREENHOUSES} virtual greenhouses for {DAYS} days")
+    seasons = virtual_seasons(site, GREENHOUSES, DAYS, seed)
     logs = [prepare_log(season.measured, site) for season in seasons]
     model = calibrate(logs[0], progress=report)
     physical, alignment = model.posterior.values, model.alignment or 0.0
@@ -120,12 +120,12 @@ def default_model(site: Site, *, seed: int = 0, report: Report = print) -> Fitte
 
 def equipped(model: FittedModel) -> FittedModel:
     """Return the model with the capacities of its site's equipment."""
-    house = model.site.greenhouse
+    greenhouse = model.site.greenhouse
     rules, held = dict(model.actuation), dict(model.holding)
-    rules["lamp_capacity"] = house.lamps.power if house.lamps else 0.0
-    rules["co2_capacity"] = held["co2_capacity"] = house.co2_dosing_capacity
-    held["heating_capacity"] = house.heating_capacity
-    for name, screen in (("energy_screen", house.energy_screen), ("blackout_screen", house.blackout_screen)):
+    rules["lamp_capacity"] = greenhouse.lamps.power if greenhouse.lamps else 0.0
+    rules["co2_capacity"] = held["co2_capacity"] = greenhouse.co2_dosing_capacity
+    held["heating_capacity"] = greenhouse.heating_capacity
+    for name, screen in (("energy_screen", greenhouse.energy_screen), ("blackout_screen", greenhouse.blackout_screen)):
         if screen is None:
             rules |= {f"{name}_unlit": 0.0, f"{name}_lit": 0.0, f"{name}_open": 0.0}
     return replace(model, actuation=rules, holding=held)

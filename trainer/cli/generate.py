@@ -54,21 +54,21 @@ def run(arguments: argparse.Namespace) -> int:
     random = np.random.default_rng(arguments.seed)
     place = WeatherClimate(site.latitude, site.longitude)
     weather = read_csv(arguments.weather) if arguments.weather else None
-    houses = [parameters_of(site).varied(random, arguments.spread) for _ in range(arguments.count)]
+    plants = [parameters_of(site).varied(random, arguments.spread) for _ in range(arguments.count)]
     setpoints: list[Telemetry] | Callable[[np.datetime64], dict[str, float]] = recipe
     if arguments.setpoints == "varied":
-        setpoints = [varied_recipe(start, end, random) for _ in houses]
+        setpoints = [varied_recipe(start, end, random) for _ in plants]
     weathers = weather or [
-        generate_weather(start, end, seed=arguments.seed + row, climate=place) for row in range(len(houses))
+        generate_weather(start, end, seed=arguments.seed + row, climate=place) for row in range(len(plants))
     ]
     with days_done(f"simulating {arguments.count} greenhouses", start, end) as reached:
         seasons = simulate_many(
-            houses,
+            plants,
             weathers,
             setpoints,
             start,
             end,
-            count=len(houses),
+            count=len(plants),
             seed=arguments.seed,
             effects=effects,
             reached=reached,

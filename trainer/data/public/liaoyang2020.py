@@ -58,12 +58,13 @@ def read(folder: Path) -> Pilot:
     except (OSError, ValueError) as error:
         raise IgrowError(f"{path}: needs the sheets {', '.join(COSTS)} ({error})") from error
     costs = {
-        house: {name.lower(): float(sheets[name][house].iloc[0]) / AREA for name in COSTS} for house in GREENHOUSES
+        greenhouse: {name.lower(): float(sheets[name][greenhouse].iloc[0]) / AREA for name in COSTS}
+        for greenhouse in GREENHOUSES
     }
     return Pilot(
         production[0],
-        {house: values / AREA for house, values in production[1].items()},
-        {house: values * EUR_PER_RMB / AREA for house, values in income[1].items()},
+        {greenhouse: values / AREA for greenhouse, values in production[1].items()},
+        {greenhouse: values * EUR_PER_RMB / AREA for greenhouse, values in income[1].items()},
         costs,
     )
 
@@ -94,4 +95,4 @@ def _by_day(path: Path) -> tuple[NDArray[np.datetime64], dict[str, Values]]:
     if missing:
         raise IgrowError(f"{path}: lacks {', '.join(missing)}")
     day = pd.to_datetime(table["date"]).to_numpy().astype("datetime64[D]")
-    return day, {house: table[house].fillna(0.0).to_numpy(dtype=np.float64) for house in GREENHOUSES}
+    return day, {greenhouse: table[greenhouse].fillna(0.0).to_numpy(dtype=np.float64) for greenhouse in GREENHOUSES}

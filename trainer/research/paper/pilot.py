@@ -56,18 +56,22 @@ class Line:
 def table(pilot: Pilot) -> dict[str, Line]:
     """Return the pilot's table by what is compared."""
     total = {
-        "yield": ("kg", lambda house: pilot.production[house].sum()),
-        "income": ("EUR", lambda house: pilot.income[house].sum()),
-        "costs": ("EUR", lambda house: sum(pilot.costs[house].values())),
+        "yield": ("kg", lambda greenhouse: pilot.production[greenhouse].sum()),
+        "income": ("EUR", lambda greenhouse: pilot.income[greenhouse].sum()),
+        "costs": ("EUR", lambda greenhouse: sum(pilot.costs[greenhouse].values())),
         "net profit": ("EUR", pilot.net_profit),
     }
     lines = {name: _line(unit, AREA, one) for name, (unit, one) in total.items()}
-    lines["price"] = _line("EUR kg-1", 1.0, lambda house: pilot.income[house].sum() / pilot.production[house].sum())
+    lines["price"] = _line(
+        "EUR kg-1", 1.0, lambda greenhouse: pilot.income[greenhouse].sum() / pilot.production[greenhouse].sum()
+    )
     return lines
 
 
 def _line(unit: str, area: float, value: Callable[[str], float]) -> Line:
-    control, experiment = (area * np.array([value(house) for house in group]) for group in (CONTROL, EXPERIMENT))
+    control, experiment = (
+        area * np.array([value(greenhouse) for greenhouse in group]) for group in (CONTROL, EXPERIMENT)
+    )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         tests = (
@@ -125,13 +129,13 @@ def figure5(pilot: Pilot, path: Path) -> None:
     figure, places = panels(3, 5.0)
     harvested, earned = pilot.production, pilot.income
     courses: list[tuple[str, Callable[[str], Floats]]] = [
-        ("harvest so far, kg/m²", lambda house: np.cumsum(harvested[house])),
-        ("price, EUR/kg", lambda house: _price(harvested[house], earned[house])),
-        ("income so far, EUR/m²", lambda house: np.cumsum(earned[house])),
+        ("harvest so far, kg/m²", lambda greenhouse: np.cumsum(harvested[greenhouse])),
+        ("price, EUR/kg", lambda greenhouse: _price(harvested[greenhouse], earned[greenhouse])),
+        ("income so far, EUR/m²", lambda greenhouse: np.cumsum(earned[greenhouse])),
     ]
     for axes, (title, course) in zip(places, courses, strict=True):
         for name, group, colour in _GROUPS:
-            rows = np.array([course(house) for house in group])
+            rows = np.array([course(greenhouse) for greenhouse in group])
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", RuntimeWarning)  # days without a harvest have no price
                 mean, low, high = np.nanmean(rows, axis=0), np.nanmin(rows, axis=0), np.nanmax(rows, axis=0)

@@ -117,16 +117,16 @@ class Greenhouses:
         self.time = self.time + hours * np.timedelta64(3600, "s")
         return run(self._plant, course.setpoints)
 
-    def memory(self, house: int) -> Memory | None:
+    def memory(self, greenhouse: int) -> Memory | None:
         """Return what one crop has had, as its limits count it."""
-        return None if self._memory is None else one_of(self._memory, house)
+        return None if self._memory is None else one_of(self._memory, greenhouse)
 
 
 class DailyGreenhouses:
     """Mechanistic greenhouses that live through `days` days, one action each day."""
 
     def __init__(self, site: Site, scenario: Scenario) -> None:
-        self._houses, self._days, self.day = Greenhouses(site, scenario), scenario.days, 0
+        self._greenhouses, self._days, self.day = Greenhouses(site, scenario), scenario.days, 0
 
     @property
     def done(self) -> bool:
@@ -135,14 +135,14 @@ class DailyGreenhouses:
 
     def observe(self) -> NDArray[np.float32]:
         """Return the observations of the day that comes, (N, 76)."""
-        houses = self._houses
-        return observe(houses.site, houses.measurements(), houses.coming_weather(HOURS), houses.time)
+        known = self._greenhouses
+        return observe(known.site, known.measurements(), known.coming_weather(HOURS), known.time)
 
     def step(self, setpoints: Setpoints) -> Valuation:
         """Live through a day under setpoints (N, 24, 4), and return what it was worth, arrays (1, N)."""
-        time = self._houses.time + np.arange(HOURS) * np.timedelta64(3600, "s")
+        time = self._greenhouses.time + np.arange(HOURS) * np.timedelta64(3600, "s")
         self.day += 1
-        return Objective(self._houses.site, time).value(self._houses.advance(setpoints))
+        return Objective(self._greenhouses.site, time).value(self._greenhouses.advance(setpoints))
 
 
 class SimulatedDays:
