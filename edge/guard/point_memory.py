@@ -158,6 +158,7 @@ class PointMemory:
     def found(self, shown: float) -> None:
         """The PLC shows something that is not ours."""
         self.stands, self.answers, self.problem = shown, None, None
+        self.fell_back_at = self.restarted_at = None  # this reading came after it, as it shows what it did
         self._close()
 
     def is_limited(self, rule: PointRule, written: float) -> bool:

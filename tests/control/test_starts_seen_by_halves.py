@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection
 
 import pytest
 
-from igrow.edge.bus.errors import NoAnswerError
+from igrow.edge.bus.errors import NoAnswerError, UnitRestingError
 from igrow.edge.bus.plc import Reading
 from igrow.edge.guard.heartbeat import HEARTBEAT, BeatCount
 from tests.control.control_fakes import FixedSource
@@ -98,6 +98,26 @@ async def test_a_hand_after_a_start_that_kept_the_setpoints_is_a_hand():
     await bench.run(5)
     tear(bench, list(WISH), lambda: bench.plc.power_up({}))
     await bench.run(2)
+    bench.plc.by_hand("heating_setpoint", 16.0)
+    await bench.run(3)
+    assert [event["point"] for event in bench.events("changed_by_hand")] == ["heating_setpoint"]
+    assert bench.plc.values["heating_setpoint"] == 16.0
+
+
+async def test_a_hand_after_a_start_that_was_seen_is_a_hand_though_the_second_look_was_lost():
+    bench = bench_of()
+    await bench.run(5)
+    bench.plc.power_up(OUTSIDE)
+    read = bench.plc.read
+
+    async def only_whole_sweeps(names=None):
+        readings, now = dict(await read(names)), bench.clock.monotonic()
+        return readings if names is None else {n: Reading(None, NoAnswerError("lost"), now) for n in readings}
+
+    bench.plc.read = only_whole_sweeps
+    bench.plc.write_error = UnitRestingError("rests")
+    await bench.run(1)
+    bench.plc.read, bench.plc.write_error = read, None
     bench.plc.by_hand("heating_setpoint", 16.0)
     await bench.run(3)
     assert [event["point"] for event in bench.events("changed_by_hand")] == ["heating_setpoint"]
