@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from igrow.core.language import LANGUAGES
 from igrow.edge.overriding import override_file
 from igrow.edge.page.password import hashed, write_password
 from igrow.edge.sources.override import read_leases
@@ -99,6 +100,14 @@ def violations(page) -> list[str]:
     return [f"{one['id']}: {node['html'][:120]}" for one in result["violations"] for node in one["nodes"]]
 
 
+def unfold(page) -> None:
+    page.evaluate("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
+
+
+def fits(page) -> bool:
+    return bool(page.evaluate("document.documentElement.scrollWidth <= window.innerWidth"))
+
+
 def keep(taken: bytes, name: str) -> None:
     """Keep a picture for the documentation, where that is asked for."""
     assert len(taken) > 5000
@@ -116,13 +125,10 @@ def top(page, height: int) -> bytes:
 
 @pytest.mark.parametrize(("width", "scheme"), LOOKS)
 def test_every_state_of_the_page_passes_the_rules_of_accessibility_and_fits_its_screen(visit, house, width, scheme):
-    def fits() -> bool:
-        return bool(page.evaluate("document.documentElement.scrollWidth <= window.innerWidth"))
-
     page = visit(width, scheme)
-    page.evaluate("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
+    unfold(page)
     assert violations(page) == []
-    assert fits()
+    assert fits(page)
     page.reload()
     keep(top(page, 1900 if width == 1280 else 1700), f"calm-{width}-{scheme}")
     keep(page.locator("#plan").screenshot(), f"plan-{width}-{scheme}")
@@ -144,8 +150,19 @@ def test_every_state_of_the_page_passes_the_rules_of_accessibility_and_fits_its_
     page.locator("#change-heating_setpoint summary").click()
     page.locator("#change-recipe summary").click()
     assert violations(page) == []
-    assert fits()
+    assert fits(page)
     keep(top(page, 900), f"not-heard-{width}-{scheme}")
+
+
+@pytest.mark.parametrize("code", LANGUAGES[1:])
+def test_a_telephone_shows_the_page_in_each_language(visit, code):
+    page = visit(390, locale=code)
+    assert page.evaluate("document.documentElement.lang") == code
+    unfold(page)
+    assert violations(page) == []
+    assert fits(page)
+    # Wide tables may be moved to and fro; that of plan and recipe is seen at once.
+    assert page.locator("#money .scroll").evaluate("(one) => one.scrollWidth <= one.clientWidth")
 
 
 def test_a_setpoint_is_taken_and_given_back_by_keyboard_alone(visit, house):
