@@ -11,6 +11,7 @@ import math
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 
+from igrow.core.separating_tests.definition import SOURCE
 from igrow.edge.bus.errors import RefusedError
 from igrow.edge.clock import Clock
 from igrow.edge.cycle_result import CycleResult, ReadablePlc
@@ -29,7 +30,7 @@ from igrow.edge.guard.core import LONGEST_RAMP, begin_again, go_on, never_sent, 
 from igrow.edge.guard.findings import moved_and_stood
 from igrow.edge.guard.heartbeat import HEARTBEAT
 from igrow.edge.guard.memory import note, recall
-from igrow.edge.image import Image, Quality
+from igrow.edge.image import Image, Quality, Value
 from igrow.edge.journal import Journal
 from igrow.edge.sensors import ImageBuilder, RawReading
 from igrow.edge.setpoint_statuses import setpoint_statuses
@@ -57,11 +58,13 @@ class ControlCycle:
         *,
         setpoints: Sequence[str],
         respect_hand: float,
+        marks_tests: bool = False,
         keep: Callable[[Image, Mapping[str, object]], None] | None = None,
     ) -> None:
         """`setpoints` are the points that sources decide; interlocks may force every point of `rules`.
 
-        `keep` is handed what a restart must not forget, in each cycle before anything is written.
+        With `marks_tests` each row of the log says whether a separating test moved the plant. `keep` is handed what a
+        restart must not forget, in each cycle before anything is written.
         """
         self._plc = plc
         self._clock = clock
@@ -73,6 +76,7 @@ class ControlCycle:
         self._journal = journal
         self._setpoints = tuple(setpoints)
         self._respect_hand = respect_hand
+        self._marks_tests = marks_tests
         self._keep = keep
         self.state = GuardState()
         self._source = ""
@@ -296,4 +300,10 @@ class ControlCycle:
             self._source = decision.source
         self._journal.sensors(image)
         self._journal.interlocks(verdict.engaged, self._rules.points)
-        self._journal.telemetry(image)
+        self._journal.telemetry(image, self._marks(decision, verdict) if self._marks_tests else {})
+
+    def _marks(self, decision: Decision, verdict: Verdict) -> Mapping[str, Value]:
+        """Return what tells a separating test in the log: its course, and the way back from it."""
+        moves = any(choice.source == SOURCE for choice in decision.choices.values())
+        returns = any(memory.taken_by == SOURCE for memory in verdict.state.points.values())
+        return {SOURCE: Value(float(moves or returns), Quality.GOOD, 0.0)}

@@ -159,6 +159,8 @@ class Daemon:
         with self._contained("alarms"):
             control.climate_alarms.tick(image, self._journal.alarm)
             control.acknowledged.look()
+        with self._contained("separating tests"):
+            control.separating_tests.tick(result, self._journal.alarms.active)
         with self._contained("updates"):
             self.services.updates.tick(image.true_time)
             self._journal.alarm("simulator", self.services.updates.worsening, Level.NOTICE)

@@ -76,6 +76,16 @@ class PlanningSettings:
 
 
 @dataclass(frozen=True)
+class SeparatingTestSettings:
+    """Small movements of the plant that tell causes apart; the grower approves each one."""
+
+    permitted: bool = setting(default=False, help="true lets the grower approve them, one at a time")
+    within: datetime.timedelta = setting(
+        low=_HOUR, high=14 * _DAY, default=3 * _DAY, help="how long an approval waits for its weather"
+    )
+
+
+@dataclass(frozen=True)
 class StatusSettings:
     """What programs ask: state, health and metrics."""
 
@@ -133,6 +143,9 @@ class DaemonFile:
     )
     recipe: Recipe = setting(default_factory=Recipe, help="what rules when no plan does")
     planning: PlanningSettings = setting(default_factory=PlanningSettings, help="planning")
+    separating_tests: SeparatingTestSettings = setting(
+        default_factory=SeparatingTestSettings, help="tests of the plant that tell causes apart"
+    )
     updates: UpdateSettings = setting(default_factory=UpdateSettings, help="new bundles")
     status: StatusSettings = setting(default_factory=StatusSettings, help="state for programs")
     page: PageSettings = setting(default_factory=PageSettings, help="the grower's page")

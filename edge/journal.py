@@ -65,9 +65,9 @@ class Journal:
         self._store.record_event(self._time, kind, detail)
         log_event(kind, detail)
 
-    def telemetry(self, image: Image) -> None:
-        """Write down the values of one image, and those that waited for a date."""
-        row = {name: value for name, value in image.values.items() if name in QUANTITIES}
+    def telemetry(self, image: Image, marks: Mapping[str, Value]) -> None:
+        """Write down the values of one image with marks of our own, and those that waited for a date."""
+        row = {name: value for name, value in {**image.values, **marks}.items() if name in QUANTITIES}
         if image.true_time is None:
             if image.link_ok:
                 self._waiting.append((image.monotonic, row))

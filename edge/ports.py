@@ -258,6 +258,8 @@ class Snapshot:
     """From `UpdateService.describe`."""
     problems: Sequence[str] = ()
     """One line for each service that reports itself unwell (store, planning, exchange, configuration)."""
+    separating_test: Mapping[str, object] = field(default_factory=dict)
+    """The separating test that was approved last, and how it stands; from `SeparatingTests.describe`."""
     writes_left: Mapping[str, int] = field(default_factory=dict)
     """For each register with a daily budget: writes left in the running 24 h."""
 

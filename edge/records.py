@@ -23,7 +23,7 @@ class WriteRecord:
     applied: float | None
     """What was written; None when nothing was."""
     source: str
-    """Who asked: override, plan, last_plan, recipe, hands_off, interlock, hand or stop."""
+    """Who asked: override, separating_test, plan, last_plan, recipe, hands_off, interlock, hand or stop."""
     reason: str
     """Why applied differs from requested, or what an interlock or a hand gets back; else empty."""
     outcome: str

@@ -37,7 +37,9 @@ def setpoint_statuses(
         )
         if name in forced:
             status = replace(status, source="interlock", why=forced[name])
-        elif memory is not None and memory.taken is not None:
-            status = replace(status, source="interlock", why=f"on its way back to {memory.taken:g}")
+        elif choice is None and memory is not None and memory.taken is not None:
+            status = replace(
+                status, source=memory.taken_by.partition(" ")[0], why=f"on its way back to {memory.taken:g}"
+            )
         statuses[name] = status
     return statuses

@@ -44,6 +44,7 @@ def snapshot_of(
         plan=plan,
         bundle=services.updates.describe(),
         problems=tuple(filter(None, found)),
+        separating_test=control.separating_tests.describe(),
         writes_left={
             name: rule.daily_budget - len(points[name].budget)
             for name, rule in rules.items()

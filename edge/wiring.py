@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from igrow import __version__
+from igrow.core.agronomy import Place
 from igrow.core.simulator.hindcast import HindcastPredictor
 from igrow.core.sun import position
 from igrow.edge.bus.plc import RegisterPlc
@@ -33,6 +34,8 @@ from igrow.edge.ports import Exchange, Plan, PlanningService, StatusService, Sto
 from igrow.edge.registers.model import TWIN_SUFFIX
 from igrow.edge.remembering import StateNotes, registers_of
 from igrow.edge.sensors import ImageBuilder, TwinSensors
+from igrow.edge.separating_tests import SeparatingTests, approval_file, possible
+from igrow.edge.separating_tests.possible import conditions_of
 from igrow.edge.sources import (
     FreshPlan,
     GrowerOverride,
@@ -116,6 +119,7 @@ class Control:
     climate_alarms: ClimateAlarms
     acknowledged: AcknowledgementWatch
     override: GrowerOverride
+    separating_tests: SeparatingTests
 
     @property
     def lockstep(self) -> bool:
@@ -217,6 +221,7 @@ def build_control(
     override = GrowerOverride(
         StateFile(override_file(configuration.state_folder), services.state_files), boot, journal.event
     )
+    tests = _separating_tests(configuration, services, boot, journal)
     recipe = RecipeSource(file.recipe, configuration.zone)
     hands_off = HandsOff({name: rules.points[name].safe for name in configuration.setpoints})
     cycle = ControlCycle(
@@ -227,6 +232,7 @@ def build_control(
         ),
         [
             override,
+            tests,
             WantedRecipe(override, recipe, hands_off),
             FreshPlan(keeper, fresh_for=1.5 * every),
             LastValidPlan(keeper),
@@ -247,6 +253,7 @@ def build_control(
         journal,
         setpoints=configuration.setpoints,
         respect_hand=respect_hand,
+        marks_tests=file.separating_tests.permitted,
         keep=notes.keep,
     )
     return Control(
@@ -256,7 +263,21 @@ def build_control(
             StateFile(configuration.state_folder / ACKNOWLEDGED_FILE, services.state_files), journal.event
         ),
         override,
+        tests,
     )  # fmt: skip
+
+
+def _separating_tests(configuration: Configuration, services: Services, boot: str, journal: Journal) -> SeparatingTests:
+    found = possible(configuration)
+    return SeparatingTests(
+        StateFile(approval_file(configuration.state_folder), services.state_files),
+        found,
+        {name: conditions_of(test, configuration.site) for name, test in found.items()},
+        configuration.setpoints,
+        Place.of(configuration.site),
+        boot,
+        journal.event,
+    )
 
 
 def _schedule(configuration: Configuration, services: Services) -> PlanningSchedule | None:

@@ -21,6 +21,8 @@ class Kind(Enum):
     YIELD = "yield"
     SETPOINT = "setpoint"
     ACTUATOR = "actuator"
+    MARK = "mark"
+    """Written by the gateway itself: no register has it."""
 
 
 @dataclass(frozen=True)
@@ -98,6 +100,11 @@ def _quantity_table() -> Mapping[str, Quantity]:
             ("lamp_power", "W m-2", 0.0, 500.0, "electric power of the lamps per floor area"),
             ("co2_dosing", "kg m-2 h-1", 0.0, 0.1, "carbon dioxide dosed per floor area"),
             ("irrigation", "L m-2 h-1", 0.0, 60.0, "irrigation water per floor area"),
+            optional=True,
+        ),
+        *rows(
+            Kind.MARK,
+            ("separating_test", "1", 0.0, 1.0, "fraction of the time that a separating test moved the plant"),
             optional=True,
         ),
     ]

@@ -17,6 +17,10 @@ COMMANDS = {
     "plan": ("igrow.edge.cli.plan", "compute one plan now, from the bundle in force and the log, and print it"),
     "forecast": ("igrow.edge.cli.forecast", "fetch the weather forecast that plans read"),
     "override": ("igrow.edge.cli.override", "set a setpoint by hand for some time, or give it back"),
+    "separating-test": (
+        "igrow.edge.cli.separating_test",
+        "list the tests that tell causes apart, approve one, or withdraw it",
+    ),
     "alarms": ("igrow.edge.cli.alarms", "list the alarms, or say that you know of them"),
     "notify": ("igrow.edge.cli.notify", "tell people of alarms, by e-mail, ntfy or a web hook"),
     "mqtt": ("igrow.edge.cli.mqtt", "publish the daemon's state to an MQTT broker"),

@@ -11,6 +11,7 @@ from typing import Any
 
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import QUANTITIES
+from igrow.core.separating_tests import separating_tests_for
 from igrow.edge.cli.common import add_configuration, configuration_of
 from igrow.edge.status.client import STATUS_FILE, fetch, last_state
 
@@ -68,6 +69,7 @@ def lines(state: Mapping[str, Any]) -> Iterator[str]:
         yield f"plan     of {_date(plan['start'])}: {_number(expected)} EUR m-2 expected, the recipe {_number(recipe)}"
     bundle = state.get("bundle") or {}
     yield f"bundle   {bundle.get('name') or 'none'}"
+    yield from _separating_test(state)
     for alarm in state["alarms"]:
         yield f"ALARM    {alarm['level']}: {alarm['text']}"
     for problem in state["problems"]:
@@ -75,6 +77,18 @@ def lines(state: Mapping[str, Any]) -> Iterator[str]:
     for clamp in list(state["clamps"])[:5]:
         applied = "nothing" if clamp["applied"] is None else _number(clamp["applied"])
         yield f"clamp    {clamp['point']}: asked {_number(clamp['requested'])}, applied {applied}: {clamp['reason']}"
+
+
+def _separating_test(state: Mapping[str, Any]) -> Iterator[str]:
+    """Yield how the approved test stands, and which ones would tell apart what the diagnosis could not."""
+    approved = state.get("separating_test") or {}
+    if approved:
+        ended, waits = approved["ended"], approved["waits_for"]
+        how = "it runs" if approved["running"] else ended or f"it waits: {waits or 'the next cycle begins it'}"
+        yield f"test     {approved['test']}, approved by {approved['by']}: {how}"
+    for effects in (state.get("bundle") or {}).get("confounded", ()):
+        for test in separating_tests_for(effects):
+            yield f"test     {test.name} would tell {' from '.join(effects)} (igrow-edge separating-test)"
 
 
 def _number(value: float | None) -> str:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from igrow.core.separating_tests.definition import SOURCE
 from igrow.edge.guard.interlocks import Force
 from igrow.edge.guard.rules import PointRule
 from igrow.edge.guard.state import Clamp, PointState, Request, Write
@@ -61,7 +62,7 @@ class PointInCycle:
         self, request: Request | None, forces: Sequence[Force], standstill: Standstill | None, *, stopping: bool
     ) -> PointState:
         """Return the point's new memory."""
-        nobody_asks = request is None
+        takes = request is None or not self.rule.decided
         if request is None:
             request = self._giving_back()
         bounds = self._bounds(forces)
@@ -80,7 +81,8 @@ class PointInCycle:
         if target.kind:
             self._clamp(request, target.value, target.reason, target.kind)
         state = self._written(target, request)
-        return self._noting_what_it_took(state, target) if nobody_asks else state
+        by = f"interlock {target.by}" if target.by else "" if request is None else request.source
+        return self._noting_what_was_taken(state, target, by) if takes else state
 
     def left_alone(self, request: Request | None, why: str) -> PointState:
         """Return the point's new memory where nothing at all may be written."""
@@ -88,16 +90,16 @@ class PointInCycle:
             self._clamp(request, self.current, why, "manual")
         return self._rested()
 
-    # an interlock takes and gives back
+    # what is taken is given back
 
-    def _noting_what_it_took(self, state: PointState, target: _Target) -> PointState:
-        """A point that nobody asks for would stay where an interlock has put it, so what it took is noted."""
-        if state.taken is not None or target.kind != "interlock":
+    def _noting_what_was_taken(self, state: PointState, target: _Target, by: str) -> PointState:
+        """A point that nobody asks for would stay where an interlock or a test has put it: note what was taken."""
+        if state.taken is not None or not (target.by or by == SOURCE):
             return state
-        return replace(state, taken=self._standing(), taken_by=target.by)
+        return replace(state, taken=self._standing(), taken_by=by)
 
     def _giving_back(self) -> Request | None:
-        """Ask for what an interlock took; forget it when it is back, or when the PLC has moved the point itself."""
+        """Ask for what was taken; forget it when it is back, or when the PLC has moved the point itself."""
         taken, by, written = self.memory.taken, self.memory.taken_by, self.memory.written
         if taken is None:
             return None
@@ -108,7 +110,9 @@ class PointInCycle:
         if current is not None and self._near(current, taken):
             self.memory = replace(self.memory, taken=None, taken_by="")
             return None
-        return Request(taken, "interlock", f"back to {taken:g}, where it stood before interlock {by} took it")
+        return Request(
+            taken, by if by == SOURCE else "interlock", f"back to {taken:g}, where it stood before {by} took it"
+        )
 
     # where to
 

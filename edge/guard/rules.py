@@ -36,8 +36,8 @@ class PointRule:
     resolution: float = 1e-6
     """The smallest difference that the register can show."""
     decided: bool = True
-    """A source decides it (a setpoint). Otherwise it is the PLC's own, such as a vent: only interlocks move it, and a
-    change there is no hand but the PLC's control."""
+    """A source decides it (a setpoint). Otherwise it is the PLC's own, such as a vent: only interlocks and separating
+    tests move it, and give it back; a change there is no hand but the PLC's control."""
 
     def __post_init__(self) -> None:
         given = (self.low, self.high, self.safe, self.slew, self.dead_band, self.minimum_interval, self.refresh)

@@ -60,9 +60,9 @@ class PointState:
     budget: tuple[float, ...] = ()
     """When the writes of the last 24 h happened, oldest first; kept only for points with a budget."""
     taken: float | None = None
-    """Where a point that no source decides stood before an interlock took it."""
+    """Where a point that no source decides stood before an interlock or a separating test took it."""
     taken_by: str = ""
-    """The interlock that did."""
+    """Which of them did."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -235,7 +235,7 @@ TWIN_SUFFIX = "_2"
 """A second sensor of a quantity has the quantity's name with this suffix."""
 
 POINT_NAMES: tuple[str, ...] = (
-    *QUANTITIES,
+    *(name for name, quantity in QUANTITIES.items() if quantity.kind is not Kind.MARK),
     *SYSTEM_POINTS,
     *(name + TWIN_SUFFIX for name, quantity in QUANTITIES.items() if quantity.kind in (Kind.WEATHER, Kind.CLIMATE)),
 )

@@ -1,6 +1,7 @@
 """Where setpoints come from, in order.
 
-Override, the recipe where the grower wants it, valid plan, last valid plan, recipe, hands off.
+Override, an approved separating test (`igrow.edge.separating_tests`), the recipe where the grower wants it, valid plan,
+last valid plan, recipe, hands off.
 """
 
 from igrow.edge.sources.decision import Choice, Decision, Offer, Source, decide

@@ -16,6 +16,8 @@ class Offer:
 
     why: str
     setpoints: Mapping[str, float] = field(default_factory=dict)
+    lent: Mapping[str, float] = field(default_factory=dict)
+    """Points that are the PLC's own otherwise, such as a vent; it gets them back when nobody offers them any more."""
 
 
 class Source(Protocol):
@@ -23,7 +25,7 @@ class Source(Protocol):
 
     @property
     def name(self) -> str:
-        """The word in the ledger: override, plan, last_plan, recipe or hands_off."""
+        """The word in the ledger: override, separating_test, plan, last_plan, recipe or hands_off."""
 
     def offer(self, image: Image) -> Offer:
         """Return what this source would do in this cycle; never raises for what a grower or a sensor does."""
@@ -40,7 +42,7 @@ class Choice:
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """All setpoints of one cycle."""
+    """All setpoints of one cycle, and what the PLC lends."""
 
     choices: Mapping[str, Choice]
     source: str
@@ -52,6 +54,7 @@ class Decision:
 def decide(sources: Sequence[Source], image: Image, setpoints: Sequence[str]) -> Decision:
     """Return the decision of this cycle. `sources` stand in order of precedence."""
     choices: dict[str, Choice] = {}
+    lent: dict[str, Choice] = {}
     passed_over: list[str] = []
     main_why = ""
     for source in sources:
@@ -63,7 +66,9 @@ def decide(sources: Sequence[Source], image: Image, setpoints: Sequence[str]) ->
             for name in setpoints
             if name in offer.setpoints and name not in choices
         }
-        if taken:
+        also = {name: Choice(value, source.name, offer.why) for name, value in offer.lent.items() if name not in lent}
+        lent.update(also)
+        if taken or also:
             choices.update(taken)
         elif offer.why:
             passed_over.append(offer.why)
@@ -72,4 +77,4 @@ def decide(sources: Sequence[Source], image: Image, setpoints: Sequence[str]) ->
     main_why = next((choice.why for choice in choices.values() if choice.source == main), "no source offers anything")
     if passed_over:
         main_why = f"{main_why} ({'; '.join(passed_over)})"
-    return Decision(choices, main, main_why)
+    return Decision({**choices, **lent}, main, main_why)

@@ -128,6 +128,9 @@ class BundleUpdates:
                 "created": active.manifest.created.isoformat() if active else None,
                 "variant": active.manifest.variant if active else None,
                 "effects": [effect.name for effect in active.manifest.effects] if active else [],
+                "confounded": [[effect.name, *effect.confounded] for effect in active.manifest.effects]
+                if active
+                else [],
                 "pinned": self._life.is_pinned,
                 "previous": state.previous,
                 "candidate": candidate.label if candidate else None,

@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from igrow.core.quantities import QUANTITIES, SETPOINTS
+from igrow.core.quantities import ACTUATORS, QUANTITIES, SETPOINTS
 from igrow.edge.registers.model import Function, Parity, RegisterMap
 from igrow.edge.virtual_plc.memory import DeviceMemory
 from igrow.edge.virtual_plc.modbus_server import ModbusServer
@@ -37,7 +37,8 @@ class VirtualPlc:
     The setpoints in force are those in the writable registers while the heartbeat register changes at least every
     `fallback_after` plant seconds. Otherwise, and before the first heartbeat, the PLC uses its own safe
     setpoints, shows them in the registers, and sets `plc_fallback`; what is written meanwhile is in force from the
-    next heartbeat on.
+    next heartbeat on. An opening that is written to a vent's register is in force until it is `refresh` old, in plant
+    time; the register itself shows where the vent is.
     """
 
     def __init__(
@@ -61,6 +62,9 @@ class VirtualPlc:
         self._sleep = sleep
         self._server = ModbusServer({register_map.devices[name].device_id: self})
         self._setpoints = tuple(name for name in SETPOINTS if name in self.memory.points)
+        self._lent = {name: point for name, point in self.memory.points.items() if point.writable and name in ACTUATORS}
+        self._commanded: dict[str, tuple[float, np.datetime64]] = {}
+        """What was written to each of them, and when."""
         self._heartbeat = self.memory.value("heartbeat") if "heartbeat" in self.memory.points else None
         self._heard: np.datetime64 | None = None
         self._task: asyncio.Task[None] | None = None
@@ -81,6 +85,11 @@ class VirtualPlc:
     def write(self, function: Function, address: int, values: Sequence[int]) -> None:
         """Do a client's write, and look whether it was the heartbeat."""
         self.memory.write(function, address, values)
+        for name, point in self._lent.items():
+            if point.function is function and address <= point.address < address + len(values):
+                value = self.memory.value(name)
+                if value is not None:
+                    self._commanded[name] = (value, self.plant.time)
         if "heartbeat" not in self.memory.points:
             return
         heartbeat = self.memory.value("heartbeat")
@@ -123,10 +132,15 @@ class VirtualPlc:
             value = self.memory.value(name)
             if value is not None:
                 setpoints[name] = value
+        for name, (value, at) in self._commanded.items():
+            refresh = self._lent[name].refresh
+            if refresh is None or self.plant.time - at <= np.timedelta64(round(1000 * refresh), "ms"):
+                setpoints[name] = value
         return setpoints
 
     def _fall_back(self) -> None:
         self._heard = None
+        self._commanded.clear()
         self._set_fallback(True)
         for name in self._setpoints:
             if name in self._safe:

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from igrow.core.errors import IgrowError
 
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 """Raised by one whenever an older reader would misunderstand a newer bundle; older ones are read all the same."""
 
 Json = Any
@@ -77,6 +77,8 @@ class EffectRecord:
     parameters: Mapping[str, Estimate]
     balances: tuple[str, ...] = ()
     onset: Onset | None = None
+    confounded: tuple[str, ...] = ()
+    """Other effects that fitted the log as well; a separating test may tell which it is."""
 
 
 @dataclass(frozen=True)

@@ -167,7 +167,9 @@ def control(
         settings: of the PLC.
         p: parameters of the greenhouse (capacities of its equipment).
         before: the PLC's memory.
-        setpoints: the four setpoints in the registry's units; a missing one is `SAFE_SETPOINTS`' value.
+        setpoints: the four setpoints in the registry's units; a missing one is `SAFE_SETPOINTS`' value. An opening in
+            % under `vent_lee` or `vent_wind` takes the place of the PLC's own demand, within its limits of frost and
+            storm; NaN leaves it to the PLC.
         seen: the readings.
         seconds: until the next call.
     """
@@ -209,11 +211,11 @@ def control(
     frost = ramp(xp, outdoor, s.frost_limit - 2.0, s.frost_limit)
     storm = ramp(xp, seen.wind_speed, s.wind_limit + 5.0, s.wind_limit)
     largest_lee = (0.1 + 0.9 * frost) * (0.5 + 0.5 * storm)
-    lee = xp.minimum(clip(xp, demand, 0.0, 1.0), largest_lee)
-    wind = xp.minimum(clip(xp, demand - s.wind_vent_delay, 0.0, 1.0), frost * storm)
+    lee = _commanded(xp, setpoints.get("vent_lee"), clip(xp, demand, 0.0, 1.0))
+    wind = _commanded(xp, setpoints.get("vent_wind"), clip(xp, demand - s.wind_vent_delay, 0.0, 1.0))
     travel = seconds / s.vent_travel
-    vent_lee = _move(xp, before.vent_lee, lee, travel)
-    vent_wind = _move(xp, before.vent_wind, wind, travel)
+    vent_lee = _move(xp, before.vent_lee, xp.minimum(lee, largest_lee), travel)
+    vent_wind = _move(xp, before.vent_wind, xp.minimum(wind, frost * storm), travel)
 
     # Lamps and screens
     limit = s.lamp_radiation_limit + 50.0 * (before.lamp_allowed - 0.5)
@@ -270,6 +272,11 @@ def control(
         pulse_left=pulse_left - running,
         irrigation=p.irrigation_rate * running / seconds,
     )
+
+
+def _commanded(xp: Any, command: Array | None, own: Array) -> Array:
+    """Return the opening that somebody else commands, 0 to 1, where one is given."""
+    return own if command is None else xp.where(command >= 0.0, 0.01 * command, own)
 
 
 def _move(xp: Any, position: Array, target: Array, travel: float) -> Array:

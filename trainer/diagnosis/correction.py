@@ -239,4 +239,6 @@ def effect_record(finding: Finding) -> EffectRecord:
     }
     began = finding.onset
     onset = None if began is None else Onset(*map(utc_datetime, (began.time, began.low, began.high)))
-    return EffectRecord(finding.effect, EFFECTS[finding.effect].kind, estimates, finding.balances, onset)
+    return EffectRecord(
+        finding.effect, EFFECTS[finding.effect].kind, estimates, finding.balances, onset, finding.confounded[1:]
+    )

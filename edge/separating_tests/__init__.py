@@ -1,0 +1,17 @@
+"""Separating tests at the plant: who approved one, whether this site can run it, and its run."""
+
+from igrow.edge.separating_tests.approval import Approval, approval_file, approve, read_approval, withdraw
+from igrow.edge.separating_tests.possible import lent_points, obstacles, possible
+from igrow.edge.separating_tests.runner import SeparatingTests
+
+__all__ = [
+    "Approval",
+    "SeparatingTests",
+    "approval_file",
+    "approve",
+    "lent_points",
+    "obstacles",
+    "possible",
+    "read_approval",
+    "withdraw",
+]

@@ -1,0 +1,35 @@
+"""The separating tests there are: those that pay by `python -m benchmarks.diagnosis separating`, and no others."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from types import MappingProxyType
+
+from igrow.core.separating_tests.definition import Condition, SeparatingTest, Stage
+
+CALM_NIGHT = (
+    Condition("wind_speed", high=8.0, margin=3.0),
+    Condition("outdoor_temperature", low=0.0, margin=2.0),
+    Condition("rain", high=0.1, if_measured=True),
+)
+"""Vents that stand open at night need air that is neither a storm nor frost, and no rain."""
+
+VENT_SQUARE_WAVE = SeparatingTest(
+    name="vent_square_wave",
+    separates=("vent_backlash", "wind_infiltration", "stack_ventilation"),
+    title="vents that turn back every half hour of a calm night",
+    course=tuple(Stage(30.0, {"vent_lee": opening}) for opening in (15.0, 5.0) * 4),
+    when="night",
+    conditions=CALM_NIGHT,
+    heat=0.0,
+    co2=0.0,
+)
+
+SEPARATING_TESTS: Mapping[str, SeparatingTest] = MappingProxyType({one.name: one for one in (VENT_SQUARE_WAVE,)})
+
+
+def separating_tests_for(effects: Collection[str]) -> tuple[SeparatingTest, ...]:
+    """Return the tests that would tell one of several effects from the others; none for a single effect."""
+    if len(set(effects)) < 2:
+        return ()
+    return tuple(one for one in SEPARATING_TESTS.values() if set(one.separates) & set(effects))
