@@ -89,7 +89,7 @@ def judge(case: Case, telemetry: Telemetry, reference: Reference, rules: Decisio
             )
         break
     errors = diagnosis.errors
-    gains = _expected_gains(evidence.first.design, case, truth) if evidence is not None else (None, None)
+    gains = expected_gains(evidence.first.design, case, truth) if evidence is not None else (None, None)
     return Outcome(
         case,
         diagnosis.verdict,
@@ -106,7 +106,7 @@ def judge(case: Case, telemetry: Telemetry, reference: Reference, rules: Decisio
     )
 
 
-def _expected_gains(design: Design, case: Case, truth: Mapping[str, HiddenEffect]) -> tuple[float | None, float | None]:
+def expected_gains(design: Design, case: Case, truth: Mapping[str, HiddenEffect]) -> tuple[float | None, float | None]:
     """Return half the squared size of a lone true cause over its standard deviation, under the noise that it leaves.
 
     First with the parameters and the nuisance subspace integrated out, then as if they were known.

@@ -25,7 +25,30 @@ VENT_SQUARE_WAVE = SeparatingTest(
     co2=0.0,
 )
 
-SEPARATING_TESTS: Mapping[str, SeparatingTest] = MappingProxyType({one.name: one for one in (VENT_SQUARE_WAVE,)})
+VENT_OPENING = SeparatingTest(
+    name="vent_opening",
+    separates=("co2_offset", "co2_drift", "co2_valve_leak", "soil_respiration", "humidity_offset", "humidity_drift"),
+    title="vents that stand open for two hours of a calm night",
+    course=(Stage(120.0, {"vent_lee": 30.0}),),
+    when="night",
+    conditions=CALM_NIGHT,
+    heat=0.0,
+    co2=0.0,
+)
+DOSING_PAUSE = SeparatingTest(
+    name="dosing_pause",
+    separates=("co2_offset", "co2_drift", "co2_dose_vent_loss", "photosynthesis_decline"),
+    title="two hours without CO2 about noon",
+    course=(Stage(120.0, {"co2_setpoint": 400.0}),),
+    when="day",
+    conditions=(),
+    heat=0.0,
+    co2=0.0,
+)
+
+SEPARATING_TESTS: Mapping[str, SeparatingTest] = MappingProxyType(
+    {one.name: one for one in (VENT_SQUARE_WAVE, VENT_OPENING, DOSING_PAUSE)}
+)
 
 
 def separating_tests_for(effects: Collection[str]) -> tuple[SeparatingTest, ...]:
