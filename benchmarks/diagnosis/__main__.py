@@ -6,8 +6,8 @@ each with a model calibrated on its own first weeks; `transferred` diagnoses the
 `matched` does the like with greenhouses of the simulator's own structure; `same` with greenhouses that have drifted a
 little since their calibration, and asks what has changed in them; `real` diagnoses the public logs. `nuisance` learns
 anew what greenhouses show though nothing is missing, and `rules` fits the bounds that are fitted, both from seeds that
-no case has, and `drift` how greenhouses change with time; `thresholds` prints all rules. Everything is made afresh: an
-hour or so on two cores, most of it for simulated weeks.
+no case has, and `drift` how greenhouses change with time; `separating` asks what tests of the plant bring, and
+`thresholds` prints all rules. Everything is made afresh: an hour or so on two cores, most of it for simulated weeks.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import sys
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from benchmarks.diagnosis import drift, matched, nuisance, real, rules, same
+from benchmarks.diagnosis import drift, matched, nuisance, real, rules, same, separating
 from benchmarks.diagnosis.cases import SEASONS, draw
 from benchmarks.diagnosis.greenhouses import of_seasons, others
 from benchmarks.diagnosis.logs import built_in, reference, simulated_cases
@@ -37,6 +37,7 @@ WHAT = (
     "same",
     "real",
     "drift",
+    "separating",
 )
 OTHER_GREENHOUSES = 8
 SEASONS_USED = ("winter", "spring")
@@ -46,8 +47,10 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.diagnosis", description=__doc__)
     parser.add_argument("what", nargs="?", default="scoring", choices=WHAT)
     parser.add_argument("data", nargs="?", type=Path, help="folder of the public data sets, for `real`")
-    parser.add_argument("--cases", type=int, help="default: 208; of `same` 60")
-    parser.add_argument("--greenhouses", type=int, help="of `same`: in the nursery of a season (default: 6)")
+    parser.add_argument("--cases", type=int, help="default: 208; of `same` 60, of `separating` 1 of each cause")
+    parser.add_argument(
+        "--greenhouses", type=int, help="of `same`, `separating`: in the nursery of a season (default: 6; 2)"
+    )
     parser.add_argument("--tuning", action="store_true", help="of `same`: greenhouses and seeds that rules are set on")
     parser.add_argument("--compartment", default="", help="of `real`: those whose name has this in it (default: all)")
     parser.add_argument("--withheld-only", action="store_true", help="of `real`: leave out lost terms and placebo")
@@ -72,6 +75,8 @@ def main() -> int:
         return rules.main(options.processes)
     if options.what == "thresholds":
         return rules.show()
+    if options.what == "separating":
+        return separating.main(options)
     if options.what == "same":
         return same.main(options)
     count = options.cases or 208

@@ -9,7 +9,7 @@ from igrow.core.separating_tests import SOURCE, Condition, SeparatingTest
 from igrow.edge.alarm_levels import Level
 from igrow.edge.cycle_result import CycleResult
 from igrow.edge.image import Image
-from igrow.edge.ports import AlarmRecord
+from igrow.edge.records import AlarmRecord
 from igrow.edge.sensors.consequences import usable_for_control
 
 ENDING_CLAMPS = frozenset({"crop", "limit", "interlock", "hand", "manual", "doubt", "refused", "budget"})

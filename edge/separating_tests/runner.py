@@ -17,7 +17,7 @@ from igrow.edge.cycle_result import CycleResult
 from igrow.edge.hand_off import LateError
 from igrow.edge.image import Image
 from igrow.edge.moment import Moment
-from igrow.edge.ports import AlarmRecord
+from igrow.edge.records import AlarmRecord
 from igrow.edge.separating_tests.approval import Approval, approval_of, to_plain
 from igrow.edge.separating_tests.hindrances import by_cycle, by_image, by_sun, does_not_follow
 from igrow.edge.sources.decision import Offer

@@ -44,6 +44,8 @@ NAMES: Mapping[str, str] = {
     "lamp_power": N_("lamp power"),
     "co2_dosing": N_("CO2 dosing"),
     "irrigation": N_("irrigation"),
+    # written by the gateway
+    "separating_test": N_("separating test"),
     # what the simulator derives
     "mean_height": N_("mean height"),
     "elapsed_days": N_("time since it began"),

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import pytest
 
 from igrow.core.simulator import actuation
 from igrow.core.simulator.hybrid.nominal import nominal, site_record
-from igrow.trainer.fit.actuation import fit_actuation, setpoint_columns
+from igrow.trainer.fit.actuation import by_its_own_rules, fit_actuation, setpoint_columns
 from igrow.trainer.fit.climate import site_prior
 from igrow.trainer.research.forecasts.forecaster import fit_forecaster
 from igrow.trainer.research.forecasts.totals import daily_totals
@@ -27,6 +29,27 @@ def test_rules_fitted_to_a_log_do_what_its_computer_did() -> None:
         got = actuation.targets(np, setpoints, seen, seen, seen, rules)[name]
         assert np.abs(got - wanted).mean() < size, name
     assert rules["lamp_capacity"] == usual["lamp_capacity"]
+
+
+def test_what_a_separating_test_asked_of_the_vents_is_no_rule_of_the_plc() -> None:
+    log = virtual_log(10, seed=8)
+    record = site_record(log, SITE, 300.0)
+    setpoints, _ = setpoint_columns(log, record)
+    wanted = fit_actuation([(record, setpoints, None)], nominal(SITE))
+    night = log["global_radiation"] <= 0.0
+    tested = log.with_columns({"vent_lee": np.where(night, 60.0, log["vent_lee"])})
+    disturbed = site_record(tested, SITE, 300.0)
+    astray = fit_actuation([(disturbed, setpoints, None)], nominal(SITE))
+    rows = by_its_own_rules(tested.with_columns({"separating_test": 1.0 * night}), disturbed)
+    assert (~rows).sum() == night.sum()
+    found = fit_actuation([(disturbed, setpoints, rows)], nominal(SITE))
+
+    def off(rules: Mapping[str, float]) -> float:
+        seen = {**record.inputs, **record.measured, "par": np.zeros(len(record))}
+        one, two = (actuation.targets(np, setpoints, seen, seen, seen, each)["vent_lee"] for each in (rules, wanted))
+        return float(np.abs(one - two)[~night].mean())
+
+    assert off(found) < 0.3 * off(astray)
 
 
 @pytest.mark.parametrize(("limit", "found"), [(150.0, (130.0, 170.0)), (1500.0, (1500.0, 1500.0))])

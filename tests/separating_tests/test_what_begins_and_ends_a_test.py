@@ -20,7 +20,8 @@ from igrow.edge.guard import Clamp, GuardState, Verdict
 from igrow.edge.guard.interlocks import Force
 from igrow.edge.hand_off import HandOff
 from igrow.edge.image import Image
-from igrow.edge.ports import AlarmRecord, SetpointStatus
+from igrow.edge.ports import SetpointStatus
+from igrow.edge.records import AlarmRecord
 from igrow.edge.separating_tests import SeparatingTests, approval_file
 from igrow.edge.separating_tests.approval import Approval, read_approval, to_plain
 from igrow.edge.separating_tests.runner import BEGAN_ANEW, COMPLETED

@@ -168,8 +168,8 @@ def test_what_the_map_does_not_let_be_written_is_refused() -> None:
     async def story(virtual: VirtualPlc, client: RegisterPlc) -> None:
         bus = client.buses["greenhouse_network"]
         for request in (
-            WriteRequest(1, Function.HOLDING, 9, (1,)),
-            WriteRequest(1, Function.HOLDING, 8, (1, 2)),
+            WriteRequest(1, Function.HOLDING, 11, (1,)),
+            WriteRequest(1, Function.HOLDING, 10, (1, 2)),
             WriteRequest(1, Function.COIL, 0, (1,)),
         ):
             with pytest.raises(AddressRefusedError):

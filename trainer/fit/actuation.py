@@ -15,6 +15,7 @@ from igrow.core import gaps
 from igrow.core.arrays import Floats, Mask
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import SETPOINTS
+from igrow.core.separating_tests.definition import SOURCE
 from igrow.core.simulator import actuation
 from igrow.core.simulator.actuation import RULES
 from igrow.core.simulator.hybrid import climate
@@ -58,6 +59,12 @@ def setpoint_columns(telemetry: Telemetry, record: Record) -> tuple[dict[str, Fl
             measured = record.measured["air_temperature" if name == "heating_setpoint" else "air_co2"]
             columns[name] = _usual_course(measured, record.step)
     return columns, tuple(inferred)
+
+
+def by_its_own_rules(telemetry: Telemetry, record: Record) -> Mask:
+    """Return the rows in which the PLC followed its rules, since no separating test moved the plant, (n,)."""
+    marked = to_grid(telemetry, int(record.step)).columns.get(SOURCE)
+    return np.ones(len(record), dtype=bool) if marked is None else ~(marked > 0.0)
 
 
 def fit_actuation(

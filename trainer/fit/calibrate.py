@@ -23,7 +23,7 @@ from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
 from igrow.trainer.data import Log
 from igrow.trainer.data.splits import alternate_weeks
-from igrow.trainer.fit.actuation import fit_actuation, setpoint_columns
+from igrow.trainer.fit.actuation import by_its_own_rules, fit_actuation, setpoint_columns
 from igrow.trainer.fit.climate import fit_climate
 from igrow.trainer.fit.evaluation import evaluate
 from igrow.trainer.fit.gaussian import Gaussian
@@ -71,7 +71,7 @@ def calibrate(
     record = log.record(alignment)
     posterior = fit_climate([(record, None)], before.posterior, progress=progress)
     setpoints, inferred = setpoint_columns(log.telemetry, record)
-    rules = fit_actuation([(record, setpoints, None)], posterior.values)
+    rules = fit_actuation([(record, setpoints, by_its_own_rules(log.telemetry, record))], posterior.values)
     say("rules of the climate computer fitted")
     stages = before.crop or crop_of(read_bundle(default_bundle_folder()))
     crop, growth = growth_of_log(log, record, posterior.values, stages)
