@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
+from igrow.core.arrays import Array
 from igrow.core.simulator import actuation
 from igrow.core.simulator.hybrid.nominal import nominal, site_record
 from igrow.trainer.fit.actuation import by_its_own_rules, fit_actuation, setpoint_columns
@@ -40,12 +41,12 @@ def test_what_a_separating_test_asked_of_the_vents_is_no_rule_of_the_plc() -> No
     tested = log.with_columns({"vent_lee": np.where(night, 60.0, log["vent_lee"])})
     disturbed = site_record(tested, SITE, 300.0)
     astray = fit_actuation([(disturbed, setpoints, None)], nominal(SITE))
-    rows = by_its_own_rules(tested.with_columns({"separating_test": 1.0 * night}), disturbed)
+    rows = by_its_own_rules(tested.with_columns({"separating_test": night.astype(np.float64)}), disturbed)
     assert (~rows).sum() == night.sum()
     found = fit_actuation([(disturbed, setpoints, rows)], nominal(SITE))
 
     def off(rules: Mapping[str, float]) -> float:
-        seen = {**record.inputs, **record.measured, "par": np.zeros(len(record))}
+        seen: dict[str, Array] = {**record.inputs, **record.measured, "par": np.zeros(len(record))}
         one, two = (actuation.targets(np, setpoints, seen, seen, seen, each)["vent_lee"] for each in (rules, wanted))
         return float(np.abs(one - two)[~night].mean())
 

@@ -159,7 +159,7 @@ def test_weather_and_climate_keep_it_from_beginning_and_end_it(
     assert quantity in gateway.why
 
 
-HINDRANCES = {
+HINDRANCES: dict[str, dict[str, Any]] = {
     "an override": {"choices": {"heating_setpoint": Choice(16.0, "override", "")}},
     "a hand": {"statuses": {"heating_setpoint": SetpointStatus(None, None, None, "", "", held_until=1e9)}},
     "an interlock": {"engaged": (Force("wind", {}, "wind_speed 20, above 15"),)},
