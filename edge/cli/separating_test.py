@@ -42,12 +42,10 @@ def run(options: argparse.Namespace) -> int:
 
 def _listed(configuration: Configuration) -> list[str]:
     """Return a line or two on each test, and how the approved one stands."""
-    site, lines = configuration.site, []
-    prices, area = site.prices, site.greenhouse.floor_area
+    lines = []
     for name, obstacle in obstacles(configuration).items():
         test = SEPARATING_TESTS[name]
-        euros = area * test.euros(prices.heat, prices.co2[0].price)
-        what = f"{test.title}; {test.minutes:.0f} min by {test.when}, at most EUR {euros:.2f}"
+        what = f"{test.title}; {test.minutes:.0f} min by {test.when}"
         lines.append(f"{name}: {what}; tells {', '.join(test.separates)}")
         lines.append(f"  not here: {obstacle}" if obstacle else "  may be approved")
     approval = read_approval(approval_file(configuration.state_folder))

@@ -1,4 +1,4 @@
-"""The separating tests there are: those that pay by `python -m benchmarks.diagnosis separating`, and no others."""
+"""The separating tests there are; `python -m benchmarks.diagnosis separating` prints what each brings."""
 
 from __future__ import annotations
 
@@ -21,8 +21,6 @@ VENT_SQUARE_WAVE = SeparatingTest(
     course=tuple(Stage(30.0, {"vent_lee": opening}) for opening in (15.0, 5.0) * 4),
     when="night",
     conditions=CALM_NIGHT,
-    heat=0.0,
-    co2=0.0,
 )
 
 VENT_OPENING = SeparatingTest(
@@ -32,8 +30,6 @@ VENT_OPENING = SeparatingTest(
     course=(Stage(120.0, {"vent_lee": 30.0}),),
     when="night",
     conditions=CALM_NIGHT,
-    heat=0.0,
-    co2=0.0,
 )
 DOSING_PAUSE = SeparatingTest(
     name="dosing_pause",
@@ -42,8 +38,6 @@ DOSING_PAUSE = SeparatingTest(
     course=(Stage(120.0, {"co2_setpoint": 400.0}),),
     when="day",
     conditions=(),
-    heat=0.0,
-    co2=0.0,
 )
 
 SEPARATING_TESTS: Mapping[str, SeparatingTest] = MappingProxyType(

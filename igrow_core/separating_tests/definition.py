@@ -2,7 +2,7 @@
 
 A step test, as system identification calls it (Ljung 1999, System Identification, chapter 13): the diagnosis names
 effects that fit as well as each other, and a known course of a few openings or setpoints makes them differ. One
-definition says what is moved, when it may begin, what ends it, and what it costs; gateway, trainer, page and benchmark
+definition says what is moved, when it may begin and what ends it; gateway, trainer, page and benchmark
 read it here. A test moves nothing by itself: the gateway's daemon asks its guard for the course, like any other source.
 """
 
@@ -66,10 +66,6 @@ class SeparatingTest:
     """The whole of it lies between sunset and sunrise, or between sunrise and sunset."""
     conditions: tuple[Condition, ...]
     """Of the weather and the climate, beside the crop's own limits; see `climate_conditions`."""
-    heat: float
-    """MJ m-2 that the heating takes for it at most, as `python -m benchmarks.diagnosis separating` prints it."""
-    co2: float
-    """kg m-2 of dosed CO2, likewise; negative where dosing pauses."""
 
     @property
     def points(self) -> tuple[str, ...]:
@@ -85,10 +81,6 @@ class SeparatingTest:
         """Return what stands so many minutes after the beginning, None once it is over."""
         ends = accumulate(stage.minutes for stage in self.course)
         return next((stage.values for stage, end in zip(self.course, ends, strict=True) if minutes < end), None)
-
-    def euros(self, heat: float, co2: float) -> float:
-        """Return what it costs at most, EUR m-2, by the prices of heat (EUR MJ-1) and CO2 (EUR kg-1)."""
-        return self.heat * heat + self.co2 * co2
 
     def span(self, point: str) -> tuple[float, float]:
         """Return the smallest and the largest value that it asks of a point."""
