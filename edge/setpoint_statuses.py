@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
+from igrow.core.separating_tests.definition import SOURCE
 from igrow.edge.guard import GuardState, Verdict
 from igrow.edge.image import Image
 from igrow.edge.ports import SetpointStatus
@@ -39,7 +40,9 @@ def setpoint_statuses(
             status = replace(status, source="interlock", why=forced[name])
         elif choice is None and memory is not None and memory.taken is not None:
             status = replace(
-                status, source=memory.taken_by.partition(" ")[0], why=f"on its way back to {memory.taken:g}"
+                status,
+                source=SOURCE if memory.taken_by == SOURCE else "interlock",
+                why=f"on its way back to {memory.taken:g}",
             )
         statuses[name] = status
     return statuses

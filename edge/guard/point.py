@@ -81,8 +81,8 @@ class PointInCycle:
         if target.kind:
             self._clamp(request, target.value, target.reason, target.kind)
         state = self._written(target, request)
-        by = f"interlock {target.by}" if target.by else "" if request is None else request.source
-        return self._noting_what_was_taken(state, target, by) if takes else state
+        by = target.by or (SOURCE if request is not None and request.source == SOURCE else "")
+        return self._noting_what_was_taken(state, by) if takes else state
 
     def left_alone(self, request: Request | None, why: str) -> PointState:
         """Return the point's new memory where nothing at all may be written."""
@@ -92,9 +92,9 @@ class PointInCycle:
 
     # what is taken is given back
 
-    def _noting_what_was_taken(self, state: PointState, target: _Target, by: str) -> PointState:
+    def _noting_what_was_taken(self, state: PointState, by: str) -> PointState:
         """A point that nobody asks for would stay where an interlock or a test has put it: note what was taken."""
-        if state.taken is not None or not (target.by or by == SOURCE):
+        if state.taken is not None or not by:
             return state
         return replace(state, taken=self._standing(), taken_by=by)
 
@@ -110,9 +110,9 @@ class PointInCycle:
         if current is not None and self._near(current, taken):
             self.memory = replace(self.memory, taken=None, taken_by="")
             return None
-        return Request(
-            taken, by if by == SOURCE else "interlock", f"back to {taken:g}, where it stood before {by} took it"
-        )
+        if by == SOURCE:
+            return Request(taken, SOURCE, f"back to {taken:g}, where it stood before the separating test")
+        return Request(taken, "interlock", f"back to {taken:g}, where it stood before interlock {by} took it")
 
     # where to
 

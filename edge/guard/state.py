@@ -62,7 +62,7 @@ class PointState:
     taken: float | None = None
     """Where a point that no source decides stood before an interlock or a separating test took it."""
     taken_by: str = ""
-    """Which of them did."""
+    """The interlock's name, or `separating_test`."""
 
 
 @dataclass(frozen=True, slots=True)
