@@ -93,7 +93,14 @@ RESULTS = {
         "Whole seasons in greenhouses that no simulator was fitted to",
         ("benchmarks.seasons", "judge"),
         "150 days, through the PLC's own control; what was ripe and picked, less costs; six dark hours for all.",
-        "greenhouses and weather 700; random strategies 5",
+        "greenhouses and weather 700",
+        long=True,
+    ),
+    "season-ranks": Result(
+        "Whether the simulator ranks strategies as a greenhouse does",
+        ("benchmarks.seasons", "rank"),
+        "200 random strategies of 150 days, each expected by the simulator and led through one greenhouse.",
+        "greenhouse and weather 700; strategies 5",
         long=True,
     ),
     "season-plans": Result(

@@ -26,8 +26,9 @@ from igrow.core.greenhouse.plant import Plant
 from igrow.core.greenhouse.sensors import EXACT
 from igrow.core.greenhouse.weather_table import WeatherTable
 from igrow.core.local_time import hour_of_day
-from igrow.core.planner.objective import Outcome
+from igrow.core.planner.objective import Outcome, Simulator
 from igrow.core.planner.plant_simulator import run
+from igrow.core.planner.recent_use import SCALED, factors
 from igrow.core.planner.season import Strategy
 from igrow.core.planner.season.course import RADIATION, asked
 from igrow.core.planner.season.search import Genes
@@ -43,6 +44,12 @@ START = np.datetime64("2020-01-01T23:00:00")
 """Local midnight of the first day."""
 DAY = np.timedelta64(86_400, "s")
 HOUR = np.timedelta64(3600, "s")
+BEFORE = 28
+"""Days under the recipe before it: soil and a grown crop need them to fit each other."""
+JUDGED = 14
+"""The last of them, by which a simulator learns what a house uses."""
+FIRST = -BEFORE - 3
+"""First day of weather, from which the first day under the recipe can be forecast."""
 SEED = 700
 EFFECTS = ("wind_infiltration", "screen_gap", "lamp_heat", "co2_valve_leak", "sky_cooling", "photosynthesis_decline")
 PARTS = ("electricity", "heat", "co2", "upkeep")
@@ -63,8 +70,8 @@ class Morning:
     present: Mapping[str, Values]
     """As measured, by quantity, (N,)."""
     applied: Values
-    """(N, 4), NaN on the first day."""
-    memory: Memory | None
+    """(N, 4)."""
+    memory: Memory
     """Of all rows; `rows` are the way's."""
     rows: slice
     co2_before: Values
@@ -117,16 +124,24 @@ class Houses:
         made = {number: _house(days, number) for number in sorted(set(numbers))}
         each = [made[number] for number in numbers]
         self.hourly = np.stack([one.hourly for one in each])
-        """From three days before the start on, (rows, days, 24, 6)."""
+        """From `FIRST` on, (rows, days, 24, 6)."""
         self.plant = Plant(
             stack([one.parameters for one in each]),
             WeatherTable([one.weather for one in each]),
-            float(unix_seconds(START)),
+            float(unix_seconds(START - BEFORE * DAY)),
             count=len(each),
             effects=[one.effects for one in each],
             disturbances=QUIET,
             sensors=EXACT,
         )
+
+    def weather(self, day: int) -> Values:
+        """Return the weather of a day counted from the season's first, (rows, 24, 6)."""
+        return self.hourly[:, day - FIRST]
+
+    def expected(self, day: int) -> Values:
+        """Return the mean of the three days before it, (rows, 24, 6)."""
+        return np.asarray(self.hourly[:, day - FIRST - 3 : day - FIRST].mean(axis=1))
 
     def measured(self) -> dict[str, Values]:
         """Return what the houses' sensors show, by quantity, (rows,)."""
@@ -144,18 +159,45 @@ class _House:
 
 def _house(days: int, number: int) -> _House:
     rng = np.random.default_rng((SEED, number))
-    weather = generate_weather(START - 3 * DAY, START + (days + 1) * DAY, seed=int(rng.integers(2**31)))
-    hourly = hourly_weather(weather, START - 3 * DAY, 24 * (days + 3)).reshape(days + 3, 24, 6)
+    begin, count = START + FIRST * DAY, days - FIRST
+    weather = generate_weather(begin, START + (days + 1) * DAY, seed=int(rng.integers(2**31)))
+    hourly = hourly_weather(weather, begin, 24 * count).reshape(count, 24, 6)
     varied = GreenhouseParameters().varied(rng, relative=0.08)
     return _House(varied, weather, hourly, [HiddenEffect(str(name)) for name in rng.choice(EFFECTS, 2, replace=False)])
 
 
+@dataclass(frozen=True)
+class Past:
+    """What houses did under the recipe before a season; a row for each."""
+
+    start: np.datetime64
+    initial: Mapping[str, Values]
+    """As measured at the start, (rows,)."""
+    weather: Values
+    """(rows, H, 6)."""
+    setpoints: Values
+    """(rows, H, 4)."""
+    used: Mapping[str, Values]
+    """Heat, electricity and CO2 by day, (rows, days)."""
+
+    def factor(self, simulator: Simulator, row: int) -> dict[str, float]:
+        """Return what a house used over what a simulator says of it, by what is used."""
+        initial = {name: float(value[row]) for name, value in self.initial.items()}
+        said = simulator.simulate(initial, self.weather[row], self.setpoints[[row]], self.start)
+        expected = {name: getattr(said, name)[0, 0].reshape(-1, 24).sum(axis=1) for name in SCALED}
+        # The floor's warmth is not measured; a day later it is known.
+        return factors(
+            {name: one[1:] for name, one in expected.items()}, {name: self.used[name][row, 1:] for name in SCALED}
+        )
+
+
 def lead(
     site: Site, days: int, ways: Mapping[str, Way], houses: Mapping[str, Sequence[int]]
-) -> dict[str, dict[str, Values]]:
-    """Lead houses by each way, and return what each used and picked by day, by way and name, (its houses, days).
+) -> tuple[dict[str, dict[str, Values]], Past]:
+    """Lead houses by each way; return what each used and picked by day, and what all did before.
 
-    `heat` MJ m-2, `electricity` kWh m-2 (and `peak` of it), `co2`, `net_growth` and `kg` (fresh fruit picked) kg m-2.
+    By way and name, (its houses, days): `heat` MJ m-2, `electricity` kWh m-2 (and `peak` of it), `co2`, `net_growth`
+    and `kg` (fresh fruit picked) kg m-2. The past's rows are all ways' houses, one way after the other.
     """
     numbers: list[int] = []
     rows: dict[str, slice] = {}
@@ -163,12 +205,13 @@ def lead(
         rows[name] = slice(len(numbers), len(numbers) + len(houses[name]))
         numbers += houses[name]
     led = Houses(days, numbers)
-    applied, memory, co2 = np.full((len(numbers), 4), np.nan), None, np.zeros(len(numbers))
+    past, applied, memory = settle(site, led)
+    co2 = np.zeros(len(numbers))
     books: dict[str, list[Values]] = {name: [] for name in (*USED, "peak", "kg")}
     began = time.monotonic()
     for day in range(days):
         begin = START + day * DAY
-        expected = led.hourly[:, day : day + 3].mean(axis=1)
+        expected = led.expected(day)
         template = for_site(site, begin, 24, radiation=expected[:, :, RADIATION].mean(axis=0))
         recipe, present = recipe_table(site, begin, 24), led.measured()
         mornings = {
@@ -183,7 +226,7 @@ def lead(
         outcome = run(led.plant, course.setpoints)
         for name, part in rows.items():
             mine = Outcome(**{key: value[:, part] for key, value in vars(outcome).items()})
-            ways[name].learn(mornings[name], mine, led.hourly[part, day + 3])
+            ways[name].learn(mornings[name], mine, led.weather(day)[part])
         peak = is_peak(site.prices, hour_of_day(begin + np.arange(24) * HOUR, site.time_zone))
         for name in USED:
             books[name].append(getattr(outcome, name)[0].sum(axis=-1))
@@ -193,7 +236,36 @@ def lead(
         left = (time.monotonic() - began) / (day + 1) * (days - day - 1)
         print(f"\r{day + 1} of {days} days, {left / 60.0:.0f} min left ", end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
-    return {name: {key: np.stack(one, axis=1)[part] for key, one in books.items()} for name, part in rows.items()}
+    found = {name: {key: np.stack(one, axis=1)[part] for key, one in books.items()} for name, part in rows.items()}
+    return found, past
+
+
+def settle(site: Site, led: Houses) -> tuple[Past, Values, Memory]:
+    """Lead all houses by the recipe until the season; return the past, the last setpoints and what crops have had."""
+    applied, memory = np.full((len(led.hourly), 4), np.nan), None
+    initial: dict[str, Values] = {}
+    setpoints, used = [], []
+    for day in range(-BEFORE, 0):
+        begin = START + day * DAY
+        if day == -JUDGED:
+            initial = {name: value.copy() for name, value in led.measured().items()}
+        radiation = led.expected(day)[:, :, RADIATION].mean(axis=0)
+        recipe = np.repeat(recipe_table(site, begin, 24)[None], len(led.hourly), axis=0)
+        course = for_site(site, begin, 24, radiation=radiation).follow(recipe, applied, memory)
+        applied, memory = course.setpoints[:, -1], course.memory
+        outcome = run(led.plant, course.setpoints)
+        setpoints.append(course.setpoints)
+        used.append({name: getattr(outcome, name)[0].sum(axis=-1) for name in SCALED})
+    judged = np.concatenate([led.weather(day) for day in range(-JUDGED, 0)], axis=1)
+    past = Past(
+        START - JUDGED * DAY,
+        initial,
+        judged,
+        np.concatenate(setpoints[-JUDGED:], axis=1),
+        {name: np.stack([one[name] for one in used[-JUDGED:]], axis=1) for name in SCALED},
+    )
+    assert memory is not None
+    return past, applied, memory
 
 
 def money(site: Site, book: Mapping[str, Values]) -> dict[str, Values]:

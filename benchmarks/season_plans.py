@@ -64,7 +64,7 @@ class Planned(Recipe):
             present,
             dict(zip(SETPOINTS, morning.applied[house].tolist(), strict=True)),
             co2_before=float(morning.co2_before[house]),
-            memory=None if morning.memory is None else one_of(morning.memory, row),
+            memory=one_of(morning.memory, row),
         )
         weather, recipe = np.tile(morning.weather[house], (2, 1)), np.tile(morning.recipe, (2, 1))
         template = for_site(self._site, morning.begin, len(weather), radiation=weather[:, RADIATION])
@@ -122,7 +122,7 @@ def main() -> int:
         "by price": Planned(site, simulator, None, given.generations),
         "by season": Planned(site, simulator, plan, given.generations),
     }
-    books = lead(site, given.days, ways, {name: list(range(given.houses)) for name in ways})
+    books, _ = lead(site, given.days, ways, {name: list(range(given.houses)) for name in ways})
     title = f"{given.days} days, energy at today's prices"
     brought(title, {name: (money(site, book), book) for name, book in books.items()})
     return 0

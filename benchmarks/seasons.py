@@ -1,15 +1,16 @@
 """Whole seasons: strategies tuned on a bundle's simulator, led through greenhouses that it does not know.
 
     python -m benchmarks.seasons tune  [--generations 36] [--search genetic CMA-ES]
-    python -m benchmarks.seasons judge [--houses 20] [--ranked 200]
+    python -m benchmarks.seasons judge [--houses 20]
+    python -m benchmarks.seasons rank  [--drawn 200]
 
 `tune` searches, with the same number of simulated seasons each, a rule for the whole season (one date, and a day from
 which on the lamps stay off) and a strategy of six dates, at today's and at doubled prices of energy, and writes them
 to `benchmarks/season_strategies.json`. `judge` leads mechanistic greenhouses by them, each with other parameters (8 %),
 weather and two undeclared effects, through the PLC's own control, and counts fruit that was ripe and picked, less
-costs; then it compares what was expected, and asks whether the simulator puts random strategies in the order that one
-greenhouse does. All, the recipe too, keep the crop's limits, six dark hours among them. Greenhouses and weather are
-not those of the tuning.
+costs; then it compares what was expected, by the bundle alone and corrected by what each house used in the weeks
+before. `rank` asks whether the simulator puts random strategies in the order that one greenhouse does. All, the recipe
+too, keep the crop's limits, six dark hours among them. Greenhouses and weather are not those of the tuning.
 """
 
 from __future__ import annotations
@@ -30,11 +31,14 @@ from scipy.stats import spearmanr
 from scipy.stats import t as student
 
 from benchmarks.planner import SITE, recipe_table
-from benchmarks.season_houses import DAY, PARTS, START, Led, Recipe, Way, lead, money
+from benchmarks.season_houses import DAY, PARTS, START, Led, Past, Recipe, Way, lead, money
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.greenhouse import generate_weather, tomato
 from igrow.core.greenhouse.described import parameters_of
+from igrow.core.planner.objective import Simulator
+from igrow.core.planner.recent_use import Corrected
 from igrow.core.planner.season import Season, Strategy, run_season
+from igrow.core.planner.season.course import STRETCH, typical_days
 from igrow.core.planner.season.search import GENERATIONS, SETTINGS, Genes, Search, genetic, rule_and_strategy
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Site, load_site
@@ -43,11 +47,10 @@ from igrow.trainer.research.policies.environment import hourly_weather
 Values = NDArray[np.float64]
 
 STRATEGIES = Path(__file__).with_name("season_strategies.json")
-TYPICAL = 10
-"""Days for which a typical one stands while strategies are tuned."""
-TUNING_SEEDS = (9_001, 9_002, 9_003)
-RANKED_SEED = 5
+TUNING_SEEDS = tuple(range(9_001, 9_021))
+RANKED_SEED, RANKED_HOUSE = 5, 20
 PRICES = ("today", "doubled")
+GROWN_AND_USED = ("net_growth", "heat", "electricity", "co2")
 
 
 def described(prices: str, days: int) -> Site:
@@ -62,27 +65,19 @@ def described(prices: str, days: int) -> Site:
     return replace(site, prices=replace(site.prices, heat=2 * site.prices.heat, electricity=twice))
 
 
-def typical_days(days: int) -> Values:
-    """Return for each stretch of `TYPICAL` days the one of some years that is nearest to their mean, (T, 24, 6)."""
+def typical_weather(days: int) -> Values:
+    """Return the two typical days of each stretch of some years, (2 S, 24, 6)."""
     years = [generate_weather(START, START + days * DAY, seed=seed) for seed in TUNING_SEEDS]
     hours = np.stack([hourly_weather(year, START, 24 * days) for year in years]).reshape(len(years), days, 24, 6)
-    return np.stack([nearest(hours[:, first : first + TYPICAL]) for first in range(0, days, TYPICAL)])
-
-
-def nearest(hours: Values) -> Values:
-    """Return the day (24, 6) of years and days (Y, D, 24, 6) that is nearest to the mean in warmth, sun and wind."""
-    some = hours.reshape(-1, 24, 6)
-    means = some.mean(axis=1)
-    away = ((means - means.mean(axis=0)) / np.maximum(means.std(axis=0), 1e-9))[:, [0, 3, 4]]
-    day: Values = some[int(np.argmin((away**2).sum(axis=1)))]
-    return day
+    stretches = [hours[:, first : first + STRETCH].reshape(-1, 24, 6) for first in range(0, days, STRETCH)]
+    return np.concatenate([typical_days(one) for one in stretches])
 
 
 def season_of(site: Site, days: int) -> Season:
     """Return the season to be tuned on: the default bundle's simulator, typical weather."""
     simulator = BundleSimulator(read_bundle(default_bundle_folder()), site.greenhouse, members=1)
     recipe = recipe_table(site, START, 24)
-    return Season(site, simulator, parameters_of(site), START, days, typical_days(days), recipe)
+    return Season(site, simulator, parameters_of(site), START, days, typical_weather(days), STRETCH // 2, recipe)
 
 
 def cma_es(
@@ -141,13 +136,11 @@ def judge(arguments: argparse.Namespace) -> None:
     """Lead all houses by all ways at once, and print the tables."""
     given = json.loads(arguments.strategies.read_text(encoding="utf-8"))
     days, kinds = given["days"], ways_of(given["days"])
-    random = np.random.default_rng(RANKED_SEED).random((arguments.ranked, kinds["season"].genes), dtype=np.float32)
-    ways: dict[str, Way] = {"recipe": Recipe(), "random": Led(kinds["season"], random)}
+    ways: dict[str, Way] = {"recipe": Recipe()}
     for prices in PRICES:
         for name, entry in given["strategies"][prices].items():
             ways[f"{name} {prices}"] = Led(kinds[name], np.array([entry["genes"]], dtype=np.float32))
-    houses = {name: list(range(arguments.houses)) for name in ways} | {"random": [arguments.houses] * arguments.ranked}
-    books = lead(described("today", days), days, ways, houses)
+    books, past = lead(described("today", days), days, ways, {name: list(range(arguments.houses)) for name in ways})
     if arguments.json:
         arguments.json.write_text(
             json.dumps({name: {key: one.tolist() for key, one in book.items()} for name, book in books.items()})
@@ -158,8 +151,7 @@ def judge(arguments: argparse.Namespace) -> None:
         brought(
             f"energy at {prices} prices", {name: (money(site, books[key]), books[key]) for name, key in led.items()}
         )
-        expected_and_obtained(site, days, {name: ways[key] for name, key in led.items()}, books, led)
-    ranked(described("today", days), days, kinds["season"], random, books["random"])
+        expected_and_obtained(site, days, {name: ways[key] for name, key in led.items()}, books, led, past)
 
 
 def brought(title: str, found: dict[str, tuple[dict[str, Values], dict[str, Values]]]) -> None:
@@ -180,29 +172,45 @@ def brought(title: str, found: dict[str, tuple[dict[str, Values], dict[str, Valu
         print(f"{name:10s}{other:>12s}" + "".join(f"{cell:12.2f}" for cell in cells))
 
 
-def expected_and_obtained(site: Site, days: int, ways: dict[str, Way], books: Any, led: dict[str, str]) -> None:
-    """Print what the season's simulator expected of each strategy over the median of what was obtained."""
+def expected_and_obtained(
+    site: Site, days: int, ways: dict[str, Way], books: Any, led: dict[str, str], past: Past
+) -> None:
+    """Print the median house's ratio of what was expected to what was obtained, by strategy.
+
+    As the season's simulator has it, and corrected by what each house used under the recipe before the season.
+    """
     season = season_of(site, days)
     crop = tomato.mature_crop(season.plant, 1.0)
     heads = ("net", "kg", "growth", "heat", "electricity", "CO2")
     print(f"{'expected / obtained':22s}" + "".join(f"{name:>12s}" for name in heads))
     for name, way in ways.items():
-        if isinstance(way, Led):
-            outcome, book = run_season(season, way.strategy, way.genes, crop), books[led[name]]
-            pairs = [(outcome.balance.net_profit, money(site, book)["net"]), (outcome.harvest, book["kg"].sum(axis=1))]
-            pairs += [
-                (outcome.used[key], book[key].sum(axis=1)) for key in ("net_growth", "heat", "electricity", "co2")
-            ]
-            print(f"{name:22s}" + "".join(f"{float(one[0]) / np.median(other):12.2f}" for one, other in pairs))
+        if not isinstance(way, Led):
+            continue
+        book = books[led[name]]
+        count = len(book["kg"])
+        had = [money(site, book)["net"], *(book[key].sum(axis=1) for key in ("kg", *GROWN_AND_USED))]
+
+        def said(simulator: Simulator, way: Led = way) -> list[float]:
+            outcome = run_season(replace(season, simulator=simulator), way.strategy, way.genes, crop)
+            parts = (outcome.balance.net_profit, outcome.harvest, *(outcome.used[key] for key in GROWN_AND_USED))
+            return [float(one[0]) for one in parts]
+
+        corrected = [said(Corrected(season.simulator, past.factor(season.simulator, row))) for row in range(count)]
+        for label, expected in ((name, [said(season.simulator)] * count), (f"{name}, corrected", corrected)):
+            ratios = np.median(np.array(expected) / np.stack(had, axis=1), axis=0)
+            print(f"{label:22s}" + "".join(f"{ratio:12.2f}" for ratio in ratios))
 
 
-def ranked(site: Site, days: int, strategy: Strategy, genes: Genes, book: dict[str, Values]) -> None:
+def rank(arguments: argparse.Namespace) -> None:
     """Print Spearman's correlation of net profit over random strategies, expected against one greenhouse's."""
+    days, count = arguments.days, arguments.drawn
+    site, strategy = described("today", days), ways_of(days)["season"]
+    genes = np.random.default_rng(RANKED_SEED).random((count, strategy.genes), dtype=np.float32)
+    books, _ = lead(site, days, {"random": Led(strategy, genes)}, {"random": [RANKED_HOUSE] * count})
     season = season_of(site, days)
-    crop = tomato.mature_crop(season.plant, 1.0)
-    expected = run_season(season, strategy, genes, crop).balance.net_profit
-    found = spearmanr(expected, money(site, book)["net"]).statistic
-    print(f"\nSpearman of net profit over {len(genes)} random strategies, expected against one greenhouse: {found:.3f}")
+    expected = run_season(season, strategy, genes, tomato.mature_crop(season.plant, 1.0)).balance.net_profit
+    found = spearmanr(expected, money(site, books["random"])["net"]).statistic
+    print(f"Spearman of net profit over {count} random strategies, expected against one greenhouse: {found:.3f}")
 
 
 def main() -> int:
@@ -219,8 +227,11 @@ def main() -> int:
     judging.set_defaults(function=judge)
     judging.add_argument("--strategies", type=Path, default=STRATEGIES)
     judging.add_argument("--houses", type=int, default=20)
-    judging.add_argument("--ranked", type=int, default=200, help="random strategies in one more greenhouse")
     judging.add_argument("--json", type=Path, help="file for what each house used and picked by day")
+    ranking = commands.add_parser("rank")
+    ranking.set_defaults(function=rank)
+    ranking.add_argument("--days", type=int, default=150)
+    ranking.add_argument("--drawn", type=int, default=200, help="random strategies")
     arguments = parser.parse_args()
     arguments.function(arguments)
     return 0

@@ -69,6 +69,10 @@ class Outcome:
         """Return what happens in the first hours."""
         return Outcome(**{one.name: getattr(self, one.name)[..., :hours] for one in fields(self)})
 
+    def last(self, hours: int) -> Outcome:
+        """Return what happens in the last hours."""
+        return Outcome(**{one.name: getattr(self, one.name)[..., -hours:] for one in fields(self)})
+
 
 class Simulator(Protocol):
     """Anything that says what setpoints do: a bundle's graph, a model in numpy, the mechanistic greenhouse."""

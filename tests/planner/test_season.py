@@ -27,7 +27,7 @@ DAYS = 40
 @pytest.fixture
 def season(site: Site, weather: np.ndarray, recipe: np.ndarray) -> Season:
     """Forty days of which each ten are like one, in a toy greenhouse."""
-    return Season(site, ToySimulator(), PLANT, START, DAYS, np.stack([weather[:24]] * 4), recipe[:24])
+    return Season(site, ToySimulator(), PLANT, START, DAYS, np.stack([weather[:24]] * 4), 10, recipe[:24])
 
 
 def genes_of(strategy: Strategy, **numbers: float) -> np.ndarray:
@@ -164,3 +164,8 @@ def test_a_day_is_worth_what_it_does_to_the_crop(season: Season, weather: np.nda
     gain = [float((income(one, 3.0) - income(one, 1.0)).mean()) for one in (hungry, full)]
     assert gain[0] > 0.0
     assert gain[1] < 0.95 * gain[0]
+
+
+def test_a_season_without_weather_for_some_of_its_days_is_refused(season: Season) -> None:
+    with pytest.raises(ValueError, match="4 typical days for 10 days each leave some of 41"):
+        replace(season, days=41)

@@ -25,7 +25,7 @@ DAYS = 40
 @pytest.fixture
 def season(site: Site, weather: np.ndarray, recipe: np.ndarray) -> Season:
     """Forty days of which each ten are like one, in a toy greenhouse."""
-    return Season(site, ToySimulator(), PLANT, START, DAYS, np.stack([weather[:24]] * 4), recipe[:24])
+    return Season(site, ToySimulator(), PLANT, START, DAYS, np.stack([weather[:24]] * 4), 10, recipe[:24])
 
 
 @pytest.fixture
@@ -129,3 +129,10 @@ def test_the_search_of_a_season_finds_more_than_its_first_generation(season: Sea
     assert history[-1] > history[0]
     assert value(genes[None])[0] == pytest.approx(history[-1], rel=1e-5)
     assert SETTINGS.offspring == 48
+
+
+def test_usual_weather_is_between_the_cold_and_the_mild_day_of_a_date(plan: SeasonPlan) -> None:
+    warmth = np.arange(4.0)[:, None, None] * np.ones((24, 6))
+    usual = replace(plan, weather=warmth).typical_weather(START + 9 * DAY, 48)
+    np.testing.assert_allclose(usual[[0, 47], 0], 0.5)
+    np.testing.assert_allclose(replace(plan, weather=warmth).typical_weather(START + 39 * DAY, 24)[:, 0], 2.5)

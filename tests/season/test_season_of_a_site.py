@@ -14,7 +14,9 @@ import pytest
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.errors import IgrowError
 from igrow.core.planner import Budget
-from igrow.core.planner.season import SeasonPlan
+from igrow.core.planner.season import SeasonPlan, Strategy, course, run_season
+from igrow.core.planner.season.course import typical_days
+from igrow.core.planner.season.plan import first_crop
 from igrow.core.planner.season.search import genetic
 from igrow.core.site import Crop, Site
 from igrow.edge.cli.plan import reasons
@@ -84,8 +86,24 @@ def test_a_season_without_an_end_is_refused() -> None:
         season.plan_season(SITE, read_bundle(default_bundle_folder()), begins=datetime.date(2026, 7, 1), generations=3)
 
 
-def test_a_typical_day_is_the_one_nearest_to_the_mean() -> None:
-    days = np.zeros((5, 24, 6))
-    days[:, :, 0] = np.array([0.0, 4.0, 5.0, 6.0, 11.0])[:, None]
-    days[:, :, 3] = np.array([0.0, 90.0, 100.0, 130.0, 200.0])[:, None]
-    np.testing.assert_array_equal(season.nearest(days), days[2])
+def test_typical_days_are_a_cold_and_a_mild_one_each_nearest_to_the_mean_of_its_half() -> None:
+    days = np.zeros((6, 24, 6))
+    days[:, :, 0] = np.array([0.0, 11.0, 1.0, 12.0, 4.0, 9.0])[:, None]
+    days[:, :, 3] = np.array([50.0, 90.0, 50.0, 90.0, 50.0, 90.0])[:, None]
+    np.testing.assert_array_equal(typical_days(days), days[[2, 1]])
+    # A cold day under a bright sky is as mild as a warm one under a dull sky.
+    days[:, :, 0], days[:, :, 3] = 5.0, np.array([10.0, 200.0, 20.0, 210.0, 15.0, 205.0])[:, None]
+    assert typical_days(days)[:, 0, 3].tolist() == [15.0, 205.0]
+
+
+def test_where_a_typical_day_begins_is_the_strategy_s_affair(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A cool strategy is not given the warmth of a morning that it never had."""
+    whole = season.season_of(SITE, read_bundle(default_bundle_folder()), FIRST, None, lambda _line: None)
+    ten = replace(whole, days=10, weather=whole.weather[:2])
+    strategy = Strategy(10, 1)
+    cool = np.zeros((1, strategy.genes), dtype=np.float32)
+    heat = []
+    for degrees in (12.0, 24.0):
+        monkeypatch.setitem(course.MORNING, "air_temperature", degrees)
+        heat.append(float(run_season(ten, strategy, cool, first_crop(ten.plant, True)).used["heat"][0]))
+    assert heat[0] == pytest.approx(heat[1], rel=0.1)

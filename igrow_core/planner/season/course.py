@@ -20,9 +20,13 @@ from igrow.core.site import Site
 
 Values = NDArray[np.float64]
 DAY = np.timedelta64(86_400, "s")
-RADIATION = WEATHER.index("global_radiation")
+STRETCH = 10
+"""Days whose weather is lived as two typical days, each for half of them."""
+SUN_WARMS = 0.1
+"""Sol-air temperature above that of the air for each W m-2 of global radiation, K."""
+OUTDOOR, RADIATION, WIND = (WEATHER.index(name) for name in ("outdoor_temperature", "global_radiation", "wind_speed"))
 MORNING = {"air_temperature": 18.0, "air_humidity": 80.0, "air_co2": 600.0, "leaf_area_index": 3.0}
-"""Where a typical day begins, at local midnight."""
+"""Where the day before a typical one begins, at local midnight."""
 
 
 @dataclass(frozen=True)
@@ -37,16 +41,18 @@ class Season:
     """UTC of the first day's local midnight."""
     days: int
     weather: Values
-    """Of typical days, (T, 24, 6): the first stands for the first `days` / T days, and so on."""
+    """Of typical days, (T, 24, 6): the first stands for the first `every` days, and so on."""
+    every: int
+    """Days for which a typical one stands; the last for those that are left."""
     recipe: Setpoints
     """The grower's day, (24, 4), for what strategies say nothing of."""
     first_day: int = 0
     """Day of the season on which the start lies; the strategies' days are counted from the season's beginning."""
 
-    @property
-    def every(self) -> int:
-        """Days for which a typical one stands."""
-        return -(-self.days // len(self.weather))
+    def __post_init__(self) -> None:
+        """Raise ValueError where days are left without weather."""
+        if len(self.weather) * self.every < self.days:
+            raise ValueError(f"{len(self.weather)} typical days for {self.every} days each leave some of {self.days}")
 
 
 @dataclass(frozen=True)
@@ -115,6 +121,26 @@ def run_season(season: Season, strategy: Strategy, genes: NDArray[np.float32], c
     return SeasonOutcome(total, fresh(p, plants) - planted, penalty, plants, used, tuple(crops))
 
 
+def typical_days(days: Values) -> Values:
+    """Return the typical cold and the typical mild one of days (D, 24, 6), (2, 24, 6).
+
+    Heat is needed on cold days alone, so that a mean day needs less than days do on the mean. Days are halved by their
+    sol-air temperature; of each half the one is taken that is nearest to its mean in warmth, sun and wind.
+    """
+    mean = days.mean(axis=1)
+    order = np.argsort(mean[:, OUTDOOR] + SUN_WARMS * mean[:, RADIATION], kind="stable")
+    half = -(-len(days) // 2)
+    return np.stack([_nearest(days[order[:half]]), _nearest(days[order[-half:]])])
+
+
+def _nearest(days: Values) -> Values:
+    """Return the one of days (D, 24, 6) that is nearest to their mean in warmth, sun and wind, (24, 6)."""
+    means = days.mean(axis=1)
+    away = ((means - means.mean(axis=0)) / np.maximum(means.std(axis=0), 1e-9))[:, [OUTDOOR, RADIATION, WIND]]
+    day: Values = days[int(np.argmin((away**2).sum(axis=1)))]
+    return day
+
+
 def believed(outcome: Outcome) -> Values:
     """Return the net growth (B, H) of the first member, less of it outside of the training data."""
     return np.asarray(outcome.net_growth[0] * np.clip(1.0 - DISBELIEF * outcome.outside[0], 0.0, 1.0))
@@ -123,11 +149,14 @@ def believed(outcome: Outcome) -> Values:
 def _typical_day(
     season: Season, strategy: Strategy, genes: NDArray[np.float32], day: int, start: np.datetime64, weather: Values
 ) -> Outcome:
-    template = for_site(season.site, start, 48, radiation=np.tile(weather[:, RADIATION], 2))
+    # The day before is like it: the night that ends in the morning has had its dark hours, or has not, and air and
+    # floor begin as warm as the strategy leaves them. A morning that is the same for all gives to a cool strategy, for
+    # nothing, a tenth of the heat that it needs.
+    twice = np.tile(weather, (2, 1))
+    template = for_site(season.site, start, 48, radiation=twice[:, RADIATION])
     wanted = asked(strategy, genes, season.first_day + day, template, weather, season.recipe)
-    # The day before is like it, so that the night that ends in the morning has had its dark hours, or has not.
-    course = template.follow(np.tile(wanted, (1, 2, 1)), np.full(4, np.nan)).setpoints[:, 24:]
-    return season.simulator.simulate(dict(MORNING), weather, course, start)
+    course = template.follow(np.tile(wanted, (1, 2, 1)), np.full(4, np.nan)).setpoints
+    return season.simulator.simulate(dict(MORNING), twice, course, start - DAY).last(24)
 
 
 def asked(

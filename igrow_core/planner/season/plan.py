@@ -52,7 +52,7 @@ class SeasonPlan:
     crops: tuple[Crop, ...]
     """As they are expected, one crop each: floats, and (STAGES,) for fruit."""
     weather: Values
-    """Of the typical day of each date's stretch, hourly means in the registry's order, (dates, 24, 6)."""
+    """Of each date's typical day, a cold and a mild one in turn, hourly means in the registry's order, (D, 24, 6)."""
 
     @property
     def strategy(self) -> Strategy:
@@ -91,11 +91,12 @@ class SeasonPlan:
         return np.concatenate(days)
 
     def typical_weather(self, time: np.datetime64, hours: int) -> Values:
-        """Return the weather that is usual from a UTC time on, (hours, 6)."""
+        """Return the weather that is usual from a UTC time on, (hours, 6): the mean of the stretch's two days."""
         ahead = time + np.arange(hours) * np.timedelta64(3600, "s")
         since = ((ahead - self.start) / np.timedelta64(3600, "s")).astype(np.int64)
-        stretch = np.clip(since // (24 * self.every), 0, len(self.weather) - 1)
-        return np.asarray(self.weather[stretch, since % 24])
+        cold = np.clip(since // (24 * self.every), 0, len(self.weather) - 1) // 2 * 2
+        mild = np.minimum(cold + 1, len(self.weather) - 1)
+        return np.asarray(0.5 * (self.weather[cold, since % 24] + self.weather[mild, since % 24]))
 
     def worth(
         self, site: Site, time: np.datetime64, present: Mapping[str, float], warmth: float | None = None
