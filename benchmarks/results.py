@@ -91,7 +91,7 @@ RESULTS = {
     ),
     "seasons": Result(
         "Whole seasons in greenhouses that no simulator was fitted to",
-        ("benchmarks.seasons", "judge"),
+        ("benchmarks.seasons", "judge", "--houses", "12"),
         "150 days, through the PLC's own control; what was ripe and picked, less costs; six dark hours for all.",
         "greenhouses and weather 700",
         long=True,
@@ -105,7 +105,7 @@ RESULTS = {
     ),
     "season-plans": Result(
         "A plan a day through a short season",
-        ("benchmarks.season_plans", "--days", "40", "--houses", "3", "--generations", "24"),
+        ("benchmarks.season_plans", "--days", "30", "--houses", "2", "--generations", "24"),
         "With the season's marginal values, and with an average price instead; the same greenhouses for all.",
         "greenhouses and weather 700; searches 0 and on",
         long=True,

@@ -123,8 +123,9 @@ def optimise(
         rng: random numbers; the same generator state gives the same plan unless `budget.seconds` ends the search.
         budget: when to end.
         generation: the genetic algorithm, in numpy or from optimizer.onnx.
-        template: genes to setpoints; by default blocks of the local day, each day its own.
-        seeds: further starting points (H, 4), such as what is left of the last plan.
+        template: genes to setpoints; that of `for_site` by default.
+        seeds: what is known to be good beside the recipe, (H, 4) each, such as what the season asks for. The search
+            starts from what of them its genes can say, and each competes as it is.
         worth: what growth is worth to the crop; by default the average price of the days on which it ripens.
         monotonic: clock in seconds.
 
@@ -141,8 +142,8 @@ def optimise(
     template = template or for_site(site, state.time, hours, radiation=forecast[:, RADIATION])
     objective = Objective(site, time, state.co2_before, worth)
     applied = np.array([state.applied.get(name, np.nan) for name in SETPOINTS])
-    recipe_course = template.follow(recipe[None], applied, state.memory)
-    followed = recipe_course.setpoints[0]
+    known = [template.follow(one[None], applied, state.memory) for one in (recipe, *seeds)]
+    followed = known[0].setpoints[0]
 
     def simulate(setpoints: Setpoints) -> tuple[Outcome, Valuation]:
         outcome = simulator.simulate(dict(state.initial), forecast, setpoints, state.time)
@@ -152,8 +153,8 @@ def optimise(
     # No plan may expect more damp hours than the crop bears, or than the recipe has too where that is more.
     damp = max(site.crop.agronomy.damp_hours, float(damp_hours(recipe_outcome, site)[0]))
 
-    def fitness(genes: NDArray[np.float32]) -> NDArray[np.float32]:
-        outcome, valuation = simulate(template.decode(genes, recipe, applied, state.memory))
+    def fitness(setpoints: Setpoints) -> NDArray[np.float32]:
+        outcome, valuation = simulate(setpoints)
         gain, _ = cautious(valuation, recipe_valuation, site.planning.caution)
         too_damp = np.maximum(damp_hours(outcome, site) - damp, 0.0)
         # The less a candidate leaves the limit the better, but any that does not is better still (Deb 2000, Comput.
@@ -163,14 +164,15 @@ def optimise(
 
     began = monotonic()
     settings = run.settings
+    known_fitness = fitness(np.concatenate([one.setpoints for one in known]))
     offspring = _first_candidates(template, [followed, *seeds], settings.offspring, rng)
     parents = offspring[: settings.parents]
     parent_fitness = np.full(settings.parents, WORST, dtype=np.float32)
     history: list[float] = []
-    evaluations = 1
+    evaluations = 1 + len(known)
     best_at = 0
     for number in range(budget.generations):
-        offspring_fitness = fitness(offspring)
+        offspring_fitness = fitness(template.decode(offspring, recipe, applied, state.memory))
         evaluations += len(offspring)
         random = draw(rng, settings, template.genes)
         parents, parent_fitness, offspring = run(parents, parent_fitness, offspring, offspring_fitness, random)
@@ -180,10 +182,12 @@ def optimise(
         if number - best_at >= budget.patience or monotonic() - began >= budget.seconds:
             break
 
-    follows_recipe = parent_fitness[0] <= 0.0
-    course = recipe_course
-    if not follows_recipe:
+    best_known = int(known_fitness.argmax())
+    course = known[best_known]
+    found = bool(parent_fitness[0] > known_fitness[best_known])
+    if found:
         course = template.follow(template.wanted(parents[:1], recipe), applied, state.memory)
+    follows_recipe = not found and best_known == 0
     plan = course.setpoints[0]
     outcome, valuation = simulate(plan[None])
     _, doubt = cautious(valuation, recipe_valuation, site.planning.caution)
@@ -194,7 +198,7 @@ def optimise(
         recipe_profit=float(recipe_valuation.profit.mean()),
         doubt=float(doubt[0]),
         leaves_range=bool((outcome.outside > 0).any()),
-        follows_recipe=bool(follows_recipe),
+        follows_recipe=follows_recipe,
         history=tuple(history),
         outcome=outcome,
         valuation=valuation,

@@ -1,7 +1,7 @@
 """Candidates: genes from 0 to 1 that stand for setpoints per hour, in blocks of local hours, within the limits.
 
 Cao et al. (2022) search four actions for each of 3984 hours, 15,936 numbers. Growers think in periods of the day,
-and so does the sun; a plan of two days in eight blocks has 16 genes a setpoint and is searched in seconds. The
+and so does the sun; a plan of two days in eight blocks has 8 genes a setpoint and is searched in seconds. The
 blocks begin and end where the electricity tariff changes too. Lamps have a gene for each hour: when a night's dark
 hours end is a matter of the sunset, which no block knows.
 
@@ -169,20 +169,20 @@ def for_site(
     start: np.datetime64,
     hours: int,
     *,
-    days_per_pattern: int = 1,
     starts: Sequence[int] = BLOCK_STARTS,
     radiation: NDArray[np.float64] | None = None,
 ) -> Template:
     """Return the template of a horizon of `hours` from `start` (UTC), in blocks or hours of the site's local day.
 
-    Consecutive local days share one pattern of blocks for `days_per_pattern` days: 1 lets each day differ, a large
-    number repeats one day over a whole season. `radiation` (H,) is the global radiation to be expected, W m-2; without
-    it the sun counts nothing in the crop's light.
+    Each local day has genes of its own but the last, which is like the one before it. A last day of its own, whose
+    night is never seen to end, burns its lamps until the horizon does and lets the house cool down towards it: a gain
+    that is not there, for which the days before are spoiled. `radiation` (H,) is the global radiation to be expected,
+    W m-2; without it the sun counts nothing in the crop's light.
     """
     time = start.astype("datetime64[s]") + np.arange(hours) * np.timedelta64(3600, "s")
     local = to_local(time, site.time_zone)
     day = local.astype("datetime64[D]").astype(np.int64)
-    pattern = (day - day[0]) // days_per_pattern
+    pattern = np.minimum(day - day[0], max(day[-1] - day[0] - 1, 0))
     hour = local.astype("datetime64[h]").astype(np.int64) % 24
     # Hours before the first block's start belong to the last block, which then runs over midnight.
     period = (np.searchsorted(np.array(starts), hour, side="right") - 1) % len(starts)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from igrow.core.planner import Budget, NumpyGeneration, Objective, PlanningState
 from igrow.core.planner.objective import Simulator
 from igrow.core.planner.onnx_generation import OnnxGeneration
 from igrow.core.planner.template import for_site
+from igrow.core.quantities import SETPOINTS
 from igrow.core.site import Site
 from tests.planner.toy_greenhouse import HOURS, START, ToySimulator, with_planning
 
@@ -119,13 +121,33 @@ def test_a_search_ends_with_its_time(site, state, weather, recipe) -> None:
 def test_a_simulator_that_says_nothing_leaves_the_recipe(site, state, weather, recipe) -> None:
     class Broken(ToySimulator):
         def simulate(self, *arguments):
-            from dataclasses import replace
-
             outcome = super().simulate(*arguments)
             broken = outcome.net_growth * np.nan if len(arguments[2]) > 1 else outcome.net_growth
             return replace(outcome, net_growth=broken)
 
     assert plan(Broken(), site, state, weather, recipe).follows_recipe
+
+
+def test_what_the_season_asks_for_competes_as_it_is_and_not_as_the_genes_can_say_it(
+    site, state, weather, recipe
+) -> None:
+    """Warmth at an odd hour, on one day alone, is nothing that blocks and a last day like the first could say."""
+    odd = recipe.copy()
+    odd[29, 0] += 1.0
+
+    class LikesOne(ToySimulator):
+        def simulate(self, *arguments):
+            outcome = super().simulate(*arguments)
+            likes = np.abs(arguments[2] - asked).max(axis=(1, 2)) < 1e-9
+            return replace(outcome, net_growth=np.where(likes, 1e-3, 1e-4)[None, :, None] + 0.0 * outcome.net_growth)
+
+    template = for_site(site, START, HOURS, radiation=weather[:, 3])
+    applied = np.array([state.applied.get(name, np.nan) for name in SETPOINTS])
+    asked = template.follow(odd[None], applied, state.memory).setpoints[0]
+    assert not np.array_equal(asked[:24], asked[24:])
+    found = optimise(LikesOne(), site, state, weather, recipe, np.random.default_rng(0), QUICK, seeds=[odd])
+    np.testing.assert_array_equal(found.setpoints, asked)
+    assert not found.follows_recipe
 
 
 def test_a_forecast_with_a_gap_is_refused(site, state, weather, recipe) -> None:
