@@ -1,12 +1,13 @@
 """Whole seasons: strategies tuned on a bundle's simulator, led through greenhouses that it does not know.
 
     python -m benchmarks.seasons tune  [--generations 36] [--search genetic CMA-ES]
+    python -m benchmarks.seasons expect
     python -m benchmarks.seasons judge [--houses 20]
     python -m benchmarks.seasons rank  [--drawn 200]
 
 `tune` searches, with the same number of simulated seasons each, a rule for the whole season (one date, and a day from
 which on the lamps stay off) and a strategy of six dates, at today's and at doubled prices of energy, and writes them
-to `benchmarks/season_strategies.json`. `judge` leads mechanistic greenhouses by them, each with other parameters (8 %),
+to `benchmarks/season_strategies.json`. `expect` prints what the simulator expects of them. `judge` leads mechanistic greenhouses by them, each with other parameters (8 %),
 weather and two undeclared effects, through the PLC's own control, and counts fruit that was ripe and picked, less
 costs; then it compares what was expected, by the bundle alone and corrected by what each house used in the weeks
 before. `rank` asks whether the simulator puts random strategies in the order that one greenhouse does. All, the recipe
@@ -132,6 +133,20 @@ def tune(arguments: argparse.Namespace) -> None:
         print("\n".join(kinds["season"].table(np.array(best["season"]["genes"], dtype=np.float32), 30)))
 
 
+def expect(arguments: argparse.Namespace) -> None:
+    """Print what the season's simulator expects of the strategies that were written down."""
+    given = json.loads(arguments.strategies.read_text(encoding="utf-8"))
+    days, kinds = given["days"], ways_of(given["days"])
+    print(f"{'prices':10s}{'strategy':10s}" + "".join(f"{head:>12s}" for head in ("net", "kg", *GROWN_AND_USED)))
+    for prices in PRICES:
+        season = season_of(described(prices, days), days)
+        for name, entry in given["strategies"][prices].items():
+            genes = np.array([entry["genes"]], dtype=np.float32)
+            one = run_season(season, kinds[name], genes, tomato.mature_crop(season.plant, 1.0))
+            parts = (one.balance.net_profit, one.harvest, *(one.used[key] for key in GROWN_AND_USED))
+            print(f"{prices:10s}{name:10s}" + "".join(f"{float(part[0]):12.2f}" for part in parts))
+
+
 def judge(arguments: argparse.Namespace) -> None:
     """Lead all houses by all ways at once, and print the tables."""
     given = json.loads(arguments.strategies.read_text(encoding="utf-8"))
@@ -223,6 +238,9 @@ def main() -> int:
     tuning.add_argument("--out", type=Path, default=STRATEGIES)
     tuning.add_argument("--generations", type=int, default=GENERATIONS)
     tuning.add_argument("--search", nargs="+", choices=SEARCHES, default=list(SEARCHES))
+    expecting = commands.add_parser("expect")
+    expecting.set_defaults(function=expect)
+    expecting.add_argument("--strategies", type=Path, default=STRATEGIES)
     judging = commands.add_parser("judge")
     judging.set_defaults(function=judge)
     judging.add_argument("--strategies", type=Path, default=STRATEGIES)

@@ -127,6 +127,8 @@ def test_the_cucumbers_of_2018_have_no_dose_and_say_so(data_folder: Path) -> Non
     assert any("CO2 dosing" in note for note in log.notes)
     assert log.site is not None
     assert log.site.crop.species == "cucumber"
+    assert log.site.crop.dry_matter_fraction < 0.05, "a cucumber holds three times the water of a tomato"
+    assert log.site.crop.days_to_harvest < 21
     assert log.resources is not None
     assert np.nansum(log.resources["co2"]) == pytest.approx(9.9, abs=0.1)
     assert log.harvests is not None

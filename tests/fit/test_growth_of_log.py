@@ -9,7 +9,8 @@ import pytest
 
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.simulator.crop import CropStages
-from igrow.core.simulator.growth import prior_of
+from igrow.core.simulator.growth import GrowthFit, prior_of
+from igrow.core.site import Crop
 from igrow.core.telemetry import Telemetry
 from igrow.trainer import prepare_log
 from igrow.trainer.data import Log
@@ -95,3 +96,13 @@ def test_growth_beyond_what_any_crop_is_known_for_asks_about_the_site_file(
     _, fit = growth_of_log(log, log.record(), PARAMETERS, before)
     site = replace(SITE, crop=replace(SITE.crop, dry_matter_fraction=0.09))
     assert "dry_matter_fraction (0.09)" in growth_notes(site, before, fit)[1]
+
+
+def test_a_crop_that_is_described_as_another_is_told_to_state_its_own(before: CropStages) -> None:
+    site = replace(SITE, crop=Crop(species="cucumber", dry_matter_fraction=0.03))
+    fit = GrowthFit(before.conversion, before.maintenance, prior_of(before), 0, (), float("nan"))
+    told = growth_notes(site, before, fit)[1]
+    missing = "fruit_share (0.7), days_to_harvest (47)"
+    assert told == f"crop.species is cucumber, but {missing} are those of a tomato: state this crop's own"
+    for crop in (Crop(), Crop(species="cucumber", dry_matter_fraction=0.03, fruit_share=0.6, days_to_harvest=14)):
+        assert growth_notes(replace(SITE, crop=crop), before, fit) == (fit.sentence,)
