@@ -5,13 +5,14 @@
     python -m benchmarks.seasons judge [--houses 20]
     python -m benchmarks.seasons rank  [--drawn 200]
 
-`tune` searches, with the same number of simulated seasons each, a rule for the whole season (one date, and a day from
-which on the lamps stay off) and a strategy of six dates, at today's and at doubled prices of energy, and writes them
-to `benchmarks/season_strategies.json`. `expect` prints what the simulator expects of them. `judge` leads mechanistic greenhouses by them, each with other parameters (8 %),
-weather and two undeclared effects, through the PLC's own control, and counts fruit that was ripe and picked, less
-costs; then it compares what was expected, by the bundle alone and corrected by what each house used in the weeks
-before. `rank` asks whether the simulator puts random strategies in the order that one greenhouse does. All, the recipe
-too, keep the crop's limits, six dark hours among them. Greenhouses and weather are not those of the tuning.
+`tune` searches, with the same number of simulated seasons each, a rule for the whole season (one date, and a day
+from which on the lamps stay off) and a strategy of six dates, at today's and at doubled prices of energy, and
+writes them to `benchmarks/season_strategies.json`. `expect` prints what the simulator expects of them. `judge`
+leads mechanistic greenhouses by them, each with other parameters (8 %), weather and two undeclared effects, through
+the PLC's own control, and counts fruit that was ripe and picked, less costs; then it compares what was expected, by
+the bundle alone and corrected by what each house used in the weeks before. `rank` asks whether the simulator puts
+random strategies in the order that one greenhouse does. All, the recipe too, keep the crop's limits, six dark hours
+among them. Greenhouses and weather are not those of the tuning.
 """
 
 from __future__ import annotations
