@@ -40,10 +40,12 @@ _SPEAKING = (
     *(_EDGE / name for name in (
         "climate_alarms.py", "clock.py", "cycle.py", "daemon.py", "guard", "image.py", "journal.py", "overriding.py",
         "planning/forecast.py", "planning/make_plan.py", "planning/process.py", "planning/worker.py",
-        "planning_schedule.py", "sensors", "setpoint_statuses.py", "sources", "stopping.py", "updates", "hand_off.py",
-        "bus/errors.py", "bus/opening.py", "bus/plc.py", "bus/request_slot.py", "exchange/service.py",
-        "exchange/sftp.py", "page/state.py", "status/client.py", "store/store.py", "store/ledger.py",
+        "planning_schedule.py", "sensors", "separating_tests", "setpoint_statuses.py", "sources", "stopping.py",
+        "updates", "hand_off.py", "bus/errors.py", "bus/opening.py", "bus/plc.py", "bus/request_slot.py",
+        "exchange/service.py", "exchange/sftp.py", "page/state.py", "status/client.py", "store/store.py",
+        "store/ledger.py",
     )),
+    _CORE / "separating_tests" / "definition.py",
     *(_TRAINER / name for name in (
         "data/plausibility", "data/screening.py", "diagnosis/open_vents.py", "cli/diagnose.py",
     )),

@@ -12,6 +12,7 @@ from igrow.edge.configuration import Configuration
 from igrow.edge.notifications.acknowledged import ACKNOWLEDGED_FILE, acknowledge
 from igrow.edge.overriding import override
 from igrow.edge.page.words import Words
+from igrow.edge.separating_tests import approve, withdraw
 from igrow.edge.sources.override import RECIPE
 
 HOURS = (1, 2, 4, 8, 12, 24, 48)
@@ -36,6 +37,8 @@ class Actions:
             "recipe": self._recipe,
             "plan": self._plan,
             "acknowledge": self._acknowledge,
+            "approve": self._approve,
+            "withdraw": self._withdraw,
         }
         wanted = known.get(form.get("do", ""))
         if wanted is None:
@@ -80,6 +83,17 @@ class Actions:
         if problem:
             raise IgrowError(problem)
         return self.say.text("Noted: you know of the alarm. It stays here until it is over.")
+
+    def _approve(self, form: Mapping[str, str], by: str) -> str:
+        approval = approve(self.configuration, form.get("test", ""), by=by)
+        said = N_("{test}: approved for one run within {time}. It begins by itself when its weather comes.")
+        return self.say.text(said, test=self.say.title(approval.test), time=self.say.lasting(approval.seconds))
+
+    def _withdraw(self, form: Mapping[str, str], by: str) -> str:
+        approval = withdraw(self.configuration, by=by)
+        if approval is None:
+            raise IgrowError(self.say.text("no test is approved any more"))
+        return self.say.text("{test}: withdrawn.", test=self.say.title(approval.test))
 
     def _setpoint(self, form: Mapping[str, str]) -> str:
         name = form.get("setpoint", "")

@@ -27,6 +27,7 @@ from igrow.edge.page.sessions import Session
 from igrow.edge.page.state import Daemon
 from igrow.edge.page.view import Known, compose, said_by
 from igrow.edge.page.words import Words
+from igrow.edge.separating_tests import approval_file, read_approval
 from igrow.edge.sources.override import read_leases
 from igrow.edge.status.client import STATUS_FILE
 from igrow.edge.store import StoreError
@@ -160,6 +161,7 @@ class Pages:
         return Known(
             configuration, heard, now, span, courses, day, problem,
             read_leases(override_file(state)), read_acknowledged(state / ACKNOWLEDGED_FILE), has_password, language,
+            read_approval(approval_file(state)),
         )  # fmt: skip
 
 

@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from igrow.core.effects import EFFECTS
 from igrow.core.language import ENGLISH, N_
 from igrow.core.quantities import QUANTITIES
 from igrow.core.telemetry import Telemetry, from_rows
 from igrow.edge.configuration import Configuration
 from igrow.edge.notifications.acknowledged import Acknowledgement
-from igrow.edge.page import money, now, panels, plan, setpoints, svg
+from igrow.edge.page import money, now, panels, plan, separating_tests, setpoints, svg
 from igrow.edge.page.actions import HOURS
 from igrow.edge.page.history import SPANS, Course
 from igrow.edge.page.state import Heard
 from igrow.edge.page.words import Words
+from igrow.edge.separating_tests import Approval
 from igrow.edge.sources.override import Lease
 from igrow.edge.sources.recipe import recipe_course
 
@@ -47,6 +47,8 @@ class Known:
     has_password: bool = False
     language: str = ENGLISH.code
     """The visitor's."""
+    approval: Approval | None = None
+    """Of a separating test, the last one."""
 
 
 def compose(known: Known) -> dict[str, Any]:
@@ -109,6 +111,7 @@ def _present(known: Known, state: Mapping[str, Any], say: Words) -> dict[str, An
             (hours, say.text("{hours} h, until {time}", hours=hours, time=say.when(time + 3600 * hours, time)))
             for hours in HOURS
         ],
+        "tests": separating_tests.panel(known.configuration, state, known.approval, say, time),
         "held": matters,
         "routine": routine,
         "points": now.points(state, say, time),
@@ -195,12 +198,8 @@ def model(bundle: Mapping[str, Any], time: float, say: Words) -> dict[str, Any]:
         (say.title(name), *(_error(live.get(f"{name} {ahead}"), name, say) for ahead in ("1_h", "24_h")))
         for name in dict.fromkeys(str(key).split(" ")[0] for key in live)
     ]
-    effects = say.language.listed([_effect(str(effect), say) for effect in bundle.get("effects") or ()])
+    effects = say.language.listed([say.effect(str(effect)) for effect in bundle.get("effects") or ()])
     return {"name": bundle.get("name"), "effects": effects, "said": said, "errors": errors}
-
-
-def _effect(name: str, say: Words) -> str:
-    return say.text(EFFECTS[name].title) if name in EFFECTS else say.spoken(name)
 
 
 def _error(value: float | None, name: str, say: Words) -> str:

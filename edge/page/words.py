@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta, tzinfo
 from zoneinfo import ZoneInfo
 
+from igrow.core.effects import EFFECTS
 from igrow.core.language import LANGUAGES, N_, Language, speak
 from igrow.core.language.units import Shown
 from igrow.core.quantities import QUANTITIES
@@ -16,6 +17,7 @@ from igrow.core.site import Site
 DIGITS = {"degC": 1, "%": 0, "ppm": 0, "W m-2": 0, "m s-1": 1, "1": 0, "deg": 0, "kg m-2 h-1": 4, "umol m-2 s-1": 0}
 DECIDERS = {
     "override": N_("You"),
+    "separating_test": N_("A separating test"),
     "plan": N_("The plan"),
     "last_plan": N_("The last plan"),
     "recipe": N_("Your recipe"),
@@ -61,6 +63,10 @@ class Words:
     def title(self, name: str) -> str:
         """Return the name of a point for people, such as "Air temperature"."""
         return _upper(self.spoken(name))
+
+    def effect(self, name: str) -> str:
+        """Return what an effect is called."""
+        return self.text(EFFECTS[name].title) if name in EFFECTS else self.spoken(name)
 
     def how(self, name: str) -> Shown:
         """Return how a quantity is shown: fractions in per cent."""

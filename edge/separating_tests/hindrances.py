@@ -46,9 +46,10 @@ def by_sun(test: SeparatingTest, place: Place, time: float) -> str:
     """Return an empty text, or that the test does not fit into what is left of this night or day."""
     now = moment(place, time)
     if now.sun_up != (test.when == "day"):
-        return f"it is no {test.when}"
+        return "it is no night" if test.when == "night" else "it is no day"
     if now.hours_to_change * 60.0 < test.minutes:
-        return f"what is left of the {test.when} is too short"
+        night = test.when == "night"
+        return "what is left of the night is too short" if night else "what is left of the day is too short"
     return ""
 
 
@@ -59,7 +60,7 @@ def by_cycle(test: SeparatingTest, result: CycleResult, alarms: Sequence[AlarmRe
     if any(status.held_until is not None for status in result.setpoints.values()):
         return "somebody has changed a setpoint at the PLC"
     for force in result.verdict.engaged:
-        return f"interlock {force.name} is engaged"
+        return f"an interlock is engaged: {force.name}"
     for alarm in alarms:
         if alarm.level is not Level.NOTICE:
             return f"an alarm: {alarm.text}"

@@ -46,6 +46,10 @@ NAMES: Mapping[str, str] = {
     "irrigation": N_("irrigation"),
     # written by the gateway
     "separating_test": N_("separating test"),
+    # separating tests
+    "vent_square_wave": N_("vents to and fro"),
+    "vent_opening": N_("open vents"),
+    "dosing_pause": N_("pause of the CO2 dosing"),
     # what the simulator derives
     "mean_height": N_("mean height"),
     "elapsed_days": N_("time since it began"),

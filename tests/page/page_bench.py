@@ -39,6 +39,17 @@ crop: {planting_date: 2025-12-16}
 """
 
 
+TESTS = """
+separating_tests: {permitted: true}
+guard:
+  points:
+    vent_lee: {low: 0, high: 60, safe: 0, slew: 200, dead_band: 1, minimum_interval: 3 min}
+"""
+"""Lets the grower approve tests."""
+CONFOUNDED = ["vent_backlash", "wind_infiltration"]
+"""What the diagnosis could not tell apart, where a test wants that."""
+
+
 def found_in(pattern: str, text: str) -> str:
     """The part of the text that stands where the pattern's parentheses are."""
     found = re.search(pattern, text, re.MULTILINE)
@@ -189,6 +200,7 @@ def state(**changes: Any) -> dict[str, Any]:
         "bundle": {
             "name": "hillside-3-20260314-3f2a9c1d", "effects": ["wind_infiltration"], "candidate": None, "refusal": "",
             "live_errors": {"air_temperature 1_h": 0.31, "air_temperature 24_h": 0.54},
+            "confounded": [],
             "last_verdict": "adopted: errors in the shadow run are 0.61 times those before",
         },
         "problems": [], "writes_left": {},

@@ -16,9 +16,22 @@ import pytest
 from igrow.core.language import LANGUAGES
 from igrow.edge.overriding import override_file
 from igrow.edge.page.password import hashed, write_password
+from igrow.edge.separating_tests import approval_file, read_approval
 from igrow.edge.sources.override import read_leases
 from tests import needs
-from tests.page.page_bench import PASSWORD, ROOT, Told, alarm, fill_log, pages_of, served, state, write_house
+from tests.page.page_bench import (
+    CONFOUNDED,
+    PASSWORD,
+    ROOT,
+    TESTS,
+    Told,
+    alarm,
+    fill_log,
+    pages_of,
+    served,
+    state,
+    write_house,
+)
 
 LOOKS = [(width, scheme) for width in (390, 1280) for scheme in ("light", "dark")]
 PICTURES = ROOT / "docs" / "page"
@@ -42,7 +55,7 @@ class House:
 @pytest.fixture(scope="module")
 def house(tmp_path_factory) -> Iterator[House]:
     folder, told = tmp_path_factory.mktemp("house"), Told()
-    path = write_house(folder)
+    path = write_house(folder, TESTS)
     fill_log(folder)
     write_password(folder / "state", hashed(PASSWORD))
     with served(pages_of(path, told)) as server:
@@ -77,7 +90,8 @@ def visit(browser, house):
         return page
 
     house.told.said, house.told.silent, house.refusing = state(), False, False
-    override_file(house.folder / "state").unlink(missing_ok=True)
+    for written in (override_file, approval_file):
+        written(house.folder / "state").unlink(missing_ok=True)
     yield open_page
     for context in contexts:
         context.close()
@@ -196,6 +210,28 @@ def test_all_works_without_scripts(visit, house):
     page.get_by_text("Plans decide again").wait_for()
     page.get_by_role("button", name="I know").click()
     page.get_by_text("known to Anna (page)").wait_for()
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_a_separating_test_is_approved_and_withdrawn(visit, house, width):
+    house.told.said["bundle"]["confounded"] = [CONFOUNDED]
+    page = visit(width)
+    sign_in(page)
+    assert violations(page) == []
+    assert fits(page)
+    page.get_by_role("button", name="Approve it, for one run").click()
+    page.get_by_text("Approved by Anna (page).").wait_for()
+    assert violations(page) == []
+    assert fits(page)
+    path = approval_file(house.folder / "state")
+    approval = read_approval(path)
+    assert approval is not None
+    assert (approval.test, approval.by, approval.is_over) == ("vent_square_wave", "Anna (page)", False)
+    page.get_by_role("button", name="Withdraw it").click()
+    page.get_by_text("has ended: withdrawn by Anna (page).").wait_for()
+    ended = read_approval(path)
+    assert ended is not None
+    assert ended.is_over
 
 
 def test_the_page_renews_itself_and_leaves_a_form_in_use_alone(visit, house):

@@ -23,9 +23,10 @@ from igrow.edge.page.sessions import Session
 from igrow.edge.page.state import Heard
 from igrow.edge.page.view import Known, compose
 from igrow.edge.page.words import Words
+from igrow.edge.separating_tests import Approval
 from igrow.edge.sources.override import Lease, read_leases
 from igrow.trainer.translations import catalogue
-from tests.page.page_bench import NOW, alarm, clamp, plan, state, write_house
+from tests.page.page_bench import CONFOUNDED, NOW, TESTS, alarm, clamp, plan, state, write_house
 
 OTHERS = LANGUAGES[1:]
 ENGLISH_WORDS = re.compile(
@@ -73,18 +74,28 @@ def everything() -> dict[str, Any]:
     }
     said["setpoints"]["lamp_on"]["held_until"] = said["monotonic"] + 5400.0
     said["bundle"] |= {"shadow_until": NOW + 7200.0, "candidate": "b-2", "refusal": "refused [x]"}
+    said["bundle"]["confounded"] = [CONFOUNDED, ["co2_offset", "photosynthesis_decline"]]
+    said["separating_test"] = {
+        "test": "vent_square_wave", "by": "Anna", "running": False, "ended": "",
+        "waits_for": "the guard held vent_lee back: above the limit of 60",
+    }  # fmt: skip
+    said["setpoints"]["co2_setpoint"] |= {
+        "source": "separating_test",
+        "why": "the separating test dosing_pause, for 20 min more",
+    }
     return said
 
 
-def shown(folder: Path, code: str, heard: Heard, site: str = "") -> str:
+def shown(folder: Path, code: str, heard: Heard, site: str = "", ended: str = "") -> str:
     """What people read of the page, and what is read to them."""
-    configuration = load_configuration(write_house(folder, site=site))
+    configuration = load_configuration(write_house(folder, TESTS, site))
     times = np.arange(NOW - 86_400.0, NOW, 300.0)
     names = (*CLIMATE, *SETPOINTS, *ACTUATORS, *WEATHER)
     courses = {name: Course(times, *[np.linspace(14.0, 30.0, len(times))] * 3) for name in names}
     leases = {name: Lease(18.0, 7200.0, NOW + 3600.0, by="Anna") for name in ("heating_setpoint", "recipe")}
+    approval = Approval("vent_square_wave", "Anna", 1, 86_400.0, ended=ended)
     known = Known(configuration, heard, NOW, "day", courses, courses, "", leases,
-                  {"link": Acknowledgement("Anna", NOW - 60.0)}, True, code)  # fmt: skip
+                  {"link": Acknowledgement("Anna", NOW - 60.0)}, True, code, approval)  # fmt: skip
     content = {**compose(known), "session": Session("Anna", b"", NOW), "said": "", "said_well": True}
     return text_of(render("page.html", content).body.decode())
 
@@ -92,6 +103,28 @@ def shown(folder: Path, code: str, heard: Heard, site: str = "") -> str:
 def text_of(page: str) -> str:
     spoken = re.sub(r'<[^>]*?(?:aria-label|title)="([^"]*)"[^>]*>', r" \1 ", page)
     return html.unescape(re.sub(r"<code>.*?</code>|<[^>]*>", "\n", spoken))
+
+
+@pytest.mark.parametrize("code", OTHERS)
+@pytest.mark.parametrize(
+    "ended",
+    [
+        "it ran to its end", "withdrawn by Anna", "wind_speed is 8.3, above 8", "air_humidity cannot be believed",
+        "vent_lee shows 3, not the 15 that was written", "its weather did not come in time",
+        "the guard held vent_lee back: above the limit of 10", "the PLC does not answer",
+        "an interlock is engaged: storm", "the clock is wrong",
+        "control began anew while it ran: the daemon was started, or read its configuration, again",
+        "an alarm: wind_speed is frozen: exactly 4.1 for 0.7 h", "what is left of the night is too short",
+    ],
+)  # fmt: skip
+def test_how_a_separating_test_ended_is_told_in_every_language(tmp_path: Path, code: str, ended: str) -> None:
+    heard = Heard(state(bundle={"name": "b", "confounded": [CONFOUNDED]}))
+    text = shown(tmp_path, code, heard, ended=ended)
+    assert speak(code).text("Approve it, for one run") in text
+    last = speak(code).text("The last test, {test}, has ended: {why}").partition("{test}")[0]
+    line = next(line for line in text.splitlines() if last in line)
+    assert set(map(str.lower, ENGLISH_WORDS.findall(line))) <= OWN[code]
+    assert ended not in line
 
 
 @pytest.mark.parametrize("code", OTHERS)
