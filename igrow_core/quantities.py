@@ -44,6 +44,11 @@ class Quantity:
         """Tell whether `value` lies in the valid range (NaN does not)."""
         return self.low <= value <= self.high
 
+    @property
+    def difference_unit(self) -> str:
+        """Unit of an error or a difference: kelvin for a temperature, which units of elsewhere convert without 32."""
+        return "K" if self.unit == "degC" else self.unit
+
 
 def _quantity_table() -> Mapping[str, Quantity]:
     def rows(kind: Kind, *table: tuple[str, str, float, float, str], optional: bool = False) -> list[Quantity]:

@@ -206,4 +206,4 @@ def _error(value: float | None, name: str, say: Words) -> str:
     if value is None:
         return "–"
     # An error is a difference.
-    return say.language.amount(value, QUANTITIES[name].unit.replace("degC", "K"))
+    return say.language.amount(value, QUANTITIES[name].difference_unit)

@@ -31,13 +31,7 @@ LASTING = (
     (5400.0, 3600.0, N_("{count} h")),
     (90.0, 60.0, N_("{count} min")),
 )
-_UTC = r"\d{2} [A-Z][a-z]{2} \d{2}:\d{2} UTC|\d{4}-\d{2}-\d{2} \d{2}:\d{2} UTC"
-_NAME = r"[a-z0-9]+(?:_[a-z0-9]+)+"
-_NUMBER = r"[-−]?\d+(?:\.\d+)?"
-_PART = re.compile(
-    rf"(?P<time>{_UTC})|(?<![\w./-])(?:(?P<name>{_NAME})|(?P<number>{_NUMBER})(?: (?P<unit>degC|K|W m-2|m s-1|g m-3|"
-    r"umol m-2 s-1|kg m-2 h-1))?)(?![\w/-]|[.:]\w)"
-)
+_UTC = re.compile(r"\d{2} [A-Z][a-z]{2} \d{2}:\d{2} UTC|\d{4}-\d{2}-\d{2} \d{2}:\d{2} UTC")
 
 
 @dataclass(frozen=True)
@@ -140,19 +134,15 @@ class Words:
         return text and _upper(text) + ("" if text.endswith((".", "!", "?", "。", "？")) else stop)
 
     def _value(self, part: str, now: float) -> str:
-        """Return what is no text of ours: names, numbers with their units and times are found in it."""
-        return _PART.sub(lambda found: self._found(found, now), part)
+        """Return what is no text of ours: times, names, and numbers with their units are found in it."""
+        between, times = _UTC.split(part), [self._time(found[0], now) for found in _UTC.finditer(part)]
+        return "".join(
+            text for pair in zip(map(self.language.values, between), [*times, ""], strict=True) for text in pair
+        )
 
-    def _found(self, found: re.Match[str], now: float) -> str:
-        if found["time"]:
-            time = _nearest(found["time"], now)
-            return found[0] if time is None else self.when(time, now)
-        if found["name"]:
-            return self.spoken(found["name"])
-        number = float(found["number"].replace("−", "-"))
-        if found["unit"]:
-            return self.amount(number, found["unit"])
-        return found["number"].replace(".", self.language.locale.decimal)
+    def _time(self, text: str, now: float) -> str:
+        time = _nearest(text, now)
+        return text if time is None else self.when(time, now)
 
 
 def _upper(text: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gettext
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -18,6 +19,11 @@ from igrow.core.language.locales import Locale, locale_of
 from igrow.core.language.names import NAMES
 from igrow.core.language.units import US, Shown, Units, written
 
+PART = re.compile(
+    r"(?<![\w./-])(?:(?P<name>[a-z0-9]+(?:_[a-z0-9]+)+)|(?P<number>[-−]?\d+(?:\.\d+)?)(?: (?P<unit>degC|K|W m-2|m s-1|"
+    r"g m-3|umol m-2 s-1|kg m-2 h-1))?)(?![\w/-]|[.:]\w)"
+)
+"""A name of the program, or a number with what unit it has, within a line."""
 LANGUAGES = ("en", "nl", "de", "es", "zh")
 """Codes of the languages; texts are written in the first."""
 
@@ -48,10 +54,24 @@ class Language:
         """
         return sentences.told(line, self.translations.gettext, value)
 
+    def values(self, part: str) -> str:
+        """Return what of a line is no text of ours: names are told, numbers written as people here do, in their units.
+
+        A number without a unit stays as large as it is: nothing says what it measures.
+        """
+        return PART.sub(self._value, part)
+
+    def _value(self, found: re.Match[str]) -> str:
+        if found["name"]:
+            return self.name(found["name"])
+        if found["unit"]:
+            return self.amount(float(found["number"].replace("−", "-")), found["unit"], 4)
+        return found["number"].replace(".", self.locale.decimal)
+
     def name(self, word: str) -> str:
         """Return what people call a quantity, parameter, balance or reason of the program."""
         known = NAMES.get(word)
-        return word.replace("_", " ") if known is None else self.text(known)
+        return word.replace("_", " ").replace("co2", "CO2") if known is None else self.text(known)
 
     def number(self, value: float, digits: int = 2) -> str:
         """Return a number with so many significant digits."""

@@ -10,19 +10,24 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from igrow.core.effects import EFFECTS
 from igrow.core.errors import IgrowError
 from igrow.core.language import LANGUAGES, speak
-from igrow.core.language.units import written
+from igrow.core.language.units import US, written
 from igrow.core.quantities import QUANTITIES
 from igrow.trainer.data import Log
-from igrow.trainer.diagnosis import Diagnosis
+from igrow.trainer.data.plausibility import find_faults
+from igrow.trainer.data.plot import plot_log
+from igrow.trainer.diagnosis import Diagnosis, plots
+from igrow.trainer.diagnosis.open_vents import OpenVents
 from igrow.trainer.diagnosis.persistence import misfits, persistence_errors
 from igrow.trainer.diagnosis.result import Interval
 from igrow.trainer.report import render_report, sentences, write_diagnosis
 from igrow.trainer.report.page import error_rows
 from igrow.trainer.report.worth import Worth, worth
+from tests.diagnosis.conftest import greenhouse_log
 
 
 def with_errors(result: Diagnosis, quantity: str, **stages: float) -> Diagnosis:
@@ -167,8 +172,73 @@ def test_the_log_is_shown_with_what_was_set_aside(page: str) -> None:
 def test_a_fault_of_the_data_has_its_page_too(stuck: Diagnosis) -> None:
     page = render_report(stuck, "de")
     assert "Ein Sensor, der gebraucht wird, arbeitet nicht: Lufttemperatur." in page
-    assert "does not work" in page
+    assert "does not work" not in page
+    assert "were set aside" not in page
     assert page.count("<svg") == 1
+
+
+def test_what_a_fault_of_the_data_saw_is_told_and_its_mend_can_be_copied() -> None:
+    table = greenhouse_log(1, days=8).telemetry
+    table = table.with_columns({"air_temperature": table["air_temperature"] * 1.8 + 32.0})
+    (fault,) = find_faults(table)
+    _, detail = sentences.fault(fault, speak("de"))
+    assert re.search(r"Lufttemperatur .*Median von \d\d,\d", detail)
+    assert "air_temperature: {column: ..., scale: 0.5555556, offset: -17.77778}" in detail
+    assert not re.search(r"\b(has|so it is|in the mapping)\b", detail)
+
+
+def test_a_note_with_figures_is_told_too(leak: Diagnosis) -> None:
+    sentence = OpenVents(-120.0, -110.0, 500).sentence
+    (note,) = sentences.notes(replace(leak, notes=(sentence,)), speak("de"))
+    assert note.startswith("Bei weit offenen Lüftungen zeigt der CO2-Sensor von den ersten Tagen an 115 ppm unter der")
+
+
+def test_errors_and_differences_of_an_american_site_are_in_its_degrees(leak: Diagnosis) -> None:
+    metric, us = speak("en"), speak("en", units="us")
+    errors = with_errors(leak, "air_temperature", deployed=1.0, recalibrated=0.55, corrected=0.5)
+    (row,) = [one for one in error_rows(errors, us) if one.quantity == "air temperature"]
+    assert ([text for text, _ in row.cells], row.unit) == (["1.8", "0.99", "0.9"], "°F")
+    (same,) = [one for one in error_rows(errors, metric) if one.quantity == "air temperature"]
+    assert ([text for text, _ in same.cells], same.unit) == (["1", "0.55", "0.5"], "K")
+    evidence = leak.evidence
+    assert evidence is not None
+
+    def drawn(figure: Figure, panel: int = 0) -> np.ndarray:
+        return np.asarray(max(figure.axes[panel].lines, key=lambda one: np.size(one.get_xdata())).get_xydata())
+
+    ours, theirs = (drawn(plots.worst_day(evidence, "air_temperature", one)) for one in (metric, us))
+    assert theirs[:, 1] == pytest.approx(ours[:, 1] * 1.8 + 32.0)
+    ours, theirs = (drawn(plots.residual_by_date(evidence, one)) for one in (metric, us))
+    assert theirs[:, 1] == pytest.approx(ours[:, 1] * 1.8, nan_ok=True)
+    ours, theirs = (drawn(plots.residual_against_driver(evidence, "wind_speed", one)) for one in (metric, us))
+    assert theirs[:, 0] == pytest.approx(ours[:, 0] * 2.23693629)
+    assert theirs[:, 1] == pytest.approx(ours[:, 1] * 1.8, nan_ok=True)
+    regimes = {"calm": (1.0, 0.5, 1.5), "windy": (2.0, 1.5, 2.5)}
+    ours, theirs = (drawn(plots.coefficient_by_regime(regimes, one, "K")) for one in (metric, us))
+    assert theirs[:, 0] == pytest.approx(ours[:, 0] * 1.8)
+    assert leak.log is not None
+    bands = [
+        plot_log(leak.log, only=("outdoor_temperature",), language=one).axes[0].dataLim.intervaly
+        for one in (metric, us)
+    ]
+    assert bands[1] == pytest.approx(bands[0] * 1.8 + 32.0)
+
+
+def test_the_size_of_a_cause_goes_with_its_unit(leak: Diagnosis) -> None:
+    offset = Interval(1.0, 0.5, 1.5, "K")
+    finding = replace(leak.findings[0], effect="air_temperature_offset", parameters={"offset": offset}, onset=None)
+    assert sentences.cause(finding, speak("en", units="us")) == "The temperature sensor reads 1.8 °F too much."
+    assert sentences.cause(finding, speak("de")) == "Der Temperatursensor zeigt 1 K zu viel an."
+    home = replace(leak, findings=(finding,))
+    assert home.log is not None
+    american = replace(home, log=replace(home.log, site=replace(home.log.known_site, units="us")))
+    assert "<td>1.8</td><td>0.9 to 2.7</td><td>°F</td>" in render_report(american)
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_a_size_whose_unit_is_another_in_america_is_said_with_it(name: str) -> None:
+    effect = EFFECTS[name]
+    assert effect.amplitude.unit not in US or "{value} {unit}" in effect.sentence
 
 
 def test_figures_share_one_style_and_turn_dark_with_the_page(page: str) -> None:

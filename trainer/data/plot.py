@@ -53,7 +53,7 @@ def plot_log(
     block = max(1, len(table) // _MOST_POINTS)
     time = local(table.time[: len(table) // block * block : block], language)
     for axes, name in zip(places, names, strict=True):
-        low, high = thinned(table[name], block)
+        low, high = thinned(language.shown(QUANTITIES[name].unit).all(table[name]), block)
         colour = COLOURS.get(name, COLOURS["weather"])
         axes.fill_between(time, low, high, color=colour, linewidth=0.8, edgecolor=colour)
         for one in log.screened:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from igrow.core.language import N_
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.diagnosis.rules import DecisionRules
 
@@ -34,7 +35,7 @@ class OpenVents:
     def sentence(self) -> str:
         """For the grower."""
         off = 0.5 * (self.first + self.last)
-        where = "below" if off < 0.0 else "above"
+        where = N_("below") if off < 0.0 else N_("above")
         return (
             f"with the vents wide open the CO2 sensor reads {abs(off):.0f} ppm {where} the outdoor air from the first "
             "days on, which is an offset of the sensor and no drift"

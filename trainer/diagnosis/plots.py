@@ -39,19 +39,21 @@ def worst_day(evidence: Evidence, quantity: str, language: Language = ENGLISH) -
     run = int(np.nanargmax(error))
     hours = (1 + np.arange(len(before.shown[quantity]))) * evidence.log.record.step / 3600.0
     figure, (axes,) = panels()
+    unit = QUANTITIES[quantity].unit
+    shown = language.shown(unit)
     measured = before.shown[quantity][:, run] - before.errors[quantity][:, run]
-    axes.plot(hours, measured, color=COLOURS["measured"], label=language.name("measured"))
+    axes.plot(hours, shown.all(measured), color=COLOURS["measured"], label=language.name("measured"))
     for stage, runs in evidence.runs.items():
         axes.plot(
             hours,
-            runs.shown[quantity][:, run],
+            shown.all(runs.shown[quantity][:, run]),
             color=COLOURS[stage],
             linestyle=STROKES[stage],
             label=language.name(stage),
         )
     day = evidence.log.record.time[int(np.argmax(evidence.log.split.day == before.day[run]))]
     axes.set_xlabel(language.text("hours ahead, {day}", day=language.short_day(day)))
-    axes.set_ylabel(f"{language.name(quantity)}, {language.unit(QUANTITIES[quantity].unit)}")
+    axes.set_ylabel(f"{language.name(quantity)}, {language.unit(unit)}")
     legend(axes)
     return figure
 
@@ -79,9 +81,10 @@ def residual_by_date(evidence: Evidence, language: Language = ENGLISH) -> Figure
         counted = line.runs.weight[balance]
         mean = _mean(line.errors[balance], counted)
         quantity = PREDICTED[balance]
+        unit = QUANTITIES[quantity].difference_unit
         axes.axhline(0.0, color=COLOURS["ink"], linewidth=0.8)
-        axes.plot(when, mean, color=COLOURS[quantity], marker="o", markersize=2.5)
-        name_above(axes, f"{language.name(quantity)}, {language.unit(_difference(quantity))}")
+        axes.plot(when, language.shown(unit).all(mean), color=COLOURS[quantity], marker="o", markersize=2.5)
+        name_above(axes, f"{language.name(quantity)}, {language.unit(unit)}")
         few_ticks(axes)
     date_axis(places[-1], language)
     places[-1].set_xlabel(language.text("measured minus predicted, mean of each day"))
@@ -97,6 +100,7 @@ def residual_against_driver(evidence: Evidence, driver: str, language: Language 
     shown = [k for k in _shown(line.runs.weight) if len(_edges(values[line.runs.weight[k]])) > 2]
     if not shown:
         raise IgrowError(f"{driver} does not vary in this log: there is nothing to plot against")
+    across = language.shown(QUANTITIES[driver].unit if driver in QUANTITIES else "1")
     figure, places = panels(len(shown), 0.5 + _PANEL * len(shown))
     for axes, balance in zip(places, shown, strict=True):
         counted = line.runs.weight[balance]
@@ -104,14 +108,17 @@ def residual_against_driver(evidence: Evidence, driver: str, language: Language 
         edges = _edges(x)
         middle = 0.5 * (edges[1:] + edges[:-1])
         place = np.clip(np.digitize(x, edges) - 1, 0, len(middle) - 1)
-        means = [float(np.mean(y[place == k])) if np.any(place == k) else np.nan for k in range(len(middle))]
+        means = np.array([np.mean(y[place == k]) if np.any(place == k) else np.nan for k in range(len(middle))])
         quantity = PREDICTED[balance]
-        axes.plot(middle, means, marker="o", markersize=3, color=COLOURS[quantity])
+        unit = QUANTITIES[quantity].difference_unit
+        axes.plot(
+            across.all(middle), language.shown(unit).all(means), marker="o", markersize=3, color=COLOURS[quantity]
+        )
         axes.axhline(0.0, color=COLOURS["ink"], linewidth=0.8)
-        name_above(axes, f"{language.name(quantity)}, {language.unit(_difference(quantity))}")
+        name_above(axes, f"{language.name(quantity)}, {language.unit(unit)}")
         few_ticks(axes)
-    unit = language.unit(QUANTITIES[driver].unit) if driver in QUANTITIES else ""
-    places[-1].set_xlabel(f"{language.name(driver)}{f', {unit}' if unit else ''}")
+    written = language.text(across.unit)
+    places[-1].set_xlabel(f"{language.name(driver)}{f', {written}' if written else ''}")
     return figure
 
 
@@ -122,18 +129,15 @@ def coefficient_by_regime(
     if not regimes:
         raise IgrowError("this cause has no size by regime: there is nothing to plot")
     figure, (axes,) = panels(1, 0.7 + 0.24 * len(regimes))
+    shown = language.shown(unit)
     for index, (value, low, high) in enumerate(regimes.values()):
-        axes.plot([low, high], [index, index], color=COLOURS["recalibrated"], linewidth=3)
-        axes.plot([value], [index], marker="o", color=COLOURS["ink"])
+        axes.plot([shown.of(low), shown.of(high)], [index, index], color=COLOURS["recalibrated"], linewidth=3)
+        axes.plot([shown.of(value)], [index], marker="o", color=COLOURS["ink"])
     axes.set_yticks(range(len(regimes)), [language.name(name) for name in regimes])
     axes.invert_yaxis()
     size, written = language.text("size"), language.unit(unit)
     axes.set_xlabel(f"{size}, {written}" if written else size)
     return figure
-
-
-def _difference(quantity: str) -> str:
-    return QUANTITIES[quantity].unit.replace("degC", "K")
 
 
 def _shown(weight: Mask) -> list[int]:

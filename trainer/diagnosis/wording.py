@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from igrow.core.effects import EFFECTS
+from igrow.core.language.units import written
 from igrow.trainer.diagnosis.actuators import Replaced
 from igrow.trainer.diagnosis.candidates import UNIT_FLUX, Pattern
 from igrow.trainer.diagnosis.estimate import Estimated, normal_quantile
@@ -85,7 +86,7 @@ def actuator(one: Replaced) -> Finding:
 def sentence(one: Estimated) -> str:
     """Return the grower's sentence, with the beginning where there is one."""
     effect = EFFECTS[one.effect]
-    text = effect.sentence.format(value=plain(one.amplitude.value), unit=effect.amplitude.unit)
+    text = effect.sentence.format(value=plain(one.amplitude.value), unit=written(effect.amplitude.unit))
     if one.onset is not None:
         # A day begins at solar midnight, which may be before midnight in UTC: its noon tells the date.
         time = (one.onset.time + np.timedelta64(12, "h")).astype("datetime64[D]").item()

@@ -140,8 +140,8 @@ def error_rows(result: Diagnosis, language: Language) -> Iterator[ErrorRow]:
         for horizon in _HORIZONS:
             if horizon not in table:
                 continue
-            shown = [float(f"{table[horizon][stage]:.3g}") for stage in STAGES]
+            unit = QUANTITIES[quantity].difference_unit
+            shown = [float(f"{language.shown(unit).of(table[horizon][stage]):.3g}") for stage in STAGES]
             best = min(shown)
             cells = [(language.number(value, 3), value == best and max(shown) > best) for value in shown]
-            unit = language.unit(QUANTITIES[quantity].unit.replace("degC", "K"))
-            yield ErrorRow(language.name(quantity), language.name(horizon), cells, unit)
+            yield ErrorRow(language.name(quantity), language.name(horizon), cells, language.unit(unit))

@@ -100,7 +100,8 @@ def cause(finding: Finding, language: Language) -> str:
         return language.text(text, quantity=language.name(finding.effect))
     effect = EFFECTS[finding.effect]
     size = finding.parameters[effect.amplitude.name]
-    told = language.text(effect.sentence, value=language.number(size.value), unit=language.unit(size.unit))
+    value = language.number(language.shown(size.unit).of(size.value))
+    told = language.text(effect.sentence, value=value, unit=language.unit(size.unit))
     if finding.onset is not None:
         return language.text("Since {day}: {told}.", day=language.day(finding.onset.time), told=told)
     return language.text("{told}.", told=f"{told[0].upper()}{told[1:]}")
@@ -194,7 +195,7 @@ def gains(result: Diagnosis, language: Language) -> Iterator[str]:
         day = horizons.get("24_h", {})
         if not {"deployed", "corrected"} <= day.keys():
             continue
-        unit = QUANTITIES[quantity].unit.replace("degC", "K")
+        unit = QUANTITIES[quantity].difference_unit
         before, after = (language.amount(day[stage], unit, 3) for stage in ("deployed", "corrected"))
         text = (
             N_("{quantity}: predictions a day ahead were off by {before}; now by {after}.")
@@ -215,7 +216,7 @@ def gains(result: Diagnosis, language: Language) -> Iterator[str]:
 def warnings(result: Diagnosis, language: Language) -> Iterator[str]:
     """Say which quantities the model predicts no better than yesterday's readings, and what could not be judged."""
     for one in misfits(result, "deployed" if result.verdict == "nothing" else "corrected"):
-        unit = QUANTITIES[one.quantity].unit.replace("degC", "K")
+        unit = QUANTITIES[one.quantity].difference_unit
         yield language.text(
             "The model does not fit {quantity}: a day ahead it is off by {error}, yesterday's readings by {yesterday}.",
             quantity=language.name(one.quantity),
@@ -245,10 +246,15 @@ def _unjudged(result: Diagnosis, language: Language) -> Iterator[str]:
 
 
 def fault(one: DataFault, language: Language) -> tuple[str, str]:
-    """Return what a fault of the data is in this language, and what was seen and how to mend it, in English."""
+    """Return what a fault of the data is, and what was seen and how to mend it."""
     quantity = language.listed([language.name(name) for name in one.quantity.split(", ")])
     known = _FAULTS.get(one.kind)
-    return ("" if known is None else language.text(known, quantity=quantity)), str(one)
+    # How to mend it may be a piece of YAML, whose names and numbers stay as they are.
+    seen, mend = language.told(one.sentence, language.values), language.told(one.mend)
+    return (
+        "" if known is None else language.text(known, quantity=quantity),
+        f"{seen}: {mend}" if mend else seen,
+    )
 
 
 def set_aside(result: Diagnosis, language: Language) -> Iterator[str]:
@@ -267,8 +273,8 @@ def set_aside(result: Diagnosis, language: Language) -> Iterator[str]:
         )
 
 
-def notes(result: Diagnosis, language: Language) -> Iterator[tuple[str, str]]:
-    """Yield the notes of a diagnosis with the language that each is in: one with figures has no translation."""
+def notes(result: Diagnosis, language: Language) -> Iterator[str]:
+    """Yield the notes of a diagnosis."""
     for note in result.notes:
-        told = language.text(note)
-        yield f"{told[0].upper()}{told[1:]}", language.code if told != note else "en"
+        told = language.told(note, language.values)
+        yield f"{told[0].upper()}{told[1:]}"

@@ -23,7 +23,7 @@ EFFECT = Effect(
     signature="the reading is off from one moment on, no balance answers",
     separating_test="hold a calibrated hand sensor beside it",
     title="a temperature sensor that is off",
-    sentence="the temperature sensor reads {value} K too much",
+    sentence="the temperature sensor reads {value} {unit} too much",
     source="sensor practice",
     measured=("air_temperature",),
 )

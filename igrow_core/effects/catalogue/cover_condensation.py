@@ -41,7 +41,7 @@ EFFECT = Effect(
     ),
     separating_test="watch the cover at dawn; compare a cold with a mild night of the same humidity",
     title="more water that condenses on the cover",
-    sentence="more water condenses on the cold cover than expected (transfer {value} m/s)",
+    sentence="more water condenses on the cold cover than expected (transfer {value} {unit})",
     source="Stanghellini and de Jong (1995), Agric. For. Meteorol. 76: condensation on the cover",
     resembles=("condensation_transfer",),
 )

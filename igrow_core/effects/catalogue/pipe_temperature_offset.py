@@ -25,7 +25,7 @@ EFFECT = Effect(
     signature="the heat of a warm pipe is off by a constant, whatever its temperature",
     separating_test="hold a contact thermometer to the pipe",
     title="pipe temperature sensors that are off",
-    sentence="the pipe temperature sensors read {value} K too much",
+    sentence="the pipe temperature sensors read {value} {unit} too much",
     source="sensor practice",
     measured=("rail_pipe_temperature", "grow_pipe_temperature"),
 )

@@ -139,7 +139,7 @@ def _clock(telemetry: Telemetry, daylight: _Daylight, site: Site) -> list[DataFa
     offset = daylight.offset()
     if abs(offset) <= LARGEST_OFFSET + own_step(telemetry.time) / 7200.0 + ERRORS * daylight.error():
         return []
-    hours = f"{abs(offset):.1f} h {'late' if offset > 0.0 else 'early'}"
+    hours = f"{offset:.1f} h late" if offset > 0.0 else f"{-offset:.1f} h early"
     seen = f"noon comes {hours} by the log's clock: the sun over {site.latitude:g}, {site.longitude:g} says so"
     if _fits_as_wall_time(telemetry, site):
         return [DataFault("local_time", "", seen, _name_zone(site.time_zone))]
