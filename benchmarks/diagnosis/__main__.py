@@ -4,10 +4,12 @@
 each, and prints the table beside its bounds. `others` does the same with greenhouses that nothing was learned from,
 each with a model calibrated on its own first weeks; `transferred` diagnoses the same logs with the built-in bundle.
 `matched` does the like with greenhouses of the simulator's own structure; `same` with greenhouses that have drifted a
-little since their calibration, and asks what has changed in them; `real` diagnoses the public logs. `nuisance` learns
-anew what greenhouses show though nothing is missing, and `rules` fits the bounds that are fitted, both from seeds that
-no case has, and `drift` how greenhouses change with time; `separating` asks what tests of the plant bring, and
-`thresholds` prints all rules. Everything is made afresh: an hour or so on two cores, most of it for simulated weeks.
+little since their calibration, and asks what has changed in them; `omission` takes terms out of the model before the
+calibration (with DATA: of the public logs) and asks the calibration log for them; `real` diagnoses the public logs.
+`nuisance` learns anew what greenhouses show though nothing is missing, and `rules` fits the bounds that are fitted,
+both from seeds that no case has, and `drift` how greenhouses change with time; `separating` asks what
+tests of the plant bring, and `thresholds` prints all rules. Everything is made afresh: an hour or so on two cores,
+most of it for simulated weeks.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ import sys
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from benchmarks.diagnosis import drift, matched, nuisance, real, rules, same, separating
+from benchmarks.diagnosis import drift, matched, nuisance, omission, real, rules, same, separating
 from benchmarks.diagnosis.cases import SEASONS, draw
 from benchmarks.diagnosis.greenhouses import of_seasons, others
 from benchmarks.diagnosis.logs import built_in, reference, simulated_cases
@@ -35,6 +37,7 @@ WHAT = (
     "rules",
     "thresholds",
     "same",
+    "omission",
     "real",
     "drift",
     "separating",
@@ -79,6 +82,8 @@ def main() -> int:
         return separating.main(options)
     if options.what == "same":
         return same.main(options)
+    if options.what == "omission":
+        return omission.main(options)
     count = options.cases or 208
     away = options.what in {"others", "transferred"}
     if away and options.season:

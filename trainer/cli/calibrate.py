@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from igrow.core.errors import IgrowError
+from igrow.core.language import LANGUAGES, speak
 from igrow.trainer.cli.log_arguments import add_log_arguments, log_of
 from igrow.trainer.cli.progress import progress
 from igrow.trainer.exporting import export, read_model
 from igrow.trainer.fit import calibrate
 from igrow.trainer.fit.population import read_population
+from igrow.trainer.report.sentences import omission
 
 EXAMPLE = "igrow-trainer calibrate DATA/agc2019 --compartment Reference --out out/reference"
 
@@ -29,6 +31,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fit-weeks", type=int, help="fit to so many first weeks of the log only (default: all; see evaluate)"
     )
+    parser.add_argument(
+        "--complete", action="store_true", help="put the term into the bundle that its log says the model lacks"
+    )
+    parser.add_argument("--language", choices=LANGUAGES, default=LANGUAGES[0], help="of what the model lacks (en)")
     parser.add_argument("--out", type=Path, required=True, help="folder for the new bundle; must not exist yet")
 
 
@@ -47,9 +53,12 @@ def run(arguments: argparse.Namespace) -> int:
     before = read_model(arguments.bundle, log.known_site) if arguments.bundle else None
     population = read_population(arguments.population) if arguments.population else None
     with progress("calibrating") as say:
-        model = calibrate(log, prior_model=before, population=population, progress=say)
+        model = calibrate(log, prior_model=before, population=population, complete=arguments.complete, progress=say)
         say("writing the bundle")
         bundle = export(model, arguments.out)
     print(f"{model.summary()}\n")
+    if model.omission is not None:
+        told = omission(model.omission, speak(arguments.language), completed=arguments.complete)
+        print("\n".join([*told, ""]))
     print(f"wrote {bundle.folder} ({bundle.label})")
     return 0

@@ -8,13 +8,14 @@ log itself lacks, or a sensor must show), `sensitivity` (day runs of the model, 
 `candidates`, `noise`, `recalibration`, `design` (errors and candidates in named blocks), `search` (a scan of all
 candidates), `rounds` (one cause after the other), `compare` (the best of them beside their own noise) or, where the
 greenhouse's own calibration log taught what is missing even then, `history`, `drift` and `change` (what has changed
-since), `estimate`, `refit` (size, beginning, confounded causes), `correction` (what stands on unseen days), `wording`,
-`result`. `rules` holds every threshold, `nuisance` what greenhouses show though nothing is missing, `sharing` what one
-tells others. docs/method.md tells why.
+since; `omission` asks what it lacked from the first day), `estimate`, `refit` (size, beginning, confounded causes),
+`correction` (what stands on unseen days), `wording`, `result`. `rules` holds every threshold, `nuisance` what
+greenhouses show though nothing is missing, `sharing` what one tells others. docs/method.md tells why.
 """
 
 from igrow.trainer.diagnosis.diagnose import diagnose, discrepancy_of, history_of
 from igrow.trainer.diagnosis.nuisance import NuisanceSubspace, read_nuisance
+from igrow.trainer.diagnosis.omission import examine
 from igrow.trainer.diagnosis.result import EXIT_CODES, Diagnosis, Finding
 from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules, read_rules
 from igrow.trainer.diagnosis.sharing import change_since, learned_from
@@ -29,6 +30,7 @@ __all__ = [
     "change_since",
     "diagnose",
     "discrepancy_of",
+    "examine",
     "history_of",
     "learned_from",
     "read_nuisance",

@@ -24,7 +24,7 @@ from igrow.trainer.diagnosis.design import prepare
 from igrow.trainer.diagnosis.drift import Drift
 from igrow.trainer.diagnosis.estimate import Estimated
 from igrow.trainer.diagnosis.evidence import Evidence
-from igrow.trainer.diagnosis.knowledge import knowledge_of
+from igrow.trainer.diagnosis.knowledge import activate, knowledge_of
 from igrow.trainer.diagnosis.nuisance import NuisanceSubspace, learn_discrepancy
 from igrow.trainer.diagnosis.open_vents import under_open_vents
 from igrow.trainer.diagnosis.result import Diagnosis, Finding, Verdict
@@ -140,7 +140,8 @@ def discrepancy_of(log: Log, model: FittedModel, rules: DecisionRules = DEFAULT)
     """
     site, days = log.known_site, log_days(log, model)
     knowledge = knowledge_of(model, site, rules)
-    design = prepare(days.record, days.split, knowledge.prior, {}, site.longitude, rules, discrepancy={})
+    effects = activate(days.record, knowledge.terms)
+    design = prepare(days.record, days.split, knowledge.prior, effects, site.longitude, rules, discrepancy={})
     return learn_discrepancy(design)
 
 
@@ -148,8 +149,9 @@ def history_of(
     log: Log, model: FittedModel, rules: DecisionRules = DEFAULT, *, population: Population | None = None
 ) -> Discrepancy:
     """Return the same with covariance and the noise's colour, for `FittedModel.history`; raises as above does."""
-    record = log_days(log, model).record
-    return history.learn(record, log.known_site, model.posterior, rules, population)
+    record, site = log_days(log, model).record, log.known_site
+    effects = activate(record, knowledge_of(model, site, rules).terms)
+    return history.learn(record, site, model.posterior, rules, population, effects)
 
 
 def log_days(log: Log, model: FittedModel) -> LogDays:

@@ -28,16 +28,24 @@ from igrow.trainer.diagnosis.linear import DailyGrams, LinearModel
 from igrow.trainer.diagnosis.noise import Whitening
 from igrow.trainer.diagnosis.recalibration import averaging
 from igrow.trainer.diagnosis.rules import DecisionRules
+from igrow.trainer.fit.climate import site_prior
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.population import Population
 
+SURE = 1e-3
+"""Standard deviation of a parameter, in that of the site's description, below which it was held and not fitted."""
 PARTS = (2, 4)
 """Into so many windows a calibration log is cut, to see what gains in each though nothing has changed."""
 
 
 def learn(
-    record: Record, site: Site, posterior: Gaussian, rules: DecisionRules, population: Population | None = None
+    record: Record,
+    site: Site,
+    posterior: Gaussian,
+    rules: DecisionRules,
+    population: Population | None = None,
+    effects: ActiveEffects | None = None,
 ) -> Discrepancy:
     """Return what a calibrated model misses of its greenhouse, learned from all days of the calibration log.
 
@@ -48,21 +56,12 @@ def learn(
             which has used this log already.
         rules: how much of everything may be missing.
         population: what other greenhouses of its owner have shown (None: the description and the rules alone).
+        effects: that the model has.
 
     Raises:
         DivergenceError: the model runs out of all bounds on the log.
     """
-    days = split_days(record, site.longitude)
-    whole = DaySplit(days.day, np.ones(days.days, dtype=bool))
-    plain = lay_out(record, whole, posterior, {}, site.longitude, rules)
-    shared = population or Population({}, {}, 0)
-    described, names = shared.prior(site).marginal(posterior.names), keys(plain)[len(posterior.names) :]
-    centre, spread = shared.scaled(names, omission(names, rules))
-    mean = np.concatenate([described.mean - posterior.mean, centre])
-    deviation = np.concatenate([described.standard_deviation, spread])
-    prior = Gaussian(keys(plain), mean, np.diag(deviation**2))
-    design = replace(plain, history=History(prior, np.zeros_like(plain.values[0]), (), {}))
-    found, design = solve_jointly(design)
+    found, design = jointly(record, site, posterior, rules, population, effects)
     balances = averaging(design.line, design.interval, rules).balances
     return Discrepancy(
         parameters=posterior.values,
@@ -72,6 +71,40 @@ def learn(
         own_gains=own_gains(design),
         middle=record.time[0] + (record.time[-1] - record.time[0]) / 2,
     )
+
+
+def jointly(
+    record: Record,
+    site: Site,
+    posterior: Gaussian,
+    rules: DecisionRules,
+    population: Population | None = None,
+    effects: ActiveEffects | None = None,
+) -> tuple[Gaussian, Design]:
+    """Return all amplitudes of a calibration log, and its design under the noise beside them; see `learn`."""
+    days = split_days(record, site.longitude)
+    whole = DaySplit(days.day, np.ones(days.days, dtype=bool))
+    plain = lay_out(record, whole, posterior, effects or {}, site.longitude, rules)
+    shared, names = population or Population({}, {}, 0), keys(plain)[len(posterior.names) :]
+    described = held(posterior, shared.prior(site).marginal(posterior.names))
+    centre, spread = shared.scaled(names, omission(names, rules))
+    mean = np.concatenate([described.mean - posterior.mean, centre])
+    deviation = np.concatenate([described.standard_deviation, spread])
+    prior = Gaussian(keys(plain), mean, np.diag(deviation**2))
+    return solve_jointly(replace(plain, history=History(prior, np.zeros_like(plain.values[0]), (), {})))
+
+
+def physical_prior(site: Site, posterior: Gaussian) -> Gaussian:
+    """Return what the site's description says of the parameters; those that a calibration was told to hold stay."""
+    return held(posterior, site_prior(site).marginal(posterior.names))
+
+
+def held(posterior: Gaussian, described: Gaussian) -> Gaussian:
+    """Return a description in which the parameters that a calibration was told to hold stay where they are."""
+    sure = posterior.standard_deviation < SURE * described.standard_deviation
+    mean = np.where(sure, posterior.mean, described.mean)
+    deviation = np.where(sure, posterior.standard_deviation, described.standard_deviation)
+    return Gaussian(posterior.names, mean, np.diag(deviation**2))
 
 
 def lay_out(

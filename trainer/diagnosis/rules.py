@@ -54,6 +54,7 @@ class DecisionRules:
     least_history_days: float = _chosen(21.0, "days of a calibration log from which on a history is learned")
     omission_effect: float = _tuned(0.3, "prior deviation of an effect in the discrepancy, in typical amplitudes")
     omission_pattern: float = _tuned(0.05, "the same of a pattern, in its units")
+    least_omission_fall: float = _chosen(0.02, "share of the error of unseen weeks that an omitted term must remove")
     wall_drift: float = _tuned(0.015, "relative change of a parameter within some weeks, by physics")
     crop_drift: float = _tuned(0.05, "the same of a parameter of the crop")
     effect_drift: float = _tuned(0.02, "change of an effect in the discrepancy, in typical amplitudes")

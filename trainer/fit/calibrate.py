@@ -1,6 +1,6 @@
 """The one calibration: from a log to the fitted model of its greenhouse.
 
-    log --> alignment --> record on the working grid --> parameters --> discrepancy
+    log --> alignment --> record on the working grid --> parameters --> what the model lacks --> discrepancy
                                                     \\-> rules of the PLC, and how it holds heat and CO2
                                                     \\-> growth, where the log counts any
 
@@ -30,6 +30,7 @@ from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.growth import crop_of, growth_notes, growth_of_log
 from igrow.trainer.fit.holding import fit_holding
 from igrow.trainer.fit.model import FittedModel, training_envelope
+from igrow.trainer.fit.omission import Omission
 from igrow.trainer.fit.population import Population
 
 HORIZONS = ("1_h", "24_h")
@@ -44,6 +45,7 @@ def calibrate(
     *,
     prior_model: FittedModel | None = None,
     population: Population | None = None,
+    complete: bool = False,
     progress: Report | None = None,
 ) -> FittedModel:
     """Return the simulator of a greenhouse fitted to its log.
@@ -56,6 +58,7 @@ def calibrate(
         prior_model: what is known of it before; None: its description alone. Causes that were found before are not
             carried over: they are looked for again.
         population: what other greenhouses of its owner have shown; a prior in the place of the description's.
+        complete: put the term into the model that its log says it lacks (`FittedModel.omission`).
         progress: is told what is being done, in lines.
 
     Raises:
@@ -87,6 +90,7 @@ def calibrate(
         effects=(),
         discrepancy={},
         history=None,
+        omission=None,
         actuation=rules,
         holding=fit_holding(record, setpoints, posterior.values, before.holding),
         crop=crop,
@@ -96,7 +100,8 @@ def calibrate(
         errors=held_out_errors(record, before.posterior, say),
         notes=(*_notes(record, inferred), *counted),
     )
-    return _with_discrepancy(model, log, population, say)
+    model = replace(model, omission=_omission(record, model, say))
+    return _with_discrepancy(model.completed() if complete else model, log, population, say)
 
 
 def held_out_errors(record: Record, prior: Gaussian, say: Report) -> tuple[HeldOutError, ...]:
@@ -125,6 +130,21 @@ def held_out_errors(record: Record, prior: Gaussian, say: Report) -> tuple[HeldO
         for quantity, by_horizon in new.items()
         for horizon, summary in by_horizon.items()
     )
+
+
+def _omission(record: Record, model: FittedModel, say: Report) -> Omission | None:
+    """Return the term that a model lacks by its own log; None, and why, where that cannot be told."""
+    from igrow.trainer.diagnosis import DEFAULT, examine  # noqa: PLC0415  (a diagnosis needs fits in turn)
+
+    if not alternate_weeks(record.time).held_out.any():
+        say("the log is too short to tell what the model lacks: four weeks are needed")
+        return None
+    say("asking the log what the model lacks")
+    try:
+        return examine(record, model.site, model.posterior, DEFAULT)
+    except (IgrowError, np.linalg.LinAlgError) as error:
+        say(f"what the model lacks could not be asked of its own log: {error}")
+        return None
 
 
 def _with_discrepancy(model: FittedModel, log: Log, population: Population | None, say: Report) -> FittedModel:

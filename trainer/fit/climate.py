@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from igrow.core.arrays import Floats, Integers, Mask
+from igrow.core.effects import EFFECTS
+from igrow.core.effects.definition import Parameter
 from igrow.core.errors import IgrowError
 from igrow.core.simulator.hybrid import record as records
 from igrow.core.simulator.hybrid.climate import ActiveEffects
@@ -45,8 +47,15 @@ def site_prior(site: Site) -> Gaussian:
 
 
 def bounds(names: Sequence[str]) -> tuple[Floats, Floats]:
-    """Return the least and the largest value of physical parameters, (p,) each."""
-    return np.array([PARAMETERS[name].low for name in names]), np.array([PARAMETERS[name].high for name in names])
+    """Return the least and the largest value of physical parameters and of parameters of effects, (p,) each."""
+    rows = [PARAMETERS[name] if name in PARAMETERS else _of_effect(name) for name in names]
+    return np.array([one.low for one in rows]), np.array([one.high for one in rows])
+
+
+def _of_effect(name: str) -> Parameter:
+    """Return the definition of a parameter that is called ``effect:parameter``."""
+    effect, _, own = name.partition(":")
+    return next(one for one in EFFECTS[effect].parameters if one.name == own)
 
 
 def fit_climate(
@@ -61,8 +70,8 @@ def fit_climate(
 
     Args:
         parts: records on the working grid; several compartments of one kind are fitted with one set of parameters.
-        prior: of all parameters.
-        effects: the active effects, held.
+        prior: of all parameters; one of an effect, to be fitted with them, is called ``effect:parameter``.
+        effects: the active effects, held but for such parameters.
         every_hours: between the starts of the free runs.
         progress: is told of each step in a line.
 
@@ -78,8 +87,9 @@ def fit_climate(
     shapes = {name: values.shape for name, values in measured.items()}
 
     def batch(points: Floats) -> Floats:
-        parameters = {name: points[:, k : k + 1] for k, name in enumerate(prior.names)}
-        found = _errors(runs, parameters, effects or {})
+        values = {name: points[:, k : k + 1] for k, name in enumerate(prior.names)}
+        active = {name: {**held, **_own(values, f"{name}:")} for name, held in (effects or {}).items()}
+        found = _errors(runs, values, active)
         return np.concatenate([found[name].reshape(len(points), -1) / ERROR_SCALES[name] for name in shapes], axis=1)
 
     def tell(step: int, errors: Floats) -> None:
@@ -115,6 +125,10 @@ def fit_climate(
         robust=ROBUST,
     )
     return Gaussian(prior.names, found.posterior.mean, uncertainty)
+
+
+def _own(values: Mapping[str, Floats], prefix: str) -> dict[str, Floats]:
+    return {name.removeprefix(prefix): value for name, value in values.items() if name.startswith(prefix)}
 
 
 def observed_scale(errors: Floats) -> tuple[float, float]:

@@ -21,6 +21,7 @@ from igrow.core.site import Site
 from igrow.trainer.fit.climate import site_prior
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
+from igrow.trainer.fit.omission import Omission
 
 MARGIN = 0.1
 """Share of its width by which a range reaches beyond the data: so far a physical model may be believed."""
@@ -45,6 +46,8 @@ class FittedModel:
     history: Discrepancy | None = None
     """The same with covariance and the colour of its noise, at the log's own step; None where it was not learned."""
     effects: tuple[EffectRecord, ...] = ()
+    omission: Omission | None = None
+    """A term that its calibration log says it lacks: among the effects only once the model is `completed`."""
     actuation: Mapping[str, float] = field(default_factory=actuation.default_rules)
     """Rules of the actuation stage by name."""
     holding: Mapping[str, float] = field(
@@ -103,11 +106,24 @@ class FittedModel:
             posterior=posterior,
             calibrated_on=self.site.name,
             effects=tuple(effects),
+            omission=None,
             training_span=span,
             errors=tuple(errors),
             discrepancy=self.discrepancy if discrepancy is None else discrepancy,
             # The history of another greenhouse is none of this one's.
             history=self.history if self.calibrated_on == self.site.name else None,
+        )
+
+    def completed(self) -> FittedModel:
+        """Return the model with the term that it lacks, its parameters refitted beside it; itself where none is."""
+        if self.omission is None:
+            return self
+        after = {(one.quantity, one.horizon): one.after for one in self.omission.errors}
+        return replace(
+            self,
+            posterior=self.omission.posterior,
+            effects=(*self.effects, self.omission.effect),
+            errors=tuple(replace(one, after=after.get((one.quantity, one.horizon), one.after)) for one in self.errors),
         )
 
     def summary(self) -> str:
@@ -167,6 +183,7 @@ class FittedModel:
             "covariance": self.posterior.covariance.tolist(),
             "discrepancy": dict(self.discrepancy),
             "effects": {name: dict(values) for name, values in self.active_effects.items()},
+            "omission": None if self.omission is None else asdict(self.omission.effect),
             "actuation": dict(self.actuation),
             "holding": dict(self.holding),
             "training_range": {name: list(ends) for name, ends in self.training_range.items()},

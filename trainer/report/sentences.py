@@ -14,6 +14,7 @@ from igrow.core.simulator.hybrid.measurement import PREDICTED
 from igrow.trainer.data.fault import DataFault
 from igrow.trainer.diagnosis.persistence import misfits
 from igrow.trainer.diagnosis.result import DISCREPANCY, WORSE, Diagnosis, Finding
+from igrow.trainer.fit.omission import Omission
 from igrow.trainer.report.worth import Worth
 
 _VERDICTS: Mapping[str, str] = {
@@ -105,6 +106,27 @@ def cause(finding: Finding, language: Language) -> str:
     if finding.onset is not None:
         return language.text("Since {day}: {told}.", day=language.day(finding.onset.time), told=told)
     return language.text("{told}.", told=f"{told[0].upper()}{told[1:]}")
+
+
+def omission(one: Omission, language: Language, *, completed: bool) -> list[str]:
+    """Return what a model lacked from its first day, what weeks that no fit saw say of it, and what became of it."""
+    effect = EFFECTS[one.effect.name]
+    size = one.effect.parameters[effect.amplitude.name]
+    told = language.text(effect.sentence, value=language.number(size.value), unit=language.unit(size.unit))
+    lines = [language.text("The log of the calibration says what the model lacks: {told}.", told=told)]
+    for error in one.errors:
+        if error.horizon == "24_h":
+            lines.append(
+                language.text(
+                    "{quantity}: without it {before}, with it {after} off a day ahead, in weeks that no fit saw.",
+                    quantity=language.name(error.quantity),
+                    before=language.amount(error.before, error.unit),
+                    after=language.amount(error.after, error.unit),
+                )
+            )
+    added = N_("It is in the bundle now.")
+    left = N_("It is not in the bundle: check it in the greenhouse, or add it with --complete.")
+    return [*lines, language.text(added if completed else left)]
 
 
 def when(pattern: str, amount: float, language: Language) -> str:

@@ -1,0 +1,208 @@
+"""Terms of the physics taken out of the model before its calibration: does the calibration log name them?
+
+Every greenhouse of a nursery is calibrated on its own weeks with the whole model, and then with one term after the
+other taken out: its parameter is held at its lowest value, and all others are fitted without it. A name with the
+whole model is a false claim. With `--tuning` what terms gain where nothing was taken out is learned, from seeds that
+no benchmark has. With a folder of data the same is asked of the public logs.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from argparse import Namespace
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.diagnosis import real
+from benchmarks.diagnosis.cases import SEASONS
+from benchmarks.diagnosis.nurseries import calibration_logs, nursery
+from benchmarks.provenance import provenance
+from igrow.core.effects import EFFECTS
+from igrow.core.simulator.hybrid.parameters import PARAMETERS
+from igrow.core.simulator.hybrid.record import Record
+from igrow.core.site import Site
+from igrow.trainer.data import prepare_log
+from igrow.trainer.data.splits import alternate_weeks
+from igrow.trainer.diagnosis import DEFAULT, omission
+from igrow.trainer.diagnosis.omission import UsualGains
+from igrow.trainer.fit.climate import fit_climate, site_prior
+from igrow.trainer.fit.evaluation import evaluate
+from igrow.trainer.fit.gaussian import Gaussian
+from igrow.trainer.fit.solver import DivergenceError
+
+COMMAND = "python -m benchmarks.diagnosis omission --tuning"
+SEEDS = {"tuning": 510_000, "scoring": 610_000}
+"""Of the first nursery; each season's are ten thousand on."""
+GREENHOUSES = 3
+"""In a nursery."""
+TAKEN_OUT = {
+    parameter: effect.name
+    for effect in EFFECTS.values()
+    for parameter in effect.resembles
+    # A screen's gap takes away from what a screen saves: no gap stands in for a screen that saves nothing.
+    if effect.name != "screen_gap"
+}
+"""Parameters that are taken out, and the effect that is then missing."""
+MATTERS = 1.05
+"""Times by which the 24 h error of held-out weeks must rise for a term to count as one that the greenhouse has."""
+DAY = omission.HORIZONS[-1]
+CONFOUNDED = ({"co2_valve_leak", "soil_respiration"},)
+LEAST, MOST = 3.0, 8.0
+"""Scores between which the bound is set."""
+FALSE_CLAIMS = 0.02
+"""Of calibrations in which nothing was taken out."""
+HELD = 1e-6
+"""Relative standard deviation of a parameter that is held."""
+
+
+@dataclass(frozen=True)
+class Told:
+    """One calibration."""
+
+    greenhouse: str
+    taken_out: str
+    """The effect that is missing; empty for none."""
+    named: str
+    score: float
+    gains: dict[str, float]
+    rise: float
+    """Of the 24 h error on held-out weeks, over that of the whole model: mean ratio of all quantities."""
+
+
+def without(prior: Gaussian, parameter: str) -> Gaussian:
+    """Return a prior that holds a parameter at the lowest value that it may have."""
+    place = prior.names.index(parameter)
+    mean, deviation = prior.mean.copy(), prior.standard_deviation.copy()
+    mean[place] = PARAMETERS[parameter].low
+    deviation[place] = HELD * PARAMETERS[parameter].value
+    return Gaussian(prior.names, mean, np.diag(deviation**2))
+
+
+def calibrations(
+    record: Record, site: Site, name: str, taken_out: Sequence[str], usual: UsualGains | None
+) -> Iterator[Told]:
+    """Calibrate with the whole model, then with each parameter taken out, and say what each calibration names.
+
+    Without usual gains nothing is named: what terms gain is all that is asked.
+    """
+    prior, held_out = site_prior(site), alternate_weeks(record.time).held_out
+    whole = None
+    for parameter in ("", *taken_out):
+        known = without(prior, parameter) if parameter else prior
+        try:
+            posterior = fit_climate([(record, None)], known)
+            gains = omission.gains_of(record, site, posterior, DEFAULT)
+        except DivergenceError as error:
+            print(f"{name} without {parameter or 'nothing'}: {error}", file=sys.stderr)
+            continue
+        errors = {
+            quantity: by_horizon[DAY].mae
+            for quantity, by_horizon in evaluate(record, posterior.values, {}, (DAY,), held_out).items()
+        }
+        whole = whole or errors
+        found = None if usual is None else omission.examine(record, site, posterior, DEFAULT, usual)
+        yield Told(
+            name,
+            TAKEN_OUT.get(parameter, ""),
+            "" if found is None else found.effect.name,
+            0.0 if found is None else found.score,
+            {effect: round(gain, 1) for effect, gain in gains.items()},
+            float(np.mean([errors[quantity] / whole[quantity] for quantity in errors])),
+        )
+
+
+def season(job: tuple[str, str, int, tuple[str, ...]]) -> list[Told]:
+    """Simulate the nursery of a season and calibrate its greenhouses."""
+    kind, name, count, taken_out = job
+    known = nursery(name, count, SEEDS[kind] + 10_000 * list(SEASONS).index(name))
+    usual = None if kind == "tuning" else omission.read_usual_gains()
+    told: list[Told] = []
+    for greenhouse, (log, _) in zip(known.greenhouses, calibration_logs(known), strict=True):
+        seen = prepare_log(log, greenhouse.site)
+        record = seen.record(seen.best_shift(site_prior(greenhouse.site).values))
+        for one in calibrations(record, greenhouse.site, greenhouse.site.name, taken_out, usual):
+            told.append(one)
+            print(f"{one.greenhouse} without {one.taken_out or 'nothing'}: {one.named or '-'}", file=sys.stderr)
+    return told
+
+
+def is_right(one: Told) -> bool:
+    """Tell whether the name is that of what was taken out, or of what no log tells apart from it."""
+    return one.named == one.taken_out or any({one.named, one.taken_out} <= pair for pair in CONFOUNDED)
+
+
+def show(told: Sequence[Told]) -> None:
+    """Print the table."""
+    whole = [one for one in told if not one.taken_out]
+    false = [one for one in whole if one.named]
+    print(f"false claims with the whole model: {len(false)} of {len(whole)} {[one.named for one in false]}")
+    print(f"{'taken out':24}{'named':>8}{'wrong':>8}{'of':>5}   where the error rises by a twentieth: named   of")
+    for effect in (*dict.fromkeys(one.taken_out for one in told if one.taken_out), "all"):
+        own = [one for one in told if one.taken_out and effect in {one.taken_out, "all"}]
+        matter = [one for one in own if one.rise >= MATTERS]
+        wrong = sum(bool(one.named) and not is_right(one) for one in own)
+        right, mattering = sum(map(is_right, own)), sum(map(is_right, matter))
+        shares = f"{right / len(own):8.2f}{wrong:8}{len(own):5}"
+        print(f"{effect:24}{shares}{mattering / max(len(matter), 1):45.2f}{len(matter):5}")
+
+
+def learned(told: Sequence[Told]) -> UsualGains:
+    """Return what terms gain in calibrations with the whole model, and the least score, each judged by the others'."""
+    gains: dict[str, list[dict[str, float]]] = {}
+    for one in told:
+        gains.setdefault(one.greenhouse, []).append(one.gains)
+    largest = []
+    for greenhouse, own in gains.items():
+        rest = UsualGains(omission.learn({name: one for name, one in gains.items() if name != greenhouse}), 0.0)
+        largest += [max(rest.score(effect, gain) for effect, gain in one.items()) for one in own]
+    print(f"largest scores, each by the gains of the others: {', '.join(f'{one:.1f}' for one in sorted(largest))}")
+    least = float(np.clip(np.quantile(largest, 1.0 - FALSE_CLAIMS), LEAST, MOST))
+    seeds = {name: SEEDS["tuning"] + 10_000 * place for place, name in enumerate(SEASONS)}
+    return UsualGains(omission.learn(gains), round(least, 1), provenance(COMMAND, seeds))
+
+
+def on_real_logs(data: Path, only: str) -> int:
+    """Print what is named in the calibration logs of the public data sets, with and without each term."""
+    right = count = 0
+    for one in real.compartments(data):
+        if only not in one.name:
+            continue
+        site = one.site
+        record = one.before.record(one.before.best_shift(site_prior(site).values))
+        for told in calibrations(record, site, one.name, tuple(real.LOST), omission.read_usual_gains()):
+            count += bool(told.taken_out)
+            right += bool(told.taken_out) and is_right(told)
+            ranked = sorted(told.gains, key=told.gains.__getitem__, reverse=True)[:3]
+            gains = ", ".join(f"{name} {told.gains[name]:.0f}" for name in ranked)
+            missing = told.taken_out or "nothing"
+            print(f"{one.name:24} without {missing:22} {told.named or '-':22} error x {told.rise:.2f}; gains {gains}")
+    print(f"named: {right} of {count}")
+    return 0
+
+
+def main(options: Namespace) -> int:
+    """Learn, or judge greenhouses or public logs."""
+    if options.data is not None:
+        return on_real_logs(options.data, options.compartment)
+    kind = "tuning" if options.tuning else "scoring"
+    taken_out = () if options.tuning else tuple(TAKEN_OUT)
+    count, told = options.greenhouses or GREENHOUSES, list[Told]()
+    with ProcessPoolExecutor(options.processes) as pool:
+        for found in pool.map(season, [(kind, name, count, taken_out) for name in options.season or list(SEASONS)]):
+            told += found
+    if options.json:
+        options.json.write_text("".join(json.dumps(asdict(one)) + "\n" for one in told), encoding="utf-8")
+    if not options.tuning:
+        show(told)
+        return 0
+    usual = learned(told)
+    path = Path(str(files("igrow.trainer.diagnosis"))) / omission.FILE
+    omission.write_usual_gains(path, usual)
+    print(f"least score {usual.least_score:g}; wrote {path}")
+    return 0

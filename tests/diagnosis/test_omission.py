@@ -1,0 +1,105 @@
+"""What a calibration log says that its model lacks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from igrow.core.bundle import EffectRecord, Estimate, HeldOutError
+from igrow.core.language import speak
+from igrow.core.simulator.hybrid.nominal import site_record
+from igrow.core.simulator.hybrid.parameters import PARAMETERS
+from igrow.core.simulator.hybrid.record import Record
+from igrow.trainer.diagnosis import DEFAULT, history, omission
+from igrow.trainer.diagnosis.omission import TERMS, UsualGains
+from igrow.trainer.fit import FittedModel
+from igrow.trainer.fit.climate import bounds, fit_climate, site_prior
+from igrow.trainer.fit.gaussian import Gaussian
+from igrow.trainer.fit.omission import Omission
+from igrow.trainer.report import sentences
+from tests.virtual_log import SITE, virtual_log
+
+
+@pytest.fixture(scope="module")
+def record() -> Record:
+    return site_record(virtual_log(10, seed=3), SITE, 900.0)
+
+
+def held(parameter: str) -> Gaussian:
+    """Return the description's prior with a parameter held at its lowest value."""
+    prior = site_prior(SITE)
+    place, mean, deviation = prior.names.index(parameter), prior.mean.copy(), prior.standard_deviation.copy()
+    mean[place], deviation[place] = PARAMETERS[parameter].low, 1e-6 * PARAMETERS[parameter].value
+    return Gaussian(prior.names, mean, np.diag(deviation**2))
+
+
+def test_a_parameter_that_was_held_is_not_free_again_when_the_log_is_asked() -> None:
+    known = history.physical_prior(SITE, held("leakage_wind"))
+    assert known.values["leakage_wind"] == 0.0
+    assert known.deviations["leakage_wind"] < 1e-6
+    assert known.deviations["leakage_still"] == site_prior(SITE).deviations["leakage_still"]
+
+
+def test_a_term_that_was_taken_out_gains_and_one_that_is_there_does_not(record: Record) -> None:
+    whole = omission.gains_of(record, SITE, site_prior(SITE), DEFAULT)
+    lacking = omission.gains_of(record, SITE, held("transpiration_night_share"), DEFAULT)
+    assert set(whole) <= set(TERMS)
+    assert whole["night_transpiration"] < 5.0
+    assert lacking["night_transpiration"] > whole["night_transpiration"] + 20.0
+    assert max(lacking, key=lacking.__getitem__) == "night_transpiration"
+
+
+def test_the_size_of_a_term_is_fitted_beside_the_parameters(record: Record) -> None:
+    assert [float(edge[0]) for edge in bounds(("wind_infiltration:air_changes",))] == [0.0, 1.0]
+    prior = held("leakage_wind")
+    joint = Gaussian(
+        (*prior.names, "wind_infiltration:air_changes"),
+        np.append(prior.mean, 0.03),
+        np.diag(np.append(prior.standard_deviation, 0.09) ** 2),
+    )
+    found = fit_climate([(record, None)], joint, {"wind_infiltration": {"exponent": 1.0}})
+    # It stands in for the leakage that was taken out: 0.06 air changes per hour for each m/s.
+    assert found.values["wind_infiltration:air_changes"] == pytest.approx(0.06, abs=0.03)
+    assert found.values["leakage_wind"] == 0.0
+
+
+def test_a_gain_stands_out_only_from_what_greenhouses_that_lack_nothing_show() -> None:
+    gains = [{"cover_condensation": gain, "night_transpiration": 0.5} for gain in (40.0, 10.0, 25.0, 60.0)]
+    usual = UsualGains(omission.learn({str(place): [one] for place, one in enumerate(gains)}), 3.5)
+    assert usual.outstanding({"cover_condensation": 60.0, "night_transpiration": 1.0}) is None
+    named = usual.outstanding({"cover_condensation": 60.0, "night_transpiration": 60.0})
+    assert named is not None
+    assert named[0] == "night_transpiration"
+    assert UsualGains({}, 3.5).outstanding({}) is None
+
+
+def test_what_came_with_the_trainer_knows_every_term() -> None:
+    usual = omission.read_usual_gains()
+    assert set(usual.root_gains) == set(TERMS)
+    assert usual.provenance
+
+
+def test_a_model_is_completed_only_when_it_is_asked() -> None:
+    model = FittedModel.described(SITE)
+    estimates = {"air_changes": Estimate(0.05, 0.03, 0.07, "h-1 (m s-1)-1"), "exponent": Estimate(1.0, 0.5, 2.0, "1")}
+    effect = EffectRecord("wind_infiltration", "process", estimates, ("heat", "vapour", "co2"))
+    errors = (HeldOutError("air_temperature", "24_h", 1.2, 0.8, "degC"),)
+    lacking = replace(
+        model,
+        omission=Omission(effect, held("leakage_wind"), 6.0, errors),
+        errors=(HeldOutError("air_temperature", "24_h", 2.0, 1.2, "degC"),),
+    )
+    assert lacking.active_effects == {}
+    whole = lacking.completed()
+    assert whole.active_effects["wind_infiltration"]["air_changes"] == 0.05
+    assert whole.posterior.values["leakage_wind"] == 0.0
+    assert [(one.before, one.after) for one in whole.errors] == [(2.0, 0.8)]
+    assert model.completed() is model
+    assert lacking.omission is not None
+    told = sentences.omission(lacking.omission, speak("en"), completed=False)
+    assert "0.05" in told[0]
+    assert "1.2" in told[1]
+    assert "0.8" in told[1]
+    assert told[-1] != sentences.omission(lacking.omission, speak("en"), completed=True)[-1]
