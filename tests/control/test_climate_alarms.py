@@ -35,7 +35,7 @@ def test_it_comes_once_it_has_lasted_and_goes_when_the_value_is_well_back():
     alarms.tick(image(899.0, 12.9), board)
     assert board.texts == {}
     alarms.tick(image(900.0, 12.0), board)
-    assert board.texts["climate too_cold"] == "too cold: greenhouse air temperature below 13 degC for 15 min, now 12"
+    assert board.texts["climate too_cold"] == "too cold: air_temperature for 15 min below 13 degC, now 12 degC"
     assert board.levels["climate too_cold"] is Level.CRITICAL
     alarms.tick(image(910.0, 13.2), board)
     assert board.texts["climate too_cold"]

@@ -91,8 +91,8 @@ def test_no_server_is_one_line(tmp_path: Path) -> None:
 
 def test_where_the_last_days_tell_no_weather_the_date_does() -> None:
     """The weather station died last week; the season knows what January is like."""
-    weather = np.zeros((3, 24, 6))
-    weather[:, :, 0] = np.array([5.0, 6.0, 7.0])[:, None]
+    weather = np.zeros((6, 24, 6))
+    weather[:, :, 0] = np.array([4.0, 6.0, 5.0, 7.0, 6.0, 8.0])[:, None]
     weather[:, 12, 3] = 200.0
     season = SeasonPlan(
         np.datetime64(START - 11 * 86_400, "s"), 30, 10, 1, np.zeros(7, dtype=np.float32), 0.0, (), (), weather
