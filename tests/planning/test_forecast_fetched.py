@@ -95,7 +95,7 @@ def test_where_the_last_days_tell_no_weather_the_date_does() -> None:
     weather[:, :, 0] = np.array([4.0, 6.0, 5.0, 7.0, 6.0, 8.0])[:, None]
     weather[:, 12, 3] = 200.0
     season = SeasonPlan(
-        np.datetime64(START - 11 * 86_400, "s"), 30, 10, 1, np.zeros(7, dtype=np.float32), 0.0, (), (), weather
+        np.datetime64(START - 11 * 86_400, "s"), 30, 5, 1, np.zeros(7, dtype=np.float32), 0.0, (), (), weather
     )
     station_dead = log().with_columns({"outdoor_temperature": np.full(len(log()), np.nan)})
     course, problem = _without_forecast(station_dead, season, START, 240)
