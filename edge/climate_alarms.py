@@ -8,7 +8,7 @@ import datetime
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from igrow.core.quantities import QUANTITIES
+from igrow.core.quantities import QUANTITIES, with_unit
 from igrow.core.site import Crop
 from igrow.core.yaml_schema import SettingError, setting
 from igrow.edge.alarm_levels import Level
@@ -85,8 +85,9 @@ class ClimateAlarms:
 
     @staticmethod
     def _text(rule: ClimateAlarm, value: float) -> str:
-        unit = QUANTITIES[rule.quantity].unit
-        bound, now = f"{rule.above if rule.above is not None else rule.below:g} {unit}", f"{value:.3g} {unit}"
+        limit = rule.above if rule.above is not None else rule.below
+        assert limit is not None
+        bound, now = with_unit(rule.quantity, limit), with_unit(rule.quantity, value, ".3g")
         side = f"above {bound}" if rule.above is not None else f"below {bound}"
         if rule.lasting:
             side = f"for {rule.lasting.total_seconds() / 60:.0f} min {side}"

@@ -259,7 +259,7 @@ class ControlCycle:
             if hand.stands:
                 held[name] = hand.seconds
             else:
-                restored[name] = hand.asked_back()
+                restored[name] = hand.asked_back(name)
         held |= dict.fromkeys(self.readback.in_question, 0.0)
         if now < self.unknown_until:
             held |= {name: self.unknown_until - now for name in self._rules.points if name not in held}

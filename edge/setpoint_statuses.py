@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
+from igrow.core.quantities import with_unit
 from igrow.core.separating_tests.definition import SOURCE
 from igrow.edge.guard import GuardState, Verdict
 from igrow.edge.image import Image
@@ -42,7 +43,7 @@ def setpoint_statuses(
             status = replace(
                 status,
                 source=SOURCE if memory.taken_by == SOURCE else "interlock",
-                why=f"on its way back to {memory.taken:g}",
+                why=f"on its way back to {with_unit(name, memory.taken)}",
             )
         statuses[name] = status
     return statuses

@@ -120,6 +120,32 @@ QUANTITIES: Mapping[str, Quantity] = _quantity_table()
 """Every quantity by its name, in the registry's order."""
 
 
+def with_unit(name: str, value: float, form: str = "g") -> str:
+    """Return a value as the daemon's sentences name it: "28 degC", "65 %"; fractions in per cent.
+
+    Whoever shows such a sentence finds the unit in it, and tells the value in the units of the site. A point that is no
+    quantity, such as an alarm of the PLC, has a bare number.
+
+    Args:
+        name: of a quantity or a point.
+        value: in the registry's unit.
+        form: as `format` has it, of the number.
+    """
+    return number_with_unit(value, QUANTITIES[name].unit if name in QUANTITIES else "", form)
+
+
+def difference_with_unit(name: str, value: float, form: str = "g") -> str:
+    """Return an error or a difference of a quantity, as `with_unit` does a value: "4 K" of a temperature."""
+    return number_with_unit(value, QUANTITIES[name].difference_unit if name in QUANTITIES else "", form)
+
+
+def number_with_unit(value: float, unit: str, form: str = "g") -> str:
+    """Return a number in a unit as sentences name it; a fraction in per cent."""
+    if unit == "1":
+        return f"{100.0 * value:{form}} %"
+    return f"{value:{form}} {unit}".rstrip()
+
+
 def names(kind: Kind) -> tuple[str, ...]:
     """Return the names of all quantities of one kind, in the registry's order."""
     return tuple(quantity.name for quantity in QUANTITIES.values() if quantity.kind is kind)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from igrow.core.quantities import with_unit
 from igrow.edge.guard.answers import matches
 from igrow.edge.guard.point_memory import PointMemory
 from igrow.edge.guard.rules import PointRule
@@ -53,5 +54,6 @@ class Causes:
             swapped = bool(own) and self._rules[other].same(there, own[-1].value)
             outside = not rule.low <= shown <= rule.high
             if rule.same(shown, sent[-1].value) and (swapped or outside):
-                return f"{name} shows {shown:g}, which was written to {other}: is the register map right?"
+                value = with_unit(name, shown)
+                return f"{name} shows {value}, which was written to {other}: is the register map right?"
         return ""

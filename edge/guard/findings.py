@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
+from igrow.core.quantities import with_unit
 from igrow.edge.guard.state import Request
 
 
@@ -55,9 +56,10 @@ class Hand:
     stands: bool
     """It is what the PLC shows; otherwise something else has moved the point away."""
 
-    def asked_back(self) -> Request:
+    def asked_back(self, point: str) -> Request:
         """Return the request that puts it back."""
-        why = f"back to {self.value:g}, set by hand at the PLC and respected for {self.seconds / 60:.0f} min more"
+        back = with_unit(point, self.value)
+        why = f"back to {back}, set by hand at the PLC and respected for {self.seconds / 60:.0f} min more"
         return Request(self.value, "hand", why, at_once=True)
 
 

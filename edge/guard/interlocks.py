@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from igrow.core.errors import IgrowError
+from igrow.core.quantities import with_unit
 from igrow.edge.image import Image
 from igrow.edge.sensors.consequences import usable_for_control
 
@@ -75,6 +76,14 @@ class Interlock:
         assert self.below is not None
         return value < self.below or (engaged and value < self.release)
 
+    def sentence(self, value: float) -> str:
+        """Return why it is engaged, at this value."""
+        bound = self.above if self.above is not None else self.below
+        assert bound is not None
+        limit = with_unit(self.quantity, bound)
+        side = f"above {limit}" if self.above is not None else f"below {limit}"
+        return f"{self.quantity} {with_unit(self.quantity, value)}, {side}"
+
 
 @dataclass(frozen=True, slots=True)
 class Force:
@@ -110,8 +119,7 @@ def evaluate(
                 forces.append(Force(interlock.name, interlock.bounds, f"engaged before {interlock.quantity} failed"))
         elif interlock.engages(value, interlock.name in engaged):
             now.add(interlock.name)
-            limit = f"above {interlock.above:g}" if interlock.above is not None else f"below {interlock.below:g}"
-            forces.append(Force(interlock.name, interlock.bounds, f"{interlock.quantity} {value:g}, {limit}"))
+            forces.append(Force(interlock.name, interlock.bounds, interlock.sentence(value)))
     return forces, frozenset(now)
 
 

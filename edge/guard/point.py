@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from igrow.core.quantities import difference_with_unit, with_unit
 from igrow.core.separating_tests.definition import SOURCE
 from igrow.edge.guard.interlocks import Force
 from igrow.edge.guard.rules import PointRule
@@ -110,9 +111,10 @@ class PointInCycle:
         if current is not None and self._near(current, taken):
             self.memory = replace(self.memory, taken=None, taken_by="")
             return None
+        back = with_unit(self.name, taken)
         if by == SOURCE:
-            return Request(taken, SOURCE, f"back to {taken:g}, where it stood before the separating test")
-        return Request(taken, "interlock", f"back to {taken:g}, where it stood before interlock {by} took it")
+            return Request(taken, SOURCE, f"back to {back}, where it stood before the separating test")
+        return Request(taken, "interlock", f"back to {back}, where it stood before interlock {by} took it")
 
     # where to
 
@@ -122,9 +124,9 @@ class PointInCycle:
 
     def _limited(self, value: float) -> _Target:
         if value < self.rule.low:
-            return _Target(self.rule.low, "limit", f"below the limit of {self.rule.low:g}")
+            return _Target(self.rule.low, "limit", f"below the limit of {with_unit(self.name, self.rule.low)}")
         if value > self.rule.high:
-            return _Target(self.rule.high, "limit", f"above the limit of {self.rule.high:g}")
+            return _Target(self.rule.high, "limit", f"above the limit of {with_unit(self.name, self.rule.high)}")
         return _Target(value)
 
     def _bounds(self, forces: Sequence[Force]) -> _Bounds:
@@ -160,7 +162,8 @@ class PointInCycle:
         start, step = self._start(), self.rule.slew * self.passed
         value = min(max(target.value, start - step), start + step)
         if abs(value - target.value) > 1e-9:
-            slew = f"slew of {3600 * self.rule.slew:g} per hour on the way to {target.value:g}"
+            change, goal = difference_with_unit(self.name, 3600 * self.rule.slew), with_unit(self.name, target.value)
+            slew = f"slew of {change} per hour on the way to {goal}"
             target.reason = f"{target.reason}; {slew}" if target.reason else slew
             target.kind = target.kind or "slew"
         target.value = value

@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterator, Mapping
 
+from igrow.core.quantities import with_unit
 from igrow.edge.guard.answers import matches, on_the_way, rounds
 from igrow.edge.guard.causes import FALLBACK, Causes
 from igrow.edge.guard.evidence import Questions, cannot_be_read, disturbed
@@ -225,9 +226,8 @@ class Readback:
         if rounds(rule, newest.value, shown):
             return [self._confirmed(name, shown)]
         there = {other: memory.stands for other, memory in self.points.items()}
-        text = (
-            self._causes.crossed(name, there) or f"{newest.value:g} was written to {name}, but the PLC shows {shown:g}"
-        )
+        wrote, shows = with_unit(name, newest.value), with_unit(name, shown)
+        text = self._causes.crossed(name, there) or f"{wrote} was written to {name}, but the PLC shows {shows}"
         limited = not newest.urgent and memory.is_limited(rule, newest.value)
         if limited:
             memory.learn_limit(newest.value)
@@ -246,7 +246,8 @@ class Readback:
         if not late or not self.cannot_be_read(name, image):
             return []
         newest = memory.sent[-1]
-        text = f"{newest.value:g} was written to {name}, which cannot be read back: nobody sees whether it was taken"
+        wrote = with_unit(name, newest.value)
+        text = f"{wrote} was written to {name}, which cannot be read back: nobody sees whether it was taken"
         memory.settled(self._rules[name], memory.stands, newest.value)
         memory.problem = Problem(text, minor=True)
         return [Finding(name, Outcome.UNCONFIRMED, newest.value, None, newest.source, text)]
@@ -268,7 +269,8 @@ class Readback:
                 ours = memory.shown if memory.sent or memory.answers is not None else None
                 memory.found(look.shown)
                 if ours is not None:
-                    text = f"{ours:g} was written to {name}, but the PLC moves it to {look.shown:g}"
+                    wrote, moved = with_unit(name, ours), with_unit(name, look.shown)
+                    text = f"{wrote} was written to {name}, but the PLC moves it to {moved}"
                     memory.problem = Problem(text)
                 continue
             if name in crossed:

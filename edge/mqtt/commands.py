@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from igrow.core.errors import IgrowError
+from igrow.core.quantities import with_unit
 from igrow.edge.configuration import Configuration
 from igrow.edge.overriding import override
 
@@ -40,4 +41,4 @@ class Commands:
         except IgrowError as error:
             return str(error)
         self._last[setpoint] = monotonic
-        return f"{setpoint} overridden to {value:g} by a message"
+        return f"{setpoint} overridden to {with_unit(setpoint, value)} by a message"

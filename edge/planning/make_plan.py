@@ -29,6 +29,7 @@ from igrow.core.planner.recent_use import (
 )
 from igrow.core.planner.season import CropWorth, SeasonPlan
 from igrow.core.planner.season.course import RADIATION
+from igrow.core.planner.season.strategy import UNITS
 from igrow.core.planner.template import for_site
 from igrow.core.planner.weather_ensemble import WeatherEnsemble
 from igrow.core.quantities import SETPOINTS
@@ -163,7 +164,9 @@ def told(season: SeasonPlan, worth: CropWorth, time: np.datetime64) -> Iterator[
         f"day {season.day_of(time):.0f} of {season.days} of the season, which is expected to bring "
         f"{season.net_profit:.2f} EUR m-2"
     )
-    numbers = ", ".join(f"{name.replace('_', ' ')} {value:.3g}" for name, value in season.numbers(time).items())
+    numbers = ", ".join(
+        f"{name.replace('_', ' ')} {value:.3g} {UNITS[name]}" for name, value in season.numbers(time).items()
+    )
     yield f"its strategy for this day: {numbers}"
     yield (
         f"growth is worth what it brings until the season's end: {oldest:.2f} EUR for a kg of fruit that is nearly "

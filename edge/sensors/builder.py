@@ -12,6 +12,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from igrow.core.quantities import with_unit
 from igrow.edge.bus.errors import NoValueError
 from igrow.edge.image import MISSING, Image, Quality, Value
 from igrow.edge.sensors.belief import Belief
@@ -89,7 +90,7 @@ class ImageBuilder:
     def build(self, readings: Mapping[str, RawReading], monotonic: float, true_time: float | None) -> Image:
         """Return the image of this cycle. `readings` may lack points that were not due."""
         news = {name for name, track in self._tracks.items() if _take(track, readings.get(name), monotonic)}
-        values = {name: _judge(track, monotonic) for name, track in self._tracks.items()}
+        values = {name: _judge(name, track, monotonic) for name, track in self._tracks.items()}
         sun = self._sun_elevation(true_time) if self._sun_elevation and true_time is not None else None
         for name, why in suspects(PAIR_CHECKS, PairContext(values, sun)):
             values[name] = _suspected(values[name], why)
@@ -140,7 +141,7 @@ def _possible(rule: SensorRule, change: float, seconds: float) -> bool:
     return abs(change) <= rule.jump or abs(change) <= rule.jump + rule.rate * seconds
 
 
-def _judge(track: _Track, now: float) -> Value:
+def _judge(name: str, track: _Track, now: float) -> Value:
     value, rule = track.value, track.rule
     if track.reading_at is None:
         return Value(None, Quality.MISSING, math.inf, track.error or "never read") if track.error else MISSING
@@ -153,13 +154,16 @@ def _judge(track: _Track, now: float) -> Value:
         return Value(None, Quality.MISSING, age, NO_NUMBER)
     if age > rule.stale_after:
         return Value(value, Quality.STALE, age, f"last read {age:.0f} s ago{_because(track)}")
+    shown = with_unit(name, value)
     if not rule.holds(value):
-        return Value(value, Quality.OUT_OF_RANGE, age, f"{value:g} is outside {rule.low:g} to {rule.high:g}")
+        low, high = with_unit(name, rule.low), with_unit(name, rule.high)
+        return Value(value, Quality.OUT_OF_RANGE, age, f"{shown} is outside {low} to {high}")
     still = now - track.changed_at
     if still > rule.frozen_after and rule.still_low < value < rule.still_high:
-        return Value(value, Quality.FROZEN, age, f"exactly {value:g} for {still / 3600:.1f} h")
-    if track.too_fast:
-        return Value(value, Quality.IMPLAUSIBLE, age, f"moved from {track.accepted:g} to {value:g} too fast")
+        return Value(value, Quality.FROZEN, age, f"exactly {shown} for {still / 3600:.1f} h")
+    if track.too_fast and track.accepted is not None:
+        before = with_unit(name, track.accepted)
+        return Value(value, Quality.IMPLAUSIBLE, age, f"moved from {before} to {shown} too fast")
     return Value(rule.cut(value), Quality.GOOD, age)
 
 

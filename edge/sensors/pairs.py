@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequenc
 from dataclasses import dataclass
 
 from igrow.core import air
+from igrow.core.quantities import difference_with_unit, number_with_unit, with_unit
 from igrow.edge.image import Quality, Value
 
 
@@ -45,7 +46,9 @@ def _light_by_night(context: PairContext) -> str:
     radiation = context.good("global_radiation")
     if radiation is None or context.sun_elevation is None or context.sun_elevation > -6.0 or radiation[0] < 50.0:
         return ""
-    return f"{radiation[0]:.0f} W m-2 of sun with the sun {-context.sun_elevation:.0f} deg below the horizon"
+    sun = with_unit("global_radiation", radiation[0], ".0f")
+    depth = number_with_unit(-context.sun_elevation, "deg", ".0f")
+    return f"{sun} of sun with the sun {depth} below the horizon"
 
 
 def _par_without_light(context: PairContext) -> str:
@@ -54,7 +57,8 @@ def _par_without_light(context: PairContext) -> str:
         return ""
     par, radiation, lamps = found
     # The brightest full moon gives less than 0.01 umol m-2 s-1.
-    return f"{par:.0f} umol m-2 s-1 with no sun and no lamps" if par > 50 and radiation < 5 and lamps < 1 else ""
+    dark = par > 50 and radiation < 5 and lamps < 1
+    return f"{with_unit('par', par, '.0f')} with no sun and no lamps" if dark else ""
 
 
 def _vents_wide(context: PairContext) -> bool:
@@ -69,7 +73,8 @@ def _warm_through_open_vents(context: PairContext) -> str:
     inside, outside = found
     if -12.0 <= inside - outside <= 20.0:
         return ""
-    return f"{inside:.1f} degC inside and {outside:.1f} outside with all vents wide open"
+    here, there = with_unit("air_temperature", inside, ".1f"), with_unit("outdoor_temperature", outside, ".1f")
+    return f"{here} inside and {there} outside with all vents wide open"
 
 
 def _humid_through_open_vents(context: PairContext) -> str:
@@ -81,7 +86,8 @@ def _humid_through_open_vents(context: PairContext) -> str:
     # A full crop in full sun lifts the vapour content by some 8 g m-3 at the ventilation of open vents.
     if -5.0 <= inside - outside <= 14.0:
         return ""
-    return f"{inside:.0f} g m-3 of vapour inside and {outside:.0f} outside with all vents wide open"
+    here, there = (number_with_unit(one, "g m-3", ".0f") for one in (inside, outside))
+    return f"{here} of vapour inside and {there} outside with all vents wide open"
 
 
 PAIR_CHECKS: Sequence[PairCheck] = (
@@ -120,6 +126,7 @@ class TwinSensors:
             return
         difference = abs(first.value - second.value)
         if difference > self.tolerance:
-            why = f"{self.first} and {self.second} differ by {difference:g}, more than {self.tolerance:g}"
+            apart, most = (difference_with_unit(self.first, one) for one in (difference, self.tolerance))
+            why = f"{self.first} and {self.second} differ by {apart}, more than {most}"
             values[self.first] = Value(first.value, Quality.IMPLAUSIBLE, first.age, why)
             values[self.second] = Value(second.value, Quality.IMPLAUSIBLE, second.age, why)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from igrow.core.agronomy import Place, moment
+from igrow.core.quantities import with_unit
 from igrow.core.separating_tests import SOURCE, Condition, SeparatingTest
 from igrow.edge.alarm_levels import Level
 from igrow.edge.cycle_result import CycleResult
@@ -78,5 +79,6 @@ def does_not_follow(test: SeparatingTest, result: CycleResult) -> str:
             continue
         waited = result.image.monotonic - memory.written_at
         if waited > FOLLOWS_AFTER and abs(shown - memory.written) > FOLLOWS:
-            return f"{point} shows {shown:g}, not the {memory.written:g} that was written"
+            shows, wrote = with_unit(point, shown), with_unit(point, memory.written)
+            return f"{point} shows {shows}, not the {wrote} that was written"
     return ""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from igrow.core.quantities import with_unit
 from igrow.core.separating_tests import SEPARATING_TESTS, Condition, SeparatingTest, climate_conditions
 from igrow.core.site import Site
 from igrow.edge.configuration import Configuration
@@ -49,7 +50,8 @@ def _obstacle(configuration: Configuration, test: SeparatingTest) -> str:
             return f"{name} does not go back to the PLC by itself: its point of the register map has no refresh"
         low, high = test.span(name)
         if low < rule.low or high > rule.high:
-            return f"it moves {name} from {low:g} to {high:g}, the limits are {rule.low:g} to {rule.high:g}"
+            span, limits = ([with_unit(name, one) for one in pair] for pair in ((low, high), (rule.low, rule.high)))
+            return f"it moves {name} from {span[0]} to {span[1]}, the limits are {limits[0]} to {limits[1]}"
     for condition in conditions_of(test, configuration.site):
         if condition.quantity not in points and not condition.if_measured:
             return f"it needs {condition.quantity}, which this plant does not measure"

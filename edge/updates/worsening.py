@@ -14,7 +14,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from igrow.core.quantities import QUANTITIES
+from igrow.core.quantities import difference_with_unit
 
 DAY = 86_400.0
 REFERENCE_DAYS = 5
@@ -55,14 +55,15 @@ def find_worsening(history: Sequence[tuple[float, Mapping[str, float]]]) -> tupl
 def worsening_sentence(found: Sequence[Worsening]) -> str:
     """Return what to tell people, in one line; times are in UTC."""
     since = datetime.fromtimestamp(min(one.since for one in found), UTC)
-    how = ", ".join(
-        f"{one.quantity.replace('_', ' ')} {one.before:.3g} -> {one.now:.3g} {QUANTITIES[one.quantity].unit}"
-        for one in found
-    )
+    how = ", ".join(f"{one.quantity} {_error(one, one.before)} -> {_error(one, one.now)}" for one in found)
     return (
         f"the simulator predicts a day ahead worse since {since:%Y-%m-%d %H:%M} UTC ({how}): "
         "something in the greenhouse has changed; the trainer looks for the cause at its next run"
     )
+
+
+def _error(one: Worsening, value: float) -> str:
+    return difference_with_unit(one.quantity, value, ".3g")
 
 
 def _worsening(quantity: str, history: Sequence[tuple[float, Mapping[str, float]]]) -> Worsening | None:

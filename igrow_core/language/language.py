@@ -18,10 +18,13 @@ from igrow.core.language import sentences
 from igrow.core.language.locales import Locale, locale_of
 from igrow.core.language.names import NAMES
 from igrow.core.language.units import US, Shown, Units, written
+from igrow.core.quantities import QUANTITIES
 
+_UNITS = {unit for one in QUANTITIES.values() for unit in (one.unit, one.difference_unit)} - {"1"} | {"g m-3"}
 PART = re.compile(
-    r"(?<![\w./-])(?:(?P<name>[a-z0-9]+(?:_[a-z0-9]+)+)|(?P<number>[-−]?\d+(?:\.\d+)?)(?: (?P<unit>degC|K|W m-2|m s-1|"
-    r"g m-3|umol m-2 s-1|kg m-2 h-1))?)(?![\w/-]|[.:]\w)"
+    r"(?<![\w./-])(?:(?P<name>[a-z0-9]+(?:_[a-z0-9]+)+)|(?P<number>[-−]?\d+(?:\.\d+)?(?:e[-+]\d+)?)(?: (?P<unit>"
+    + "|".join(map(re.escape, sorted(_UNITS, key=len, reverse=True)))
+    + r"))?)(?![\w/-]|[.:]\w)"
 )
 """A name of the program, or a number with what unit it has, within a line."""
 LANGUAGES = ("en", "nl", "de", "es", "zh")
@@ -59,7 +62,7 @@ class Language:
 
         A number without a unit stays as large as it is: nothing says what it measures.
         """
-        return PART.sub(self._value, part)
+        return self.name(part) if part in NAMES else PART.sub(self._value, part)
 
     def _value(self, found: re.Match[str]) -> str:
         if found["name"]:

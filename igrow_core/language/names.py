@@ -84,6 +84,17 @@ NAMES: Mapping[str, str] = {
     "too_cold": N_("too cold"),
     "too_hot": N_("too hot"),
     "too_damp": N_("too damp"),
+    # limits of the crop
+    "day_temperature": N_("temperature by day"),
+    "night_temperature": N_("temperature at night"),
+    "mean_temperature": N_("mean temperature of a day"),
+    "temperature_difference": N_("largest difference within a day"),
+    "temperature_drift": N_("fastest change of the temperature"),
+    "light_sum": N_("light of a day"),
+    "light_sum_high": N_("light of a day"),
+    "dark_hours": N_("dark hours"),
+    "co2_with_people": N_("CO2 while people are inside"),
+    "rest": N_("least times between switching"),
     # regimes
     "day": N_("day"),
     "night": N_("night"),

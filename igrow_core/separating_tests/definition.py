@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from itertools import accumulate
 from typing import Literal
 
+from igrow.core.quantities import with_unit
+
 SOURCE = "separating_test"
 """The word for a test in the ledger, and the name of the quantity that marks its rows in the log."""
 
@@ -35,10 +37,11 @@ class Condition:
         if value is None:
             return f"{self.quantity} cannot be believed"
         margin = self.margin if beginning else 0.0
+        shown = with_unit(self.quantity, value, ".4g")
         if value < self.low + margin:
-            return f"{self.quantity} is {value:.4g}, below {self.low + margin:g}"
+            return f"{self.quantity} is {shown}, below {with_unit(self.quantity, self.low + margin)}"
         if value > self.high - margin:
-            return f"{self.quantity} is {value:.4g}, above {self.high - margin:g}"
+            return f"{self.quantity} is {shown}, above {with_unit(self.quantity, self.high - margin)}"
         return ""
 
 

@@ -40,7 +40,7 @@ async def test_a_write_that_the_plc_does_not_take_raises_an_alarm_and_is_tried_a
     bench.plc.ignores = {"heating_setpoint"}
     await bench.run(9)
     (alarm,) = bench.journal.alarms.active
-    assert alarm.text == "21 was written to heating_setpoint, but the PLC shows 18"
+    assert alarm.text == "21 degC was written to heating_setpoint, but the PLC shows 18 degC"
     assert len(bench.plc.written("heating_setpoint")) == 2
     bench.plc.ignores = set()
     bench.plc.values["heating_setpoint"] = 21.0
@@ -205,7 +205,7 @@ async def test_a_bad_sensor_raises_an_alarm_that_names_it():
     bench = make_bench(values={"air_temperature": 1e9})
     await bench.run()
     assert [alarm.text for alarm in bench.journal.alarms.active] == [
-        "air_temperature is out_of_range: 1e+09 is outside -1e+06 to 1e+06"
+        "air_temperature is out_of_range: 1e+09 degC is outside -1e+06 degC to 1e+06 degC"
     ]
 
 

@@ -46,7 +46,7 @@ async def test_after_a_storm_the_vents_stand_where_they_stood_before():
     rows = [row for row in bench.store.writes if row.point == "vent_lee" and row.outcome == "written"]
     assert [(row.applied, row.source) for row in rows] == [(10.0, "interlock"), (60.0, "interlock")]
     assert "interlock wind" in rows[0].reason
-    assert rows[1].reason == "back to 60, where it stood before interlock wind took it"
+    assert rows[1].reason == "back to 60 %, where it stood before interlock wind took it"
     assert not bench.events("changed_by_hand")
 
 
@@ -56,7 +56,7 @@ async def test_during_a_storm_source_reason_and_alarm_say_what_rules():
     await storm(bench, 2)
     status = bench.result.setpoints["vent_lee"]
     assert status.source == "interlock"
-    assert "wind_speed 20, above 15" in status.why
+    assert "wind_speed 20 m s-1, above 15 m s-1" in status.why
     assert "vent_lee" in bench.alarms["interlock wind"]
     await calm(bench, 2)
     assert "back to 60" in bench.result.setpoints["vent_lee"].why

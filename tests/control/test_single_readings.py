@@ -117,7 +117,7 @@ async def test_a_reading_in_doubt_holds_what_hangs_on_it_where_it_is_and_nothing
     assert bench.plc.values["heating_setpoint"] == 23.0
     (row,) = [row for row in bench.store.writes if row.outcome == "clamped"]
     assert (row.point, row.requested) == ("co2_setpoint", 900.0)
-    assert "air_co2: 0 is outside" in row.reason
+    assert "air_co2: 0 ppm is outside" in row.reason
 
 
 async def test_a_gust_within_reason_closes_the_vents_at_once():

@@ -101,7 +101,7 @@ def test_a_hostile_message_changes_nothing_and_is_answered_in_one_short_line(tmp
 def test_a_message_overrides_for_a_time_and_not_more_often_than_people_do(tmp_path):
     configuration = configured(tmp_path, permit=True)
     commands = Commands(configuration)
-    assert commands.take("heating_setpoint", b"20", 0.0) == "heating_setpoint overridden to 20 by a message"
+    assert commands.take("heating_setpoint", b"20", 0.0) == "heating_setpoint overridden to 20 degC by a message"
     assert leases(configuration)["heating_setpoint"].seconds == 7200.0
     for number in range(100):
         commands.take("heating_setpoint", b"22", 0.01 * number)

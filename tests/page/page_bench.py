@@ -183,7 +183,7 @@ def state(**changes: Any) -> dict[str, Any]:
         "values": {
             "air_temperature": good(21.3), "air_humidity": good(79.0), "air_co2": good(742.0), "par": good(214.0),
             "global_radiation": good(288.0), "outdoor_temperature": good(9.4), "vent_lee": good(12.0),
-            "wind_speed": {"value": 4.1, "quality": "frozen", "age": 3.0, "why": "exactly 4.1 for 0.7 h"},
+            "wind_speed": {"value": 4.1, "quality": "frozen", "age": 3.0, "why": "exactly 4.1 m s-1 for 0.7 h"},
             "sky_temperature": {"value": None, "quality": "missing", "age": None, "why": "never read"},
         },
         "setpoints": {
@@ -191,11 +191,11 @@ def state(**changes: Any) -> dict[str, Any]:
             "irrigation_on": setpoint(0.0),
         },
         "clamps": [
-            clamp("heating_setpoint", 31.0, 28.0, "above the limit of 28"),
-            clamp("co2_setpoint", 900.0, 850.0, "slew of 600 per hour on the way to 900"),
+            clamp("heating_setpoint", 31.0, 28.0, "above the limit of 28 degC"),
+            clamp("co2_setpoint", 900.0, 850.0, "slew of 600 ppm per hour on the way to 900 ppm"),
             clamp("heating_setpoint", 20.5, 19.0, "the crop's temperature_drift", 4000.0),
         ],
-        "alarms": [alarm("sensor wind_speed", "wind_speed is frozen: exactly 4.1 for 0.7 h", "warning")],
+        "alarms": [alarm("sensor wind_speed", "wind_speed is frozen: exactly 4.1 m s-1 for 0.7 h", "warning")],
         "plan": plan(),
         "bundle": {
             "name": "hillside-3-20260314-3f2a9c1d", "effects": ["wind_infiltration"], "candidate": None, "refusal": "",

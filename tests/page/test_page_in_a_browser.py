@@ -154,7 +154,7 @@ def test_every_state_of_the_page_passes_the_rules_of_accessibility_and_fits_its_
         link_ok=False,
         alarms=[
             alarm("link", "no point of the PLC can be read: check cable, address and power", "critical"),
-            alarm("sensor wind_speed", "wind_speed is frozen: exactly 4.1 for 0.7 h", "warning", 7200.0),
+            alarm("sensor wind_speed", "wind_speed is frozen: exactly 4.1 m s-1 for 0.7 h", "warning", 7200.0),
             alarm("service planning", "planning failed", "notice"),
         ],
         problems=["the disk is full"],

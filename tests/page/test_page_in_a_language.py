@@ -25,6 +25,7 @@ from igrow.edge.page.view import Known, compose
 from igrow.edge.page.words import Words
 from igrow.edge.separating_tests import Approval
 from igrow.edge.sources.override import Lease, read_leases
+from igrow.edge.updates.worsening import Worsening, worsening_sentence
 from igrow.trainer.translations import catalogue
 from tests.page.page_bench import CONFOUNDED, NOW, TESTS, alarm, clamp, plan, state, write_house
 
@@ -36,8 +37,9 @@ ENGLISH_WORDS = re.compile(
 )
 OWN = {"nl": {"is", "of", "for", "was", "plan's"}, "de": {"was"}, "es": set(), "zh": set()}
 """Words that another language has too."""
-LIMITED = "1 was written to lamp_on, but the PLC shows 0: it seems to have a limit of its own there"
+LIMITED = "100 % was written to lamp_on, but the PLC shows 0 %: it seems to have a limit of its own there"
 DARK = "90 umol m-2 s-1 with no sun and no lamps"
+WORSE = Worsening("air_temperature", NOW - 86_400.0, 0.5, 1.5)
 AMERICAN = "\nunits: us\n"
 
 
@@ -52,12 +54,15 @@ def everything() -> dict[str, Any]:
             alarm("climate too_cold", "too cold: air_temperature for 15 min below 13 degC, now 9.5 degC", "critical"),
             alarm("interlock storm", "interlock storm rules vent_wind: a storm breaks open vents", "notice"),
             alarm("write lamp_on", LIMITED, "warning"),
+            alarm("simulator", worsening_sentence([WORSE]), "notice"),
             alarm("link", "no point of the PLC can be read: check cable, address and power", "critical"),
         ],
         clamps=[
             *state()["clamps"],
-            clamp("co2_setpoint", 900.0, 400.0, "interlock wind: wind_speed 21, above 18"),
-            clamp("heating_setpoint", 21.0, 20.0, "back to 20, set by hand at the PLC and respected for 35 min more"),
+            clamp("co2_setpoint", 900.0, 400.0, "interlock wind: wind_speed 21 m s-1, above 18 m s-1"),
+            clamp("heating_setpoint", 21.0, 20.0, "back to 20 degC, set by hand at the PLC and respected for 35 min more"),
+            clamp("heating_setpoint", 31.0, 28.0, "above the limit of 28 degC; slew of 4 K per hour on the way to 28 degC"),
+            clamp("heating_setpoint", 23.0, 22.0, "the crop's mean_temperature"),
             clamp("co2_setpoint", 900.0, 850.0, "written 20 s ago, at least 300 s apart; the crop's temperature_drift"),
         ],
         problems=["the disk is full", "planning: no plan was made: it needs more than 512 MiB"],
@@ -77,7 +82,7 @@ def everything() -> dict[str, Any]:
     said["bundle"]["confounded"] = [CONFOUNDED, ["co2_offset", "photosynthesis_decline"]]
     said["separating_test"] = {
         "test": "vent_square_wave", "by": "Anna", "running": False, "ended": "",
-        "waits_for": "the guard held vent_lee back: above the limit of 60",
+        "waits_for": "the guard held vent_lee back: above the limit of 60 %",
     }  # fmt: skip
     said["setpoints"]["co2_setpoint"] |= {
         "source": "separating_test",
@@ -110,11 +115,11 @@ def text_of(page: str) -> str:
     "ended",
     [
         "it ran to its end", "withdrawn by Anna", "wind_speed is 8.3, above 8", "air_humidity cannot be believed",
-        "vent_lee shows 3, not the 15 that was written", "its weather did not come in time",
-        "the guard held vent_lee back: above the limit of 10", "the PLC does not answer",
+        "vent_lee shows 3 %, not the 15 % that was written", "its weather did not come in time",
+        "the guard held vent_lee back: above the limit of 10 %", "the PLC does not answer",
         "an interlock is engaged: storm", "the clock is wrong",
         "control began anew while it ran: the daemon was started, or read its configuration, again",
-        "an alarm: wind_speed is frozen: exactly 4.1 for 0.7 h", "what is left of the night is too short",
+        "an alarm: wind_speed is frozen: exactly 4.1 m s-1 for 0.7 h", "what is left of the night is too short",
     ],
 )  # fmt: skip
 def test_how_a_separating_test_ended_is_told_in_every_language(tmp_path: Path, code: str, ended: str) -> None:
@@ -170,6 +175,11 @@ def test_an_american_site_is_told_in_its_units_and_asks_in_them(tmp_path: Path) 
         "°F",
         "53.6 to 82.4 °F",
         "below 55.4 °F, now 49.1 °F",
+        "Above the limit of 82.4 °F; slew of 7.2 °F per hour on the way to 82.4 °F",
+        "Back to 68 °F, set by hand",
+        "wind speed 46.98 mph, above 40.26 mph",
+        "exactly 9.171 mph for 0.7 h",
+        "air temperature 0.9 °F -> 2.7 °F",
         "10,760 ft²",
         "crop: no hotter than 89.6 °F",
     ):

@@ -130,11 +130,11 @@ def test_alarms_stand_in_the_order_of_what_they_ask_and_say_who_knows():
 
 def test_routine_ramps_are_apart_from_what_matters():
     clamps = [
-        clamp("co2_setpoint", 900.0, 850.0, "slew of 600 per hour on the way to 900"),
+        clamp("co2_setpoint", 900.0, 850.0, "slew of 600 ppm per hour on the way to 900 ppm"),
         clamp("co2_setpoint", 900.0, 850.0, "written 20 s ago, at least 300 s apart"),
         clamp("heating_setpoint", 20.0, 19.0, "the crop's temperature_drift"),
-        clamp("heating_setpoint", 31.0, 28.0, "above the limit of 28"),
-        clamp("heating_setpoint", 31.0, 27.0, "above the limit of 28; slew of 4 per hour on the way to 28"),
+        clamp("heating_setpoint", 31.0, 28.0, "above the limit of 28 degC"),
+        clamp("heating_setpoint", 31.0, 27.0, "above the limit of 28 degC; slew of 4 K per hour on the way to 28 degC"),
         clamp("co2_setpoint", 900.0, 400.0, "interlock wind: too much"),
     ]
     matters, routine = now.held_back(clamps, NOW, SAY)

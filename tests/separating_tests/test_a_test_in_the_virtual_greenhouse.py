@@ -172,7 +172,7 @@ async def test_what_is_not_permitted_or_not_possible_is_refused_in_a_line(
     allowed = house.path.read_text()
     for text, said in (
         (allowed.replace("permitted: true", "permitted: false"), "are not permitted here"),
-        (allowed.replace("high: 60", "high: 10"), "the limits are 0 to 10"),
+        (allowed.replace("high: 60", "high: 10"), "the limits are 0 % to 10 %"),
         (allowed[: allowed.index("guard:")], "the gateway does not write vent_lee"),
     ):
         house.path.write_text(text)

@@ -54,5 +54,5 @@ def test_few_days_and_lost_errors_say_nothing() -> None:
 def test_the_sentence_says_since_when_and_how_much() -> None:
     told = worsening_sentence(find_worsening(course([0.3, 0.35, 0.28, 0.33, 0.31, 0.3, 0.36, 0.29, 0.9, 1.1, 1.0])))
     assert "worse since 1970-01-" in told
-    assert "air temperature 0.314 -> 1 degC" in told
+    assert "air_temperature 0.314 K -> 1 K" in told
     assert "\n" not in told

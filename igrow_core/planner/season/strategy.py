@@ -28,6 +28,16 @@ RANGES = {
 }
 """What a strategy says, and between what: degC, degC, K for each 100 W m-2 of the day's mean radiation, ppm while there
 is light, h a day, local hour (before midnight negative), W m-2 of sun above which lamps rest."""
+UNITS = {
+    "day_temperature": "degC",
+    "night_temperature": "degC",
+    "warmer_by_sun": "K for each 100 W m-2",
+    "co2": "ppm",
+    "lamp_hours": "h",
+    "lamps_from": "h",
+    "lamps_below": "W m-2",
+}
+"""Units of what a strategy says, as its sentences name them."""
 NO_CO2 = 400.0
 """ppm asked for in the dark."""
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from igrow.core import sun
+from igrow.core.quantities import difference_with_unit
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data.fault import DataFault, Remedy
@@ -64,7 +65,8 @@ def _inside_out(telemetry: Telemetry, site: Site) -> list[DataFault]:
     warmer = float(np.median(outside - inside))
     # What is held varies less from night to night than the weather.
     if warmer > SWAPPED_ALIKE and (outside > inside).mean() > 0.9 and np.std(outside) < 0.7 * np.std(inside):
-        seen = f"nights are {warmer:.1f} K warmer outside than inside, and differ less from one to the next"
+        warmth = difference_with_unit("air_temperature", warmer, ".1f")
+        seen = f"nights are {warmth} warmer outside than inside, and differ less from one to the next"
         return [_swap("air_temperature", "outdoor_temperature", seen)]
     return []
 
