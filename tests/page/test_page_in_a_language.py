@@ -38,6 +38,8 @@ ENGLISH_WORDS = re.compile(
 OWN = {"nl": {"is", "of", "for", "was", "plan's"}, "de": {"was"}, "es": set(), "zh": set()}
 """Words that another language has too."""
 LIMITED = "100 % was written to lamp_on, but the PLC shows 0 %: it seems to have a limit of its own there"
+BACK = "back to 20 degC, set by hand at the PLC and respected for 35 min more"
+RAMP = "above the limit of 28 degC; slew of 4 K per hour on the way to 28 degC"
 DARK = "90 umol m-2 s-1 with no sun and no lamps"
 WORSE = Worsening("air_temperature", NOW - 86_400.0, 0.5, 1.5)
 AMERICAN = "\nunits: us\n"
@@ -60,8 +62,8 @@ def everything() -> dict[str, Any]:
         clamps=[
             *state()["clamps"],
             clamp("co2_setpoint", 900.0, 400.0, "interlock wind: wind_speed 21 m s-1, above 18 m s-1"),
-            clamp("heating_setpoint", 21.0, 20.0, "back to 20 degC, set by hand at the PLC and respected for 35 min more"),
-            clamp("heating_setpoint", 31.0, 28.0, "above the limit of 28 degC; slew of 4 K per hour on the way to 28 degC"),
+            clamp("heating_setpoint", 21.0, 20.0, BACK),
+            clamp("heating_setpoint", 31.0, 28.0, RAMP),
             clamp("heating_setpoint", 23.0, 22.0, "the crop's mean_temperature"),
             clamp("co2_setpoint", 900.0, 850.0, "written 20 s ago, at least 300 s apart; the crop's temperature_drift"),
         ],
