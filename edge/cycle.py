@@ -191,6 +191,8 @@ class ControlCycle:
         beat = image.value_of(HEARTBEAT)
         cleared = beat.value is not None and beat.age <= 0.0 and self._writer.beats.was_cleared(beat.value)
         findings = self.readback.observe(image, restarted=cleared, patient=patient)
+        if beat.age > 0.0 and self.readback.tell_a_start(findings):
+            self._writer.beats.is_cleared()
         self._journal.findings(findings, self._respect_hand)
         moved, stood = moved_and_stood(findings, briefly=LONGEST_RAMP)
         self.state = go_on(begin_again(self.state, moved), stood)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 
+from igrow.edge.guard.answers import matches
 from igrow.edge.guard.causes import FALLBACK
 from igrow.edge.guard.heartbeat import HEARTBEAT
 from igrow.edge.guard.point_memory import PointMemory
+from igrow.edge.guard.power_up import Look, started_anew
 from igrow.edge.guard.rules import PointRule
 from igrow.edge.image import Image, Quality
 
@@ -17,22 +19,52 @@ class Questions:
 
     def __init__(self, rules: Mapping[str, PointRule], units: Mapping[str, str], longest: float) -> None:
         """After `longest` seconds a change is judged by what is known."""
+        self._rules = rules
         self._decided = [name for name, rule in rules.items() if rule.decided]
         self._units = units
         self._longest = longest
         self._since: dict[str, float] = {}
+        self._first: dict[str, Look] = {}
+        """What the setpoints of a unit in question showed when they were first seen so."""
         self.names: Collection[str] = ()
         """The points in question."""
         self.wanted: Collection[str] = ()
         """What is to be read to judge them."""
 
-    def ask(self, changed: Collection[str], image: Image) -> None:
+    def carry_over(self, before: Questions, same: Collection[str]) -> None:
+        """Go on where the questions before a reload stood; `same` are the points that are the same registers."""
+        self._since = {name: at for name, at in before._since.items() if name in same}
+        self._first = {name: look for name, look in before._first.items() if name in same}
+
+    def anew(self, looks: Mapping[str, Look]) -> set[str]:
+        """Return the setpoints of units that look as if they had started anew: now, or when that was first seen."""
+        units = [unit for seen in (self._seen_first(looks), self._only_decided(looks)) for unit in self._by_unit(seen)]
+        return {name for unit in units if started_anew(unit, self._rules) for name in unit}
+
+    def overtaken(self, looks: Mapping[str, Look], restarted: Collection[str]) -> list[dict[str, Look]]:
+        """Return, by unit, what was first seen of a start after which somebody has moved one of the setpoints.
+
+        `restarted` are the points whose unit has just shown that it started anew. That was before the move where
+        another setpoint shows still what it showed then: a later start would have moved it as well.
+        """
+        starts = []
+        for first in self._by_unit(self._seen_first(looks)):
+            again = {name for name in first if _changed(self._first, name) and _changed(looks, name)}
+            moved = {n for n in again if not matches(self._rules[n], looks[n].shown, first[n].shown)}
+            stays = any(looks[name].at > first[name].at + 1e-6 for name in again - moved)
+            told = started_anew(first, self._rules) or (stays and any(name in restarted for name in moved))
+            present = {name: looks[name] for name in first if name in looks}
+            if moved and told and not started_anew(present, self._rules):
+                starts.append(first)
+        return starts
+
+    def ask(self, looks: Mapping[str, Look], changed: Collection[str], image: Image) -> None:
         """Put the changed points in question whose unit has not been read as a whole since the last of them was seen.
 
         A reading of the same sweep does not count: one half of it may lie before a PLC's start, the other after it.
         What has changed in a unit is judged together, as it may have one cause.
         """
-        self._since = {name: self._since.get(name, image.monotonic - image.value_of(name).age) for name in changed}
+        self._since = {name: self._since.get(name, looks[name].at) for name in changed}
         names: set[str] = set()
         wanted: set[str] = set()
         for unit in {self._units.get(name, "") for name in changed}:
@@ -42,6 +74,29 @@ class Questions:
                 names |= since.keys()
                 wanted |= missing
         self.names, self.wanted = names, wanted
+        units = {self._units.get(name, "") for name in names}
+        first = self._seen_first(looks)
+        self._first = {name: look for name, look in first.items() if self._units.get(name, "") in units}
+
+    def judged(self, names: Collection[str]) -> None:
+        """Forget what was first seen of these points; what they show from now on is another matter."""
+        self._since = {name: at for name, at in self._since.items() if name not in names}
+        self._first = {name: look for name, look in self._first.items() if name not in names}
+
+    def _seen_first(self, looks: Mapping[str, Look]) -> dict[str, Look]:
+        """Return the looks at setpoints, each as it was when it first showed something new in the present question.
+
+        A start is told by what all show together; a hand, or a write of ours, may follow before that is judged.
+        """
+        decided = self._only_decided(looks)
+        return decided | {n: look for n, look in self._first.items() if look.changed or not _changed(decided, n)}
+
+    def _only_decided(self, looks: Mapping[str, Look]) -> dict[str, Look]:
+        return {name: look for name, look in looks.items() if self._rules[name].decided}
+
+    def _by_unit(self, looks: Mapping[str, Look]) -> list[dict[str, Look]]:
+        units = {self._units.get(name, "") for name in looks}
+        return [{n: look for n, look in looks.items() if self._units.get(n, "") == unit} for unit in sorted(units)]
 
     def _missing(self, unit: str, since: Mapping[str, float], image: Image) -> set[str]:
         last = max(since.values())
@@ -66,6 +121,10 @@ def cannot_be_read(name: str, memory: PointMemory, image: Image, patience: float
     since = memory.answering_since
     long = since is not None and image.monotonic - since > patience
     return long and image.reaches(name) and image.value_of(name).quality is Quality.MISSING
+
+
+def _changed(looks: Mapping[str, Look], name: str) -> bool:
+    return name in looks and looks[name].changed
 
 
 def _is_newer(name: str, since: float, image: Image) -> bool:

@@ -84,6 +84,10 @@ class BeatCount:
         self._kept_before = self._kept_before and self._sure is None and not cleared
         return cleared
 
+    def is_cleared(self) -> None:
+        """The PLC has started anew by what its setpoints show: that the register was cleared is no news any more."""
+        self._kept = self._kept_before = False
+
     def carry_over(self, before: BeatCount) -> None:
         """Go on where the count before a reload stood; the register is the same."""
         self._beat, self._sure, self._unsure = before._beat, before._sure, before._unsure

@@ -6,7 +6,7 @@ person changes one setpoint after the other.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from igrow.edge.guard.rules import PointRule
@@ -22,6 +22,8 @@ class Look:
     shown: float
     changed: bool
     """It shows something that neither stood there nor was written."""
+    at: float
+    """When it was read, in the daemon's monotonic seconds."""
     since: float
     """Seconds since it was looked at before."""
     was_interrupted: bool
@@ -45,12 +47,6 @@ def started_anew(looks: Mapping[str, Look], rules: Mapping[str, PointRule]) -> b
         return False
     interrupted = all(looks[name].was_interrupted for name in changed)
     return interrupted or max(looks[name].since for name in changed) < SECONDS_PER_HAND * len(changed)
-
-
-def by_unit(looks: Mapping[str, Look], units: Mapping[str, str]) -> Iterator[tuple[str, Mapping[str, Look]]]:
-    """Yield the looks at each unit's points; points without a unit are taken for one unit's."""
-    for unit in sorted({units.get(name, "") for name in looks}):
-        yield unit, {name: look for name, look in looks.items() if units.get(name, "") == unit}
 
 
 def _outside(rule: PointRule, value: float) -> bool:

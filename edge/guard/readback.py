@@ -25,7 +25,7 @@ from igrow.edge.guard.evidence import Questions, cannot_be_read, disturbed
 from igrow.edge.guard.findings import Finding, Hand, Outcome, Problem
 from igrow.edge.guard.heartbeat import HEARTBEAT
 from igrow.edge.guard.point_memory import PointMemory
-from igrow.edge.guard.power_up import Look, by_unit, started_anew
+from igrow.edge.guard.power_up import Look
 from igrow.edge.guard.rules import PointRule
 from igrow.edge.guard.state import Write
 from igrow.edge.image import Image
@@ -75,8 +75,13 @@ class Readback:
         """Go on where the read-back before a reload stood; `same` are the points that are the same registers."""
         for name in self.points.keys() & before.points.keys() & set(same):
             self.points[name] = before.points[name]
+        self._questions.carry_over(before._questions, self.points.keys() & set(same))
         if HEARTBEAT in same:
             self._beat_at = before._beat_at
+
+    def tell_a_start(self, findings: Collection[Finding]) -> bool:
+        """Tell whether by these findings the unit has started anew that holds the heartbeat's register."""
+        return any(f.outcome is Outcome.RESTARTED and self._causes.same_unit(f.point, HEARTBEAT) for f in findings)
 
     def held(self, now: float) -> dict[str, float]:
         """Return the seconds that each point changed by hand is still respected."""
@@ -131,35 +136,48 @@ class Readback:
         `restarted`: the heartbeat's register was cleared. Who is `patient` waits until the rest of a unit is read.
         """
         now = image.monotonic
-        for memory in self.points.values():
-            memory.grow_old(now)
         self._listen(image, restarted)
         findings: list[Finding] = []
+        looks = self._looks(self.points, image, findings)
+        for start in self._questions.overtaken(looks, [n for n, memory in self.points.items() if memory.restarted]):
+            changed = {name: look for name, look in start.items() if look.changed}
+            findings.extend(self._explain(changed, changed, image))
+            self._questions.judged(start)
+            for name, look in changed.items():
+                self.points[name].looked_at = look.at
+            looks |= self._looks(changed, image, findings)
+        unclear = {name for name, look in looks.items() if look.changed and not self.points[name].restarted}
+        anew = self._questions.anew(looks)
+        self._questions.ask(looks, unclear if patient else (), image)
+        looks = {name: look for name, look in looks.items() if name not in self.in_question}
+        findings.extend(self._explain(looks, anew, image))
+        for name, look in looks.items():
+            self.points[name].was_looked_at(look.at, now)
+        findings.extend(self._ended(now))
+        return findings
+
+    def _looks(self, names: Collection[str], image: Image, findings: list[Finding]) -> dict[str, Look]:
+        """Look at what new readings show; adds to `findings` what became of our writes."""
         looks: dict[str, Look] = {}
-        for name, memory in self.points.items():
-            value = image.value_of(name)
-            if not memory.is_new(value, now):
+        for name in names:
+            memory, value = self.points[name], image.value_of(name)
+            if not memory.is_new(value, image.monotonic):
                 findings.extend(self._unread(name, image))
                 continue
             assert value.value is not None
             found = self._ours(name, value.value, image)
-            since, unapplied = now - value.age - memory.looked_at, found is not None and self.pending(name)
-            looks[name] = Look(value.value, found is None, since, memory.was_interrupted, unapplied)
+            at, unapplied = image.monotonic - value.age, found is not None and self.pending(name)
+            interrupted, since = memory.was_interrupted, at - memory.looked_at
+            looks[name] = Look(value.value, found is None, at, since, interrupted, unapplied)
             findings.extend(found or ())
-        unclear = {name for name, look in looks.items() if look.changed and not self.points[name].restarted}
-        self._questions.ask(unclear if patient else (), image)
-        looks = {name: look for name, look in looks.items() if name not in self.in_question}
-        findings.extend(self._explain(looks, image))
-        for name in looks:
-            self.points[name].was_looked_at(now - image.value_of(name).age, now)
-        findings.extend(self._ended(now))
-        return findings
+        return looks
 
     def _listen(self, image: Image, restarted: bool) -> None:
-        """Note how long each point's unit could not be heard, or could not hear us."""
+        """Note how long each point's unit could not be heard, or could not hear us, and what is too old by now."""
         now, fallback = image.monotonic, image.value_of(FALLBACK).says_yes
         beat_at = -math.inf if self._beat_at is None and HEARTBEAT in image.values else self._beat_at
         for name, memory in self.points.items():
+            memory.grow_old(now)
             interrupted = any(name in points for points in image.interrupted.values())
             memory.hear(now, answers=image.reaches(name), interrupted=interrupted, beat_at=beat_at)
             if fallback:
@@ -252,10 +270,9 @@ class Readback:
         memory.problem = Problem(text, minor=True)
         return [Finding(name, Outcome.UNCONFIRMED, newest.value, None, newest.source, text)]
 
-    def _explain(self, looks: Mapping[str, Look], image: Image) -> Iterator[Finding]:
-        """Say who changed what is not ours, and agree with it."""
+    def _explain(self, looks: Mapping[str, Look], anew: Collection[str], image: Image) -> Iterator[Finding]:
+        """Say who changed what is not ours, and agree with it; `anew` are the setpoints that look like a start."""
         decided = {name: look for name, look in looks.items() if self._rules[name].decided}
-        anew = {name for _, unit in by_unit(decided, self._units) if started_anew(unit, self._rules) for name in unit}
         shows = {name: look.shown for name, look in looks.items()}
         crossed = {n: text for n, look in decided.items() if look.changed and (text := self._causes.crossed(n, shows))}
         for name, look in looks.items():
