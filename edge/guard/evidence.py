@@ -38,7 +38,7 @@ class Questions:
 
     def anew(self, looks: Mapping[str, Look]) -> set[str]:
         """Return the setpoints of units that look as if they had started anew: now, or when that was first seen."""
-        units = [unit for seen in (self._seen_first(looks), self._only_decided(looks)) for unit in self._by_unit(seen)]
+        units = [unit for seen in (self._seen_first(looks), looks) for unit in self._by_unit(seen)]
         return {name for unit in units if started_anew(unit, self._rules) for name in unit}
 
     def overtaken(self, looks: Mapping[str, Look], restarted: Collection[str]) -> list[dict[str, Look]]:
@@ -84,15 +84,11 @@ class Questions:
         self._first = {name: look for name, look in self._first.items() if name not in names}
 
     def _seen_first(self, looks: Mapping[str, Look]) -> dict[str, Look]:
-        """Return the looks at setpoints, each as it was when it first showed something new in the present question.
+        """Return these looks, each as it was when it first showed something new in the present question.
 
         A start is told by what all show together; a hand, or a write of ours, may follow before that is judged.
         """
-        decided = self._only_decided(looks)
-        return decided | {n: look for n, look in self._first.items() if look.changed or not _changed(decided, n)}
-
-    def _only_decided(self, looks: Mapping[str, Look]) -> dict[str, Look]:
-        return {name: look for name, look in looks.items() if self._rules[name].decided}
+        return {**looks, **{n: first for n, first in self._first.items() if first.changed or not _changed(looks, n)}}
 
     def _by_unit(self, looks: Mapping[str, Look]) -> list[dict[str, Look]]:
         units = {self._units.get(name, "") for name in looks}

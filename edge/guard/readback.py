@@ -1,7 +1,7 @@
 """What stands in the PLC: confirms our writes by a later read, and notices hands that changed a setpoint there.
 
-A write counts only when a reading taken after it shows the value, or what this device makes of it (a resolution, a
-limit or a ramp of its own). A reading that shows something else has one of these causes, looked for in this order:
+A reading that shows neither what stood there nor what became of a write of ours (`igrow.edge.guard.our_writes`) has
+one of these causes, looked for in this order:
 
 1. the point is the PLC's own (no source decides it): the PLC's control has moved it;
 2. the PLC puts the value of one setpoint into another;
@@ -19,11 +19,12 @@ import math
 from collections.abc import Collection, Iterator, Mapping
 
 from igrow.core.quantities import with_unit
-from igrow.edge.guard.answers import matches, on_the_way, rounds
+from igrow.edge.guard.answers import matches
 from igrow.edge.guard.causes import FALLBACK, Causes
-from igrow.edge.guard.evidence import Questions, cannot_be_read, disturbed
+from igrow.edge.guard.evidence import Questions, disturbed
 from igrow.edge.guard.findings import Finding, Hand, Outcome, Problem
 from igrow.edge.guard.heartbeat import HEARTBEAT
+from igrow.edge.guard.our_writes import OurWrites
 from igrow.edge.guard.point_memory import PointMemory
 from igrow.edge.guard.power_up import Look
 from igrow.edge.guard.rules import PointRule
@@ -51,12 +52,14 @@ class Readback:
         After `silence` without a word, or without our heartbeat, a PLC may have fallen back by itself.
         """
         self._rules = rules
-        self._confirm_within = confirm_within
         self._respect_hand = respect_hand
         self._units = units or {}
         self.points = {name: PointMemory() for name in rules}
         self._beat_at: float | None = None
         self._causes = Causes(rules, self.points, self._units, silence)
+        self._ours = OurWrites(
+            rules, self.points, self._causes, confirm_within=confirm_within, respect_hand=respect_hand
+        )
         self._questions = Questions(rules, self._units, confirm_within)
 
     def wrote(self, write: Write, now: float) -> None:
@@ -114,7 +117,7 @@ class Readback:
 
     def cannot_be_read(self, name: str, image: Image) -> bool:
         """Tell whether no reading of a point is to be waited for."""
-        return cannot_be_read(name, self.points[name], image, self._confirm_within)
+        return self._ours.cannot_be_read(name, image)
 
     @property
     def in_question(self) -> Collection[str]:
@@ -139,16 +142,18 @@ class Readback:
         self._listen(image, restarted)
         findings: list[Finding] = []
         looks = self._looks(self.points, image, findings)
-        for start in self._questions.overtaken(looks, [n for n, memory in self.points.items() if memory.restarted]):
+        cleared = {name for name, memory in self.points.items() if memory.restarted}
+        for start in self._questions.overtaken(self._decided(looks), cleared):
             changed = {name: look for name, look in start.items() if look.changed}
             findings.extend(self._explain(changed, changed, image))
             self._questions.judged(start)
             for name, look in changed.items():
                 self.points[name].looked_at = look.at
             looks |= self._looks(changed, image, findings)
-        unclear = {name for name, look in looks.items() if look.changed and not self.points[name].restarted}
-        anew = self._questions.anew(looks)
-        self._questions.ask(looks, unclear if patient else (), image)
+        decided = self._decided(looks)
+        anew = self._questions.anew(decided)
+        unclear = {name for name, look in decided.items() if look.changed and not self.points[name].restarted}
+        self._questions.ask(decided, unclear if patient else (), image)
         looks = {name: look for name, look in looks.items() if name not in self.in_question}
         findings.extend(self._explain(looks, anew, image))
         for name, look in looks.items():
@@ -156,16 +161,20 @@ class Readback:
         findings.extend(self._ended(now))
         return findings
 
+    def _decided(self, looks: Mapping[str, Look]) -> dict[str, Look]:
+        """Return the looks at setpoints; what the PLC moves by itself is no question."""
+        return {name: look for name, look in looks.items() if self._rules[name].decided}
+
     def _looks(self, names: Collection[str], image: Image, findings: list[Finding]) -> dict[str, Look]:
         """Look at what new readings show; adds to `findings` what became of our writes."""
         looks: dict[str, Look] = {}
         for name in names:
             memory, value = self.points[name], image.value_of(name)
             if not memory.is_new(value, image.monotonic):
-                findings.extend(self._unread(name, image))
+                findings.extend(self._ours.unread(name, image))
                 continue
             assert value.value is not None
-            found = self._ours(name, value.value, image)
+            found = self._ours.shown_by(name, value.value, image)
             at, unapplied = image.monotonic - value.age, found is not None and self.pending(name)
             interrupted, since = memory.was_interrupted, at - memory.looked_at
             looks[name] = Look(value.value, found is None, at, since, interrupted, unapplied)
@@ -191,90 +200,14 @@ class Readback:
                 memory.hand = None
                 yield Finding(name, Outcome.HAND_ENDED, None, memory.stands)
 
-    def _ours(self, name: str, shown: float, image: Image) -> list[Finding] | None:
-        """Return the findings where a reading shows what stood there or what we wrote; None where it does not."""
-        rule, memory, now = self._rules[name], self.points[name], image.monotonic
-        if memory.stands is None:
-            memory.stands = shown
-        stays = matches(rule, shown, memory.stands)
-        newest = memory.sent[-1] if memory.sent else None
-        if newest is not None and stays and matches(rule, shown, newest.value):
-            return [self._confirmed(name, shown)]
-        if stays:
-            return self._overdue(name, shown, now)
-        # A PLC takes writes in turn, so of equal ones it is the first.
-        ours = next((sent for sent in (*memory.late, *memory.sent) if matches(rule, shown, sent.value)), None)
-        if ours is not None and ours is newest:
-            return [self._confirmed(name, shown)]
-        if ours is not None:
-            memory.applied(ours, shown, now)
-            return []
-        if memory.answers is not None and matches(rule, shown, memory.answers):
-            memory.stands = shown
-            return []
-        return self._answered(name, shown, image)
-
-    def _answered(self, name: str, shown: float, image: Image) -> list[Finding] | None:
-        """Judge a change that may be what the device makes of a write that is on its way."""
-        rule, memory, now = self._rules[name], self.points[name], image.monotonic
-        if memory.overdue or not memory.sent or memory.stands is None:
-            return None
-        moving = memory.moved_at > -math.inf and not memory.was_disturbed
-        if memory.restarted or (not moving and self._causes.fell_back(name, shown, image)):
-            return None
-        newest = memory.sent[-1]
-        on_its_way = any(on_the_way(rule, memory.stands, sent.value, shown) for sent in memory.sent)
-        if on_its_way or memory.is_known_limit(rule, newest.value, shown):
-            memory.move_to(shown, now)
-            return self._overdue(name, shown, now)
-        return [self._confirmed(name, shown)] if rounds(rule, newest.value, shown) else None
-
-    def _confirmed(self, name: str, shown: float) -> Finding:
-        memory = self.points[name]
-        newest = memory.sent[-1]
-        memory.settled(self._rules[name], shown, newest.value)
-        return Finding(name, Outcome.CONFIRMED, newest.value, shown, newest.source)
-
-    def _overdue(self, name: str, shown: float, now: float) -> list[Finding]:
-        """Judge a write that no reading shows yet; this one is near enough to what stood there."""
-        rule, memory = self._rules[name], self.points[name]
-        if not memory.sent or memory.overdue or now - memory.waits_since <= self._confirm_within:
-            return []
-        newest = memory.sent[-1]
-        if rounds(rule, newest.value, shown):
-            return [self._confirmed(name, shown)]
-        there = {other: memory.stands for other, memory in self.points.items()}
-        wrote, shows = with_unit(name, newest.value), with_unit(name, shown)
-        text = self._causes.crossed(name, there) or f"{wrote} was written to {name}, but the PLC shows {shows}"
-        limited = not newest.urgent and memory.is_limited(rule, newest.value)
-        if limited:
-            memory.learn_limit(newest.value)
-            text = f"{text}: it seems to have a limit of its own there"
-            memory.settled(rule, shown, newest.value)
-            memory.limited_until = now + self._respect_hand
-        else:
-            memory.overdue, memory.answers = True, None
-        memory.problem = Problem(text, minor=limited)
-        return [Finding(name, Outcome.UNCONFIRMED, newest.value, shown, newest.source, text)]
-
-    def _unread(self, name: str, image: Image) -> list[Finding]:
-        """Judge a write to a point that cannot be read, although its unit answers; no reading will ever confirm it."""
-        memory = self.points[name]
-        late = memory.sent and image.monotonic - memory.sent[-1].at > self._confirm_within
-        if not late or not self.cannot_be_read(name, image):
-            return []
-        newest = memory.sent[-1]
-        wrote = with_unit(name, newest.value)
-        text = f"{wrote} was written to {name}, which cannot be read back: nobody sees whether it was taken"
-        memory.settled(self._rules[name], memory.stands, newest.value)
-        memory.problem = Problem(text, minor=True)
-        return [Finding(name, Outcome.UNCONFIRMED, newest.value, None, newest.source, text)]
-
     def _explain(self, looks: Mapping[str, Look], anew: Collection[str], image: Image) -> Iterator[Finding]:
         """Say who changed what is not ours, and agree with it; `anew` are the setpoints that look like a start."""
-        decided = {name: look for name, look in looks.items() if self._rules[name].decided}
         shows = {name: look.shown for name, look in looks.items()}
-        crossed = {n: text for n, look in decided.items() if look.changed and (text := self._causes.crossed(n, shows))}
+        crossed = {
+            n: text
+            for n, look in self._decided(looks).items()
+            if look.changed and (text := self._causes.crossed(n, shows))
+        }
         for name, look in looks.items():
             if not look.changed:
                 continue

@@ -6,10 +6,12 @@ from dataclasses import replace
 import pytest
 
 from igrow.edge.guard import DEFAULT_INTERLOCKS, PointRule
+from igrow.edge.guard.heartbeat import HEARTBEAT
 from igrow.edge.image import Quality
 from igrow.edge.sensors import SensorRule
 from tests.control.control_fakes import FixedSource
 from tests.control.stubborn_plc import RULES, make_stubborn_bench
+from tests.control.test_starts_seen_by_halves import lose
 
 VENT = PointRule(low=0.0, high=100.0, safe=0.0, dead_band=2.0, minimum_interval=180.0, decided=False)
 VENTS = {**RULES, "vent_lee": VENT, "vent_wind": VENT}
@@ -212,3 +214,16 @@ async def test_a_vent_that_does_not_close_is_tried_again_and_raises_an_alarm(min
     await storm(bench, round(minutes * 6))
     assert "the PLC shows 30" in bench.alarms["write vent_lee"]
     assert len(bench.plc.written("vent_lee")) > 10
+
+
+async def test_a_vent_that_the_plc_moves_is_never_in_question():
+    """Who moved it is known: nobody but the PLC does, whatever else of its unit could not be read."""
+    bench = bench_of()
+    await bench.run(3)
+    await storm(bench)
+    lose(bench, HEARTBEAT, *RULES)
+    await calm(bench, 20)
+    bench.plc.values["vent_lee"] = 25.0
+    await bench.run(1)
+    assert not bench.cycle.readback.in_question
+    assert not [clamp for clamp in bench.result.verdict.clamps if clamp.kind == "doubt" and clamp.point in OPEN]
