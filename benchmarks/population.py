@@ -7,25 +7,20 @@ their description as the prior and once with what the others shared. Both are ju
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from benchmarks.builder import QUANTITIES, SHARED_DAYS, START, asked_for, site_of
 from igrow.core.greenhouse import GreenhouseParameters, generate_weather, recipe, simulate_many
-from igrow.core.site import Greenhouse, Lamps, Site
 from igrow.trainer.data import Log, prepare_log
 from igrow.trainer.diagnosis import learned_from
 from igrow.trainer.fit import calibrate, evaluate
 from igrow.trainer.fit.population import Population, learn_population
 
-START = np.datetime64("2020-02-10T00:00:00")
-BUILDER, OWN = 0.2, 0.06
-"""How far the builder's greenhouses lie from the described one, and each of them from the others, relative."""
 FIRST_DAYS = (8, 14)
-SHARED_DAYS, JUDGED_DAYS = 28, 14
-QUANTITIES = ("air_temperature", "air_humidity", "air_co2")
+JUDGED_DAYS = 14
 
 
 @dataclass(frozen=True)
@@ -45,12 +40,6 @@ def simulate(plants: Sequence[GreenhouseParameters], days: int, seed: int) -> li
     return [prepare_log(one.measured, site_of(plant)) for one, plant in zip(seasons, plants, strict=True)]
 
 
-def site_of(plant: GreenhouseParameters) -> Site:
-    """Return what a grower would write down."""
-    described = Greenhouse(mean_height=float(np.mean(plant.air_height)), lamps=Lamps())
-    return Site(name="new", latitude=plant.latitude, longitude=plant.longitude, greenhouse=described)
-
-
 def judge(log: Log, days: int, population: Population | None) -> dict[str, float]:
     """Calibrate on the first days of a log; returns the errors a day ahead on its last two weeks."""
     end = START + np.timedelta64(days, "D")
@@ -61,20 +50,13 @@ def judge(log: Log, days: int, population: Population | None) -> dict[str, float
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--shared", type=int, default=8, help="greenhouses that share what they learned (default 8)")
-    parser.add_argument("--new", type=int, default=6, help="greenhouses that begin (default 6)")
-    parser.add_argument("--seed", type=int, default=44_000)
-    options = parser.parse_args()
-    rng = np.random.default_rng(options.seed)
-    builder = GreenhouseParameters().varied(rng, BUILDER)
-    plants = [builder.varied(rng, OWN) for _ in range(options.shared + options.new)]
-    shared = simulate(plants[: options.shared], SHARED_DAYS, options.seed + 1)
+    plants = asked_for(__doc__, shared=8, new=6, seed=44_000)
+    shared = simulate(plants.shared, SHARED_DAYS, plants.seed + 1)
     population = learn_population([learned_from(calibrate(one)) for one in shared])
     found = []
-    for log in simulate(plants[options.shared :], max(FIRST_DAYS) + JUDGED_DAYS, options.seed + 2):
+    for log in simulate(plants.new, max(FIRST_DAYS) + JUDGED_DAYS, plants.seed + 2):
         found += [Error(days, judge(log, days, None), judge(log, days, population)) for days in FIRST_DAYS]
-    print(f"{options.new} new greenhouses, {options.shared} that shared; error a day ahead, median (better in)")
+    print(f"{len(plants.new)} new greenhouses, {len(plants.shared)} that shared; error a day ahead, median (better in)")
     print(f"{'days of log':>12}" + "".join(f"{name:>34}" for name in QUANTITIES))
     for days in FIRST_DAYS:
         cells = []

@@ -8,15 +8,14 @@ with nothing missing and once with something hidden: by what came with the train
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from benchmarks.builder import QUANTITIES, SHARED_DAYS, START, asked_for, site_of
 from benchmarks.diagnosis.nurseries import DRIFT
-from benchmarks.population import BUILDER, OWN, QUANTITIES, SHARED_DAYS, START, site_of
 from igrow.core.greenhouse import GreenhouseParameters, HiddenEffect, generate_weather, recipe, simulate_many
 from igrow.core.greenhouse.tomato import Crop
 from igrow.trainer.data import Log, prepare_log
@@ -84,20 +83,12 @@ def likelihood(pair: Pair, known: Drift) -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--shared", type=int, default=6, help="greenhouses that share (default 6)")
-    parser.add_argument("--new", type=int, default=4, help="greenhouses that begin (default 4)")
-    parser.add_argument("--seed", type=int, default=45_000)
-    options = parser.parse_args()
-    rng = np.random.default_rng(options.seed)
-    builder = GreenhouseParameters().varied(rng, BUILDER)
-    plants = [builder.varied(rng, OWN) for _ in range(options.shared + options.new)]
-    came = drift.read_drift()
-    population, pairs = share(both(plants[: options.shared], [None] * options.shared, options.seed + 1), came.days)
+    plants = asked_for(__doc__, shared=6, new=4, seed=45_000)
+    new, came = plants.new, drift.read_drift()
+    population, pairs = share(both(plants.shared, [None] * len(plants.shared), plants.seed + 1), came.days)
     fleet = drift.learn(pairs, came.days, came) if len(pairs) >= drift.LEAST_PAIRS else came
-    new = plants[options.shared :]
     causes = [CAUSES[number % len(CAUSES)] for number in range(len(new))]
-    logs = both([*new, *new], [*(None for _ in new), *causes], options.seed + 3)
+    logs = both([*new, *new], [*(None for _ in new), *causes], plants.seed + 3)
     found: dict[str, list[tuple[str, Told, float]]] = {"alone": [], "shared": []}
     for number in range(len(new)):
         models: dict[str, FittedModel] = {
@@ -112,10 +103,10 @@ def main() -> None:
                 found[name].append((cause, told(diagnose(later, model, drift=known)), likely))
         print(f"{number + 1} of {len(new)} new", file=sys.stderr, flush=True)
     moved = [fleet.rates[key] / came.rates[key] for key in fleet.rates if key in came.rates]
-    print(f"{options.shared} shared, of {len(pairs)} how they change; {len(new)} new greenhouses, two later logs each")
+    print(f"{len(plants.shared)} shared, of {len(pairs)} how they change; {len(new)} new greenhouses")
     print(f"keys of the population {len(population.mean)}; rates of the fleet over those that came: "
           f"{np.quantile(moved, 0.1):.2f} to {np.quantile(moved, 0.9):.2f} (80 %)")  # fmt: skip
-    print(f"{'':52}{'alone':>10}{'shared':>10}")
+    print(f"{'mean over later logs':52}{'logs':>6}{'alone':>10}{'shared':>10}")
     rows: list[tuple[str, Callable[[str, Told, float], float | None]]] = [
         ("false claims where nothing is missing", lambda c, t, _: None if c else float(t.verdict != "nothing")),
         ("right cause first", lambda c, t, _: float(t.causes[:1] == (c,)) if c else None),
@@ -130,7 +121,7 @@ def main() -> None:
         errors = [[one.errors[quantity] for cause, one, _ in found[name] if not cause] for name in found]
         cells.append((f"error a day ahead, {quantity}", errors))
     for what, values in cells:
-        print(f"{what:52}" + "".join(f"{np.mean(one):10.3g}" for one in values))
+        print(f"{what:52}{len(values[0]):6}" + "".join(f"{np.mean(one):10.3g}" for one in values))
 
 
 if __name__ == "__main__":
