@@ -10,11 +10,14 @@ import psutil
 
 
 def below(name: str = "") -> list[psutil.Process]:
-    """Return the processes that this one started, and those that they did, whose command line holds a text."""
+    """Return the processes that this one started, and those that they did, whose command line begins with a text.
+
+    Begins: a child that was forked a moment ago shows its parent's command line, with whatever stands in it.
+    """
     found = []
     for one in psutil.Process().children(recursive=True):
         with contextlib.suppress(psutil.Error):
-            if name in " ".join(one.cmdline()):
+            if " ".join(one.cmdline()).startswith(name):
                 found.append(one)
     return found
 

@@ -18,8 +18,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from igrow.core.errors import IgrowError
-from igrow.core.exchange import Place, SegmentName, read_receipt
+from igrow.core.exchange import Below, ExchangeError, Place, SegmentName, read_receipt
 from igrow.core.exchange.documents import LARGEST_DOCUMENT
+from igrow.core.exchange.signed_files import signed_files
 from igrow.core.whole_files import write_whole
 from igrow.edge.exchange.outbox import REPORTS, Outbox
 from igrow.edge.exchange.places import open_place
@@ -28,8 +29,8 @@ from igrow.edge.parent import end_with_parent
 
 STATUS_FILE = "status.json"
 LARGEST_BUNDLE = 512 * 2**20
-MOST_FILES = 1000
-"""Of one folder of signed files; a repository keeps some thirty."""
+MOST_ROOTS = 1000
+"""Versions of the root metadata; one a replaced key."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,8 @@ class Order:
     identity: str | None = None
     deadline: float = 600.0
     """Seconds after which the round is ended, wherever it is."""
+    seen: tuple[float, float] | None = None
+    """Lowest and highest time that the clock showed after it went back, since the order before; None: it did not."""
 
 
 @dataclass
@@ -96,12 +99,14 @@ def _round(order: Order, folder: Path, place: Place | None, status: RoundStatus)
     outbox = Outbox(folder, order.site, order.igrow_version)
     try:
         if order.time is not None:
-            status.sealed = seal_due(outbox, Path(order.store), order.time, order.period, partly=order.partly)
+            status.sealed = seal_due(
+                outbox, Path(order.store), order.time, order.period, partly=order.partly, seen=order.seen
+            )
         place = place or open_place(order.url, known_hosts=order.known_hosts, identity=order.identity)
         _receive(outbox, place, order.site, status)
         _send(outbox, place, order.site, status)
         _send_reports(folder / REPORTS, place, order.site)
-        mirror(place, f"{order.site}/bundles", folder / "bundles")
+        mirror(Below(place, f"{order.site}/bundles"), folder / "bundles")
     finally:
         status.given_up = outbox.keep_within(order.budget)
         waiting = outbox.segments()
@@ -128,8 +133,7 @@ def _send(outbox: Outbox, place: Place, site: str, status: RoundStatus) -> None:
         return
     there = {SegmentName.parse(entry.name) for entry in place.entries(f"{site}/segments")}
     for name in waiting:
-        if name not in there:
-            content = outbox.path(name).read_bytes()
+        if name not in there and (content := outbox.content(name)) is not None:
             place.put(f"{site}/segments/{name}", content)
             status.sent += 1
             status.sent_bytes += len(content)
@@ -141,34 +145,55 @@ def _send_reports(reports: Path, place: Place, site: str) -> None:
         path.unlink()
 
 
-def mirror(place: Place, source: str, target: Path) -> int:
+def mirror(place: Place, target: Path) -> int:
     """Copy the signed bundles to the gateway's own disk; returns how many files came anew.
 
-    They are checked there, by their signatures (`igrow.edge.updates`). The timestamp comes last, so that the copy is at
-    every moment one that the publisher has signed.
+    They are checked there, by their signatures (`igrow.edge.updates`). What is copied is what the timestamp leads to,
+    whatever a listing shows, and the timestamp comes last: the copy is at every moment one that the publisher has
+    signed. Raises ExchangeError where a file is missing, and then the copy stays what it was.
     """
-    stamp = place.get(f"{source}/metadata/timestamp.json", LARGEST_DOCUMENT)
+    stamp = place.get("metadata/timestamp.json", LARGEST_DOCUMENT)
     file = target / "metadata" / "timestamp.json"
     if stamp is None or (file.exists() and file.read_bytes() == stamp):
         return 0
-    came = 0
-    for kind in ("targets", "metadata"):
-        folder = target / kind
-        folder.mkdir(parents=True, exist_ok=True)
-        entries = [entry for entry in place.entries(f"{source}/{kind}") if entry.name != "timestamp.json"][-MOST_FILES:]
-        for entry in entries:
-            copy = folder / entry.name
-            if not copy.exists() or copy.stat().st_size != entry.size or kind == "metadata":
-                content = place.get(f"{source}/{kind}/{entry.name}", LARGEST_BUNDLE)
-                if content is not None and not (copy.exists() and copy.read_bytes() == content):
-                    write_whole(copy, content)
-                    came += 1
-        names = {entry.name for entry in entries}
-        for path in folder.iterdir():
-            if path.name not in names and path != file:
-                path.unlink(missing_ok=True)
-    write_whole(file, stamp)
-    return came + 1
+    signed, came = signed_files(place, stamp), 0
+    roots = _roots(place)
+    for name, content in {**roots, **signed.metadata}.items():
+        came += _copy(target / "metadata" / name, content)
+    for name, length in signed.archives.items():
+        copy = target / "targets" / name
+        if not copy.exists() or copy.stat().st_size != length:
+            archive = place.get(f"targets/{name}", LARGEST_BUNDLE)
+            if archive is None:
+                raise ExchangeError(f"{place}/targets/{name}: is named by the signed metadata and not there")
+            came += _copy(copy, archive)
+    came += _copy(file, stamp)
+    named = {*roots, *signed.metadata, *signed.archives, file.name}
+    for path in target.glob("*/*"):
+        if path.name not in named:
+            path.unlink(missing_ok=True)
+    return came
+
+
+def _roots(place: Place) -> dict[str, bytes]:
+    """Return all versions of the root metadata: a gateway follows them one by one from that which it trusts."""
+    found: dict[str, bytes] = {}
+    while len(found) < MOST_ROOTS:
+        name = f"{len(found) + 1}.root.json"
+        content = place.get(f"metadata/{name}", LARGEST_DOCUMENT)
+        if content is None:
+            break
+        found[name] = content
+    return found
+
+
+def _copy(path: Path, content: bytes) -> int:
+    """Write a file that is not there yet; returns 1 where it came anew."""
+    if path.exists() and path.read_bytes() == content:
+        return 0
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(path, content)
+    return 1
 
 
 @contextmanager

@@ -2,6 +2,10 @@
 
 `chain.json` says how far the log is sealed. A segment counts from the moment that its file is there: where the power
 fails before `chain.json` follows, the newest segment's own seal tells the rest.
+
+A chain ends where its numbers no longer say what the trainer has: this gateway or the trainer was restored from a
+backup, the site was renamed, a segment was lost here. Another chain then begins, and the log is sealed from its first
+row on; what the trainer has already, it recognises.
 """
 
 from __future__ import annotations
@@ -43,6 +47,8 @@ class ChainState:
     """While the clock shows times that are sealed already: from when to when it did."""
     given_up: tuple[tuple[int, int], ...] = ()
     """Numbers of segments deleted for want of space before a receipt came."""
+    site: str = ""
+    """Whose log the chain seals; empty where that was not noted yet."""
 
 
 class Outbox:
@@ -56,6 +62,11 @@ class Outbox:
         (folder / SEGMENTS).mkdir(parents=True, exist_ok=True)
         (folder / REPORTS).mkdir(exist_ok=True)
         self.state = self._recover(_read_state(folder / CHAIN_FILE))
+        if self.state.site not in ("", site):
+            self._begin_again()
+        earlier = [name for name in self.segments() if name.chain != self.state.chain]
+        self._seal_again([name for name in earlier if self._site_of(name) != site])
+        self.move(replace(self.state, site=site))
 
     def segments(self) -> list[SegmentName]:
         """Return what waits, oldest first."""
@@ -118,16 +129,23 @@ class Outbox:
             sync_folder(self.folder)
             self.state = state
 
+    def content(self, name: SegmentName) -> bytes | None:
+        """Return a segment's file, None where the disk has spoilt it: it is deleted then, and missed by `take`."""
+        content = self.path(name).read_bytes()
+        if name.is_of(content):
+            return content
+        self.path(name).unlink(missing_ok=True)
+        return None
+
     def take(self, receipt: Receipt) -> int:
         """Forget what the trainer holds; returns how many segments that were.
 
-        A receipt for other segments than ours shows that this gateway's memory is older than what it has sent: a
-        backup was restored. From here on another chain is kept, so that no number means two things.
+        A receipt of the present chain that does not fit what this outbox has sealed ends the chain.
         """
-        if receipt.chain == self.state.chain and self._is_of_others(receipt):
-            self._begin_again()
-            return 0
         if receipt.chain == self.state.chain:
+            if self._is_of_others(receipt) or self._lacks(receipt):
+                self._begin_again()
+                return 0
             left = tuple(one for one in self.state.given_up if not all(map(receipt.holds, range(one[0], one[1] + 1))))
             self.move(replace(self.state, given_up=left))
         taken = [
@@ -141,27 +159,45 @@ class Outbox:
         return len(taken)
 
     def _is_of_others(self, receipt: Receipt) -> bool:
-        """Tell whether a receipt of the present chain names segments that this outbox did not seal."""
+        """Tell whether a receipt names segments that this outbox did not seal: its memory is that of a backup."""
         mine = {name.number: name.digest for name in self.segments() if name.chain == receipt.chain}
         mine[self.state.number] = self.state.digest
         named = {**receipt.beyond, receipt.anchor[0]: receipt.anchor[1]}
-        return max(named) > self.state.number or any(
+        return max(receipt.through, *named) > self.state.number or any(
             mine.get(number, digest) != digest for number, digest in named.items()
         )
 
+    def _lacks(self, receipt: Receipt) -> bool:
+        """Tell whether neither trainer nor outbox has a segment: an earlier receipt named it, or the disk lost it."""
+        known = {name.number for name in self.segments() if name.chain == receipt.chain}
+        known |= {number for first, last in self.state.given_up for number in range(first, last + 1)}
+        later = range(receipt.through + 1, self.state.number + 1)
+        return any(not receipt.holds(number) and number not in known for number in later)
+
     def _begin_again(self) -> None:
-        """Begin another chain; what waits of the old one is sealed again as its first segments."""
-        old = [name for name in self.segments() if name.chain == self.state.chain]
-        self.move(replace(self.state, chain=secrets.token_hex(6), number=0, digest="", given_up=()))
-        for name in old:
-            data = self.path(name).read_bytes()
+        """Begin another chain, of which the log is sealed from its first row on, and before it all that waits."""
+        chain = ChainState(secrets.token_hex(6), sealed_at=self.state.sealed_at, site=self._site)
+        old = self.segments()
+        self.move(chain)
+        self._seal_again(old)
+
+    def _seal_again(self, names: Sequence[SegmentName]) -> None:
+        """Seal what waits in other segments as segments of the present chain: the log may have it no more."""
+        for name in names:
             with contextlib.suppress(SegmentError, DamagedError):
-                segment = open_segment(name, data, self._site)
+                old = open_segment(name, self.path(name).read_bytes(), self._site_of(name))
                 self.seal(
-                    int(segment.seal.start), int(segment.seal.end), segment.telemetry, segment.events,
+                    int(old.seal.start), int(old.seal.end), old.telemetry, old.events,
                     through=self.state.through, sequence=self.state.sequence, sealed_at=self.state.sealed_at,
                 )  # fmt: skip
             self.path(name).unlink(missing_ok=True)
+
+    def _site_of(self, name: SegmentName) -> str:
+        """Return whose log a segment that waits has sealed, empty where the disk has spoilt it."""
+        try:
+            return peek_seal(self.path(name).read_bytes()).site
+        except SegmentError:
+            return ""
 
     def keep_within(self, budget: int) -> int:
         """Delete the oldest segments above `budget` bytes, never the newest; returns how many that were."""
@@ -184,7 +220,7 @@ class Outbox:
         mine = [n for n in map(SegmentName.parse, (p.name for p in (self.folder / SEGMENTS).iterdir())) if n]
         if state is None:
             if not mine:
-                state = ChainState(secrets.token_hex(6))
+                state = ChainState(secrets.token_hex(6), site=self._site)
                 self.state = replace(state, number=-1)  # so that the first move writes it
                 self.move(state)
                 return state
@@ -204,6 +240,7 @@ class Outbox:
                     through=int(seal.through),
                     sequence=seal.last_sequence,
                     given_up=seal.given_up,
+                    site=seal.site,
                 )
         return state
 
@@ -228,6 +265,7 @@ def _read_state(path: Path) -> ChainState | None:
             float(document["sealed_at"]),
             None if behind is None else (float(behind[0]), float(behind[1])),
             tuple((int(first), int(last)) for first, last in document["given_up"]),
+            str(document.get("site", "")),
         )
     except (IgrowError, OSError, KeyError, TypeError, ValueError):
         return None

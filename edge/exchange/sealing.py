@@ -42,11 +42,18 @@ class Span:
     """False for rows from before `through`, which a clock that was behind has left."""
 
 
-def observe(state: ChainState, time: float, period: int) -> tuple[ChainState, Span | None]:
-    """Return the state after the clock showed `time`, and a span that a clock behind the log has left, if any."""
+def observe(
+    state: ChainState, time: float, period: int, seen: tuple[float, float] | None = None
+) -> tuple[ChainState, Span | None]:
+    """Return the state after the clock showed `time`, and a span that a clock behind the log has left, if any.
+
+    `seen` are the lowest and the highest time that it showed after it had gone back, since the round before.
+    """
     through, behind = state.through, state.behind
-    if through and time < through - GRACE_SECONDS:
-        behind = (time, time) if behind is None else (min(behind[0], time), max(behind[1], time))
+    shown = [one for one in (time, *(seen or ())) if through and one < through - GRACE_SECONDS]
+    if shown:
+        behind = (min(*shown, *(behind or shown)), max(*shown, *(behind or shown)))
+    if time in shown and behind is not None:
         if behind[1] - behind[0] >= period:
             return replace(state, through=int(behind[0]) - SLACK_SECONDS, behind=None), None
         return replace(state, behind=behind), None
@@ -71,7 +78,15 @@ def due_span(first: int | None, through: int, time: float, period: int, *, partl
     return Span(start, now) if partly and now - first >= PARTLY_SECONDS else None
 
 
-def seal_due(outbox: Outbox, store: Path, time: float, period: int, *, partly: bool = False) -> int:
+def seal_due(
+    outbox: Outbox,
+    store: Path,
+    time: float,
+    period: int,
+    *,
+    partly: bool = False,
+    seen: tuple[float, float] | None = None,
+) -> int:
     """Seal what is due at `time`; returns the number of new segments.
 
     Args:
@@ -80,13 +95,14 @@ def seal_due(outbox: Outbox, store: Path, time: float, period: int, *, partly: b
         time: the plant's time, seconds since 1970 UTC.
         period: seconds that a segment covers.
         partly: seal also what there is of a period that is not over.
+        seen: lowest and highest time that the clock showed after it had gone back, since the round before.
 
     Raises OSError, and StoreError where the log cannot be read.
     """
     before = outbox.state.number
     if not outbox.state.sealed_at:
         outbox.move(replace(outbox.state, sealed_at=time))
-    state, left = observe(outbox.state, time, period)
+    state, left = observe(outbox.state, time, period, seen)
     if newest_sequence(store) < state.sequence:
         state = replace(state, sequence=0)  # the ledger was lost and began again
     if left is not None:

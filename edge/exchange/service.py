@@ -79,6 +79,9 @@ class ExchangeService:
         self._started = float("-inf")
         self._period_sealed = -1
         self._newest: float | None = None
+        self._front = float("-inf")
+        """The latest time that the clock ever showed."""
+        self._seen: tuple[float, float] | None = None
         self._report_waits = False
         self._problem = ""
         # Starting a process and reading what it left touch the gateway's own disk, which may hang as well.
@@ -107,6 +110,7 @@ class ExchangeService:
     def _tick(self, time: float | None) -> None:
         self._reap()
         self._newest = time
+        self._look_at(time)
         if self._process is not None:
             return
         since = self._monotonic() - self._started
@@ -115,6 +119,15 @@ class ExchangeService:
         if since >= self._rules.every or soon:
             self._start(time, partly=self._report_waits)
             self._period_sealed = period
+
+    def _look_at(self, time: float | None) -> None:
+        """Notice a clock that goes back: rounds are too rare to see what lasts for minutes."""
+        if time is None:
+            return
+        if time < self._front - GRACE_SECONDS:
+            low, high = self._seen or (time, time)
+            self._seen = (min(low, time), max(high, time))
+        self._front = max(self._front, time)
 
     def leave_report(self, time: float, name: str, content: Mapping[str, object]) -> None:
         """Leave a report for the trainer; the next round takes it, and seals the log that belongs to it.
@@ -144,7 +157,7 @@ class ExchangeService:
 
     def _start(self, time: float | None, *, partly: bool) -> None:
         self._store.flush()
-        order = replace(self._order, time=time, partly=partly)
+        order = replace(self._order, time=time, partly=partly, seen=self._seen)
         environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
         environment["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))
         try:
@@ -163,6 +176,7 @@ class ExchangeService:
             self._problem = f"exchange: no round can be started: {error.strerror or error}"
         self._started = self._monotonic()
         self._report_waits = False
+        self._seen = None  # the round seals what it tells of before it touches the exchange
 
     def _reap(self) -> None:
         """Look whether the round is over; end one that is too long."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -32,6 +33,10 @@ class SegmentName:
 
     def __str__(self) -> str:
         return f"{self.chain}-{self.number:08d}-{self.digest}.zip"
+
+    def is_of(self, content: bytes) -> bool:
+        """Tell whether a file's content is what this name was given to."""
+        return hashlib.sha256(content).hexdigest() == self.digest
 
     @classmethod
     def parse(cls, text: str) -> SegmentName | None:

@@ -71,7 +71,7 @@ def open_segment(name: SegmentName, data: bytes, site: str) -> Segment:
 
     Raises DamagedError where it is not the file that its name says, and SegmentError where it is and cannot be used.
     """
-    if _digest(data) != name.digest:
+    if not name.is_of(data):
         raise DamagedError(f"{name}: cut short or altered on its way")
     try:
         return _open(name, data, site)

@@ -28,6 +28,9 @@ class World:
 
     def __init__(self, folder: Path, place: Place | None = None, *, budget: int = 2**30, period: int = DAY) -> None:
         self.folder = folder
+        self.site = SITE
+        self.seen: tuple[float, float] | None = None
+        """What the daemon saw of a clock that went back, since the round before."""
         self.place = place or FolderPlace(folder / "exchange")
         self.budget = budget
         self.period = period
@@ -58,17 +61,20 @@ class World:
         """Let the courier make a round at this time."""
         self.store.flush()
         order = Order(
-            str(self.outbox), str(self.store.folder), SITE, "exchange", "0.1.0", time, self.period, self.budget, partly
-        )
+            str(self.outbox), str(self.store.folder), self.site, "exchange", "0.1.0", time, self.period,
+            self.budget, partly, seen=self.seen,
+        )  # fmt: skip
+        self.seen = None
         return run_round(order, place or self.place)
 
-    def collect(self, now: float, place: Place | None = None) -> Collected:
-        return collect(place or self.place, SITE, self.archive, datetime.fromtimestamp(now, UTC))
+    def collect(self, now: float, place: Place | None = None, *, take_over: bool = False) -> Collected:
+        moment = datetime.fromtimestamp(now, UTC)
+        return collect(place or self.place, self.site, self.archive, moment, take_over=take_over)
 
     def archived(self) -> dict[int, float]:
         """Return what the trainer holds, row by row as any program reads it; a repeated row is an error."""
         rows: dict[int, float] = {}
-        for path in sorted((self.folder / "archive" / "telemetry").rglob("*.parquet")):
+        for path in sorted(self.archive.telemetry_folder(self.site).rglob("*.parquet")):
             table = pq.ParquetFile(path).read()
             for time, value in zip(
                 table["time"].to_numpy().astype("datetime64[s]").astype(int).tolist(),
@@ -82,7 +88,7 @@ class World:
     def sequences(self) -> list[int]:
         """Return the sequence numbers of the archived records."""
         found: list[int] = []
-        for path in sorted((self.folder / "archive" / "events").rglob("*.parquet")):
+        for path in sorted((self.archive.root / "events" / f"site={self.site}").rglob("*.parquet")):
             found += pq.ParquetFile(path).read()["sequence"].to_pylist()
         return sorted(found)
 

@@ -1,4 +1,5 @@
-"""Seeded sequences of cut connections, full disks, repeated and reordered deliveries, clocks, and kills at any instant.
+"""Seeded sequences of cut connections, full disks, repeated and reordered deliveries, clocks and kills at any instant;
+and of memories that go back: a side restored from its backup, a second trainer, a site that gets another name.
 
 After each sequence the faults end, gateway and trainer make their rounds, and the archive must hold every row and every
 record once. A kill is an exception that nothing catches, raised before or after any one operation on a disk or on the
@@ -8,8 +9,10 @@ exchange, on either side; everything in memory is then thrown away.
 from __future__ import annotations
 
 import random
+import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -18,10 +21,13 @@ from igrow.core.errors import IgrowError
 from igrow.core.exchange import Entry, ExchangeError, FolderPlace
 from igrow.edge.exchange import outbox
 from igrow.trainer.service import archive, ledger
-from tests.exchange.gateway_and_trainer import DAY, SITE, START, World
+from igrow.trainer.service.archive import Archive
+from igrow.trainer.service.collecting import collect
+from tests.exchange.gateway_and_trainer import DAY, START, World
 
 QUICK, SOAK = 25, 600
 DAYS = 5
+STEPS = [*("round", "collect", "repeat") * 4, "second trainer", "renamed", "trainer", "gateway"]
 
 
 class Killed(BaseException):
@@ -68,6 +74,8 @@ class BadPlace(FolderPlace):
         return found
 
     def get(self, path: str, largest: int) -> bytes | None:
+        if self.chance.hits(0.05) and "/receipts/" in path:
+            return (super().get(path, largest) or b"")[: self.chance.random.randrange(100)]
         return self.chance.around(lambda: super(BadPlace, self).get(path, largest), self._cut)  # type: ignore[return-value]
 
     def put(self, path: str, content: bytes) -> None:
@@ -101,36 +109,72 @@ def bad_disks(patch: pytest.MonkeyPatch, chance: Chance) -> Iterator[None]:
     patch.undo()
 
 
+class Backups:
+    """Copies of what one side remembers, which come back in its place when it has moved on."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        self.sides = {"trainer": world.archive.root, "gateway": world.outbox}
+
+    def turn(self, side: str) -> None:
+        """Make a copy where there is none, else restore it."""
+        present = self.sides[side]
+        copy = self.world.folder / f"{side}-backup"
+        if copy.exists():
+            shutil.rmtree(present, ignore_errors=True)
+            copy.rename(present)
+        elif present.exists():
+            shutil.copytree(present, copy)
+
+
+def log_with_jumps(world: World, chance: Chance, now: float, later: float) -> None:
+    """Let the gateway measure for some hours; its clock may go back for a part of one, seen by no round."""
+    world.log(now, later, 3600)
+    if chance.hits(0.2):
+        begin = now - chance.random.choice([5, 30, 60]) * 3600 + chance.random.randrange(1, 3000)
+        end = begin + chance.random.choice([600, 3000])
+        world.log(begin, end, 300)
+        world.seen = (begin, end)
+
+
 def run_sequence(folder: Path, seed: int, patch: pytest.MonkeyPatch) -> None:
     chance = Chance(seed)
     place = BadPlace(folder / "exchange", chance)
     world = World(folder, place, period=chance.random.choice([DAY, DAY // 4]))
+    backups = Backups(world)
     with bad_disks(patch, chance):
         now = START
         while now < START + DAYS * DAY:
             later = now + chance.random.choice([6, 12, 24, 30]) * 3600
-            world.log(now, later, 3600)
+            log_with_jumps(world, chance, now, later)
             now = later
             for _ in range(chance.random.randrange(1, 4)):
                 clock = now + 300 if not chance.hits(0.1) else now + chance.random.choice([-400, 3653]) * DAY
-                step = chance.random.choice(["round", "collect", "repeat"])
+                step = chance.random.choice(STEPS)
                 try:
                     if step == "round":
                         world.round(clock, partly=chance.random.random() < 0.2)
                     elif step == "collect":
                         world.collect(now + 2 * DAY)
+                    elif step == "second trainer":
+                        second = Archive(folder / "second")
+                        collect(place, world.site, second, datetime.fromtimestamp(now + 2 * DAY, UTC))
+                    elif step == "renamed":
+                        world.site = f"house-{chance.random.randrange(100)}"
+                    elif step in backups.sides:
+                        backups.turn(step)
                     else:
                         place.repeat()
                 except (Killed, IgrowError, OSError):
                     continue
         chance.healed = True
-        for _ in range(3):
+        for _ in range(5):
             now += DAY
             world.log(now, now + 3600, 3600)
             assert world.round(now + DAY + 300).problem == ""
-            world.collect(now + DAY)
+            world.collect(now + DAY, take_over=True)
         assert world.round(now + DAY + 900).waiting == 0
-        assert place.entries(f"{SITE}/segments") == []
+        assert place.entries(f"{world.site}/segments") == []
         notes = world.collect(now + 2 * DAY).notes
     assert notes == []
     world.assert_complete()

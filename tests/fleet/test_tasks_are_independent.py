@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.processes import below
 from igrow.trainer.fleet.registry import Backend
 from igrow.trainer.fleet.runner import run_tasks
 from igrow.trainer.fleet.tasks import Ending, Outcome, Task
@@ -96,6 +97,30 @@ def test_a_local_ray_of_two_workers_gives_the_same_digits_when_one_is_killed(tmp
     expected = digits(outcomes(*tasks))
     assert {name: result for name, (_, result) in found.items() if name in expected} == expected
     assert all(ending == "done" for ending, _ in found.values())
+
+
+def test_a_cluster_that_is_not_there_is_one_sentence() -> None:
+    from igrow.core.errors import IgrowError
+
+    with pytest.raises(IgrowError, match=r"no Ray cluster at 127\.0\.0\.1:1: "):
+        list(run_tasks([task("one", "compute", {"seed": 1})], Backend.RAY, address="127.0.0.1:1"))
+
+
+def test_a_process_that_was_just_forked_is_no_worker(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It shows its parent's command line, which may hold a script with the name that is looked for."""
+
+    class Process:
+        def __init__(self, *words: str) -> None:
+            self.words = words
+
+        def cmdline(self) -> list[str]:
+            return list(self.words)
+
+        def children(self, *, recursive: bool) -> list[Process]:
+            return [Process("python", "-c", "kill_one('ray::run_limited')"), Process("ray::run_limited")]
+
+    monkeypatch.setattr("psutil.Process", lambda: Process("python"))
+    assert [one.cmdline() for one in below("ray::run_limited")] == [["ray::run_limited"]]
 
 
 def test_a_backend_that_is_not_there_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:

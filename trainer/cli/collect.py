@@ -27,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--forward", metavar="TARGET", help="write new days to InfluxDB or PostgreSQL too, or to a file"
     )
+    parser.add_argument("--take-over", action="store_true", help="go on where another archive has collected so far")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -35,10 +36,10 @@ def run(arguments: argparse.Namespace) -> int:
     failed = False
     for site in arguments.site:
         try:
-            done = collect(place, site, archive, utc_now())
+            done = collect(place, site, archive, utc_now(), take_over=arguments.take_over)
             if arguments.forward is not None:
                 forward(archive, site, arguments.forward, utc_now().date() + timedelta(days=1))
-        except IgrowError as error:
+        except (IgrowError, OSError) as error:
             print(f"{site}: error; {error}", flush=True)
             failed = True
             continue

@@ -40,6 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     status.add_argument("--page", type=Path, metavar="FOLDER", help="write the page and the reports into this folder")
     for one, days in ((diagnose, DAYS), (recalibrate, DAYS), (calibrate, DAYS), (learn, DAYS + LATER_DAYS)):
         one.add_argument("--days", type=int, default=days, help=f"newest days of the log (default {days})")
+    collect.add_argument("--take-over", action="store_true", help="go on where another archive has collected so far")
     recalibrate.add_argument("--force", action="store_true", help="also the sites that are not due")
     publish.add_argument("--again", action="store_true", help="publish each site's bundle again, as after a new key")
 
@@ -84,7 +85,10 @@ def make_task(arguments: argparse.Namespace, registry: Registry, entry: Entry, n
     common = {"state": str(registry.state.resolve()), "exchange": exchange, "now": now.timestamp()}
     keys = str(registry.keys.resolve())
     given: dict[str, Callable[[], tuple[str, dict[str, Any]]]] = {
-        "collect": lambda: ("collect_site", {"site": entry.site.name, "forward_to": registry.file.forward}),
+        "collect": lambda: (
+            "collect_site",
+            {"site": entry.site.name, "forward_to": registry.file.forward, "take_over": arguments.take_over},
+        ),
         "publish": lambda: ("publish_site", {"site": entry.site.name, "keys": keys, "again": arguments.again}),
         "diagnose": lambda: (
             "recalibrate_site",

@@ -7,8 +7,10 @@ is killed costs a retry of its task, a run that is killed costs the tasks that h
 from __future__ import annotations
 
 import importlib
+import socket
 from collections.abc import Iterator, Sequence
 from typing import Any
+from urllib.parse import urlsplit
 
 from joblib import Parallel, delayed
 
@@ -16,6 +18,9 @@ from igrow.core.errors import IgrowError
 from igrow.trainer.fleet.registry import Backend
 from igrow.trainer.fleet.tasks import Outcome, Task
 from igrow.trainer.fleet.worker import close_all, run_limited
+
+ANSWERS_SECONDS = 20.0
+"""Within which the head of a cluster takes a connection."""
 
 
 def run_tasks(
@@ -45,10 +50,9 @@ def run_tasks(
 def _on_ray(tasks: Sequence[Task], workers: int, address: str | None) -> Iterator[Outcome]:
     ray = _ray()
     began = not ray.is_initialized()
+    if began:
+        _connect(ray, workers, address)
     try:
-        if began:
-            local = {"num_cpus": workers, "include_dashboard": False} if address is None else {}
-            ray.init(address=address, log_to_driver=False, configure_logging=False, **local)
         # A worker that dies takes no task with it: the cluster gives the task to another.
         remote = ray.remote(num_cpus=1, max_retries=3)(run_limited)
         waiting = [remote.remote(task) for task in tasks]
@@ -56,12 +60,33 @@ def _on_ray(tasks: Sequence[Task], workers: int, address: str | None) -> Iterato
             ready, waiting = ray.wait(waiting, num_returns=1)
             yield ray.get(ready[0])
     except ray.exceptions.RayError as error:
-        raise IgrowError(f"the Ray cluster: {str(error).strip().splitlines()[0]}") from None
-    except ConnectionError as error:
-        raise IgrowError(f"no Ray cluster at {address}: {error}") from None
+        raise IgrowError(f"the Ray cluster: {_first_line(error)}") from None
     finally:
         if began:
             ray.shutdown()
+
+
+def _connect(ray: Any, workers: int, address: str | None) -> None:
+    """Join the cluster at `address`, or start one on this machine; raises IgrowError."""
+    given = address or ""
+    parts = urlsplit(given if "://" in given else f"ray://{given}")
+    if parts.hostname and parts.port:
+        try:
+            # Asked first, since Ray itself waits for minutes where nobody answers.
+            socket.create_connection((parts.hostname, parts.port), timeout=ANSWERS_SECONDS).close()
+        except OSError as error:
+            raise IgrowError(f"no Ray cluster at {address}: {error}") from None
+    local = {"num_cpus": workers, "include_dashboard": False} if address is None else {}
+    try:
+        ray.init(address=address, log_to_driver=False, configure_logging=False, **local)
+    except Exception as error:  # whatever it is, Ray raises it as a bare Exception too
+        ray.shutdown()
+        where = "Ray does not start on this machine" if address is None else f"no Ray cluster at {address}"
+        raise IgrowError(f"{where}: {_first_line(error)}") from None
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).strip().splitlines() or [type(error).__name__])[0]
 
 
 def _ray() -> Any:

@@ -33,11 +33,17 @@ REFRESH_BEFORE = timedelta(days=30)
 
 
 def collect_site(
-    site: str, state: str, exchange: dict[str, str | None], now: float, forward_to: str | None = None
+    site: str,
+    state: str,
+    exchange: dict[str, str | None],
+    now: float,
+    forward_to: str | None = None,
+    *,
+    take_over: bool = False,
 ) -> dict[str, Any]:
     """Collect one site; its newest outcome stands in `collected.json`, and what people should know in its history."""
     moment = datetime.fromtimestamp(now, UTC)
-    done = collect(_place(exchange), site, Archive(Path(state) / "archive"), moment)
+    done = collect(_place(exchange), site, Archive(Path(state) / "archive"), moment, take_over=take_over)
     document = {
         "time": moment.strftime("%Y-%m-%dT%H:%M:%SZ"),
         "command": "collect",

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import io
 import tarfile
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -31,8 +32,9 @@ from tuf.api.serialization import DeserializationError
 from tuf.api.serialization.json import JSONSerializer
 
 from igrow.core.bundle import Bundle, read_bundle, self_test
-from igrow.core.exchange import FolderPlace, Place
+from igrow.core.exchange import ExchangeError, FolderPlace, Place
 from igrow.core.exchange.documents import LARGEST_DOCUMENT
+from igrow.core.exchange.signed_files import signed_files
 from igrow.trainer.publishing.keys import PublishingError, load_root, load_signer, root_versions
 
 KEPT_VERSIONS = 8
@@ -131,9 +133,18 @@ def _write_chain(place: Place, keys: Path, targets: int, now: datetime, lifetime
 
 
 def _newest_version(place: Place, role: str) -> int:
-    """Return the newest version of targets or snapshot that is there, 0 where there is none."""
-    numbers = [entry.name.split(".")[0] for entry in place.entries("metadata") if entry.name.endswith(f".{role}.json")]
-    return max((int(number) for number in numbers if number.isdigit() and len(number) < 10), default=0)
+    """Return the newest version of targets or snapshot that is there, 0 where there is none.
+
+    What the present timestamp leads to counts too: a listing may show a part, and no version may be given twice.
+    """
+    names = [entry.name.split(".")[0] for entry in place.entries("metadata") if entry.name.endswith(f".{role}.json")]
+    numbers = [int(number) for number in names if number.isdigit() and len(number) < 10]
+    stamp = place.get("metadata/timestamp.json", LARGEST_DOCUMENT)
+    if stamp is not None:
+        with suppress(ExchangeError):
+            signed = signed_files(place, stamp)
+            numbers.append(signed.targets if role == "targets" else signed.snapshot)
+    return max(numbers, default=0)
 
 
 def _load_targets(place: Place, keys: Path) -> Targets:

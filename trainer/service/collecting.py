@@ -21,6 +21,7 @@ from igrow.core.exchange import DamagedError, ExchangeError, Place, Segment, Seg
 from igrow.core.exchange.segment import LARGEST_SEGMENT
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.service.archive import Archive
+from igrow.trainer.service.claim import claim
 from igrow.trainer.service.ledger import SiteLedger, read_ledger
 
 AHEAD = timedelta(days=1)
@@ -49,13 +50,15 @@ class Collected:
     """One sentence for each thing that a person should know."""
 
 
-def collect(place: Place, site: str, archive: Archive, now: datetime) -> Collected:
-    """Collect everything that site `site` left in the exchange.
+def collect(place: Place, site: str, archive: Archive, now: datetime, *, take_over: bool = False) -> Collected:
+    """Collect everything that site `site` left in the exchange; `take_over` where another archive has collected it.
 
-    Raises ExchangeError where the exchange fails, and IgrowError where another run collects the same site.
+    Raises ExchangeError where the exchange fails, and IgrowError where another run, or another trainer, collects the
+    same site.
     """
     done = Collected(site)
     with _alone(archive, site):
+        claim(place, site, archive.root, now, take_over=take_over)
         ledger = read_ledger(archive.root, site)
         found = [name for entry in place.entries(f"{site}/segments") if (name := SegmentName.parse(entry.name))]
         found.sort(key=lambda name: (name.chain, name.number, name.digest))

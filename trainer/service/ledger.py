@@ -45,6 +45,7 @@ class SiteLedger:
     path: Path
     site: str
     chains: dict[str, Chain] = field(default_factory=dict)
+    """In the order in which the last segment of each came."""
     newest: datetime | None = None
     """Time of the newest row."""
 
@@ -61,7 +62,7 @@ class SiteLedger:
     def add(self, segment: Segment) -> list[str]:
         """Note a segment; returns a sentence for each break of its chain."""
         name, seal = segment.name, segment.seal
-        chain = self.chains.setdefault(name.chain, Chain(Receipt(name.chain)))
+        chain = self._chain(name.chain)
         notes = self._breaks(chain, segment)
         lost = [n for first, last in seal.given_up for n in range(first, last + 1) if not chain.receipt.holds(n)]
         if lost:
@@ -80,20 +81,29 @@ class SiteLedger:
 
     def add_refused(self, name: SegmentName) -> None:
         """Note a segment that cannot be used: it is not wanted again."""
-        chain = self.chains.setdefault(name.chain, Chain(Receipt(name.chain)))
+        chain = self._chain(name.chain)
         chain.links.setdefault(name.number, Link(name.digest, "", 0.0, 0.0))
         chain.receipt = chain.receipt.with_segments({name.number: name.digest})
 
     def missing(self) -> list[str]:
-        """Return a sentence for each gap in a chain, with the days that it covers."""
+        """Return a sentence for each gap, with the days that it covers, in the chain that a segment came of last.
+
+        A gateway that began another chain has sealed in it what it has still; nothing more comes of those before.
+        """
         notes = []
-        for chain in self.chains.values():
+        for chain in list(self.chains.values())[-1:]:
             for first, last in chain.receipt.gaps():
                 before, after = chain.links.get(first - 1), chain.links.get(last + 1)
                 days = f", {_day(before.end)} to {_day(after.start)}" if before and after else ""
                 which = f"segment {first} has" if first == last else f"segments {first} to {last} have"
                 notes.append(f"{which} not come yet{days}")
         return notes
+
+    def _chain(self, name: str) -> Chain:
+        """Return a chain, which is then the last one that a segment came of."""
+        chain = self.chains.pop(name) if name in self.chains else Chain(Receipt(name))
+        self.chains[name] = chain
+        return chain
 
     def save(self) -> None:
         """Write the ledger, durably; raises OSError."""
@@ -139,7 +149,7 @@ def read_ledger(archive: Path, site: str) -> SiteLedger:
         document = parse_object(path.read_bytes(), str(path))
         newest = document["newest"]
         chains = {one["chain"]: _chain(one) for one in document["chains"]}
-    except (IgrowError, OSError, KeyError, TypeError, ValueError):
+    except (IgrowError, OSError, KeyError, TypeError, ValueError, ArithmeticError):
         return empty
     return SiteLedger(path, site, chains, None if newest is None else datetime.fromtimestamp(newest, UTC))
 
