@@ -22,6 +22,8 @@ class RunningDaemon:
         self.folder = folder
         self.state = folder / "state"
         self.daemon: subprocess.Popen[bytes] | None = None
+        self.runs = False
+        """It was started, and nobody has ended it since."""
         self._environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
         register_map = ROOT / "config" / "register-maps" / "virtual-plc.yaml"
         command = [*COMMAND, "simulate-plc", "--map", str(register_map), "--port", "0"]
@@ -47,24 +49,32 @@ class RunningDaemon:
             [*COMMAND, "run", str(self.configuration)], stdout=log, stderr=log, env={**self._environment, **environment}
         )
         log.close()
+        self.runs = True
 
     def kill(self) -> None:
         """Kill -9."""
         assert self.daemon is not None
+        self.runs = False
         self.daemon.kill()
         self.daemon.wait()
 
     def stop(self) -> int:
         """Stop as systemd does; returns the exit status."""
         assert self.daemon is not None
+        self.runs = False
         self.daemon.send_signal(signal.SIGTERM)
         return self.daemon.wait(60)
 
     def wait_for(self, condition, seconds: float = 900.0) -> None:
-        """Wait until a condition holds; the limit only ends a hang, on however busy a machine."""
+        """Wait until a condition holds; a daemon that was not ended has to live on until then.
+
+        The limit only ends a hang, on however busy a machine.
+        """
         until = time.monotonic() + seconds
         while not condition():
-            assert self.daemon is None or self.daemon.poll() is None, (self.folder / "daemon.log").read_text()
+            assert not self.runs or self.daemon is None or self.daemon.poll() is None, (
+                self.folder / "daemon.log"
+            ).read_text()
             assert time.monotonic() < until, (self.folder / "daemon.log").read_text()[-2000:]
             time.sleep(0.05)
 
