@@ -23,7 +23,7 @@ def read_state(path: Path) -> dict[str, object]:
     """
     try:
         content = json.loads(path.read_text("utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return {}
     return content if isinstance(content, dict) else {}
 
@@ -52,57 +52,57 @@ def alone_in(folder: Path, *, wait: bool = True) -> Iterator[None]:
         os.close(descriptor)
 
 
+Stamp = tuple[int, int] | None
+"""Tells one state of a file from another; None where it is absent."""
+
+
 class StateFile:
-    """A state file as the control cycle has it: a disk that hangs can neither hold its reader nor its writer."""
+    """A state file as the control cycle has it: a disk that hangs can neither hold its reader nor its writer.
+
+    People leave such files, by command or on the page, and the daemon answers in them. What it answers never goes over
+    something that it has not read.
+    """
 
     def __init__(self, path: Path, aside: HandOff) -> None:
         """Several files may share one `aside`."""
         self.path = path
         self._aside = aside
+        self._taken: Stamp = None
+        """The state of the file whose content `news` returned last."""
         self._problem = ""
-        self._unread = ""
+        self.unread = ""
+        """Empty while it can be read, else one line."""
 
     @property
     def problem(self) -> str:
         """Empty while it can be read and written, else one line."""
-        return self._aside.problem or self._unread or self._problem
+        return self._aside.problem or self.unread or self._problem
 
-    def read(self) -> dict[str, object]:
-        """Return what the file holds; raises LateError."""
-        return self._aside.ask(lambda: read_state(self.path))
+    def news(self) -> dict[str, object] | None:
+        """Return what the file holds, nothing where it is absent; None where that has not changed since the last time.
 
-    def content(self) -> dict[str, object] | None:
-        """Return what the file holds, nothing where it is absent; None where it cannot be read, and `problem` says so.
-
-        To be called aside.
+        Nor is there news where it cannot be read, and `unread` says so. Raises LateError.
         """
-        try:
-            content = json.loads(self.path.read_text("utf-8"))
-            if not isinstance(content, dict):
-                raise ValueError("no JSON object")
-        except FileNotFoundError:
-            content = {}
-        except (OSError, ValueError) as error:
-            why = error.strerror if isinstance(error, OSError) else error
-            self._unread = f"{self.path} cannot be read ({why}), so what it said before goes on"
-            return None
-        self._unread = ""
+        stamp, content = self._aside.ask(self._changed)
+        if content is not None:
+            self._taken = stamp
         return content
 
     def do(self, work: Callable[[], T]) -> T:
         """Return what `work` with the file returns; raises LateError."""
         return self._aside.ask(work)
 
-    def write(self, content: Mapping[str, object], unless: Callable[[], bool] = lambda: False) -> None:
-        """Replace the file, at once where the disk answers in time; not where `unless` then holds.
+    def answer(self, content: Mapping[str, object]) -> None:
+        """Replace what `news` returned last, at once where the disk answers in time.
 
-        Nor where somebody else is changing it in this very moment: what he leaves is seen the next time.
+        Not where somebody has changed the file since, or is doing so now: what he leaves is news the next time.
         """
+        taken = self._taken
 
         def now() -> None:
             try:
                 with alone_in(self.path.parent, wait=False):
-                    if not unless():
+                    if self._stamp() == taken:
                         self._problem = write_state(self.path, content)
             except BlockingIOError:
                 pass
@@ -111,3 +111,33 @@ class StateFile:
 
         with contextlib.suppress(LateError):
             self._aside.do(now)
+
+    # aside
+
+    def _changed(self) -> tuple[Stamp, dict[str, object] | None]:
+        stamp = self._stamp()
+        if stamp == self._taken:
+            self.unread = ""
+            return stamp, None
+        return stamp, self._content()
+
+    def _stamp(self) -> Stamp:
+        try:
+            status = self.path.stat()
+        except OSError:
+            return None
+        return status.st_mtime_ns, status.st_ino
+
+    def _content(self) -> dict[str, object] | None:
+        try:
+            content = json.loads(self.path.read_text("utf-8"))
+            if not isinstance(content, dict):
+                raise ValueError("no JSON object")
+        except FileNotFoundError:
+            content = {}
+        except (OSError, ValueError, RecursionError) as error:
+            why = error.strerror if isinstance(error, OSError) else error
+            self.unread = f"{self.path} cannot be read ({why}), so what it said before goes on"
+            return None
+        self.unread = ""
+        return content

@@ -21,7 +21,7 @@ from igrow.edge.records import AlarmRecord
 from igrow.edge.separating_tests.approval import Approval, approval_of, to_plain
 from igrow.edge.separating_tests.hindrances import by_cycle, by_image, by_sun, does_not_follow
 from igrow.edge.sources.decision import Offer
-from igrow.edge.state_file import StateFile, read_state
+from igrow.edge.state_file import StateFile
 
 COMPLETED = "it ran to its end"
 BEGAN_ANEW = "control began anew while it ran: the daemon was started, or read its configuration, again"
@@ -73,7 +73,6 @@ class SeparatingTests:
         self._place = place
         self._boot = boot
         self._tell = tell
-        self._stamp: tuple[int, int] | None = None
         self._looked_at: float | None = None
         self._approval: Approval | None = None
         self._told: int | None = None
@@ -235,27 +234,14 @@ class SeparatingTests:
     def _look(self, image: Image) -> None:
         """Take over what the file holds when it has changed."""
         with contextlib.suppress(LateError):
-            stamp, content = self._file.do(self._changed)
-            self._looked_at = image.monotonic
+            content = self._file.news()
+            if not self._file.unread:
+                self._looked_at = image.monotonic
             if content is not None:
-                self._stamp, self._approval = stamp, approval_of(content)
-
-    def _changed(self) -> tuple[tuple[int, int] | None, dict[str, object] | None]:
-        """Return the file's stamp, and its content where it has changed (aside)."""
-        stamp = self._file_stamp()
-        return stamp, (read_state(self._file.path) if stamp else {}) if stamp != self._stamp else None
+                self._approval = approval_of(content)
 
     def _write(self, approval: Approval) -> None:
-        read = self._stamp
-        # Not over what somebody has left there in the meantime: it is seen in the next cycle.
-        self._file.write(to_plain(approval), unless=lambda: self._file_stamp() != read)
-
-    def _file_stamp(self) -> tuple[int, int] | None:
-        try:
-            status = self._file.path.stat()
-        except OSError:
-            return None
-        return status.st_mtime_ns, status.st_ino
+        self._file.answer(to_plain(approval))
 
     def _now(self, image: Image) -> Moment:
         return Moment(self._boot, image.monotonic, image.true_time)

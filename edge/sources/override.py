@@ -106,7 +106,6 @@ class GrowerOverride:
         self._file = file
         self._boot = boot
         self._tell = tell
-        self._stamp: tuple[int, int] | None = None
         self._leases: dict[str, Lease] = {}
         self._ends: dict[str, float] = {}
 
@@ -136,17 +135,11 @@ class GrowerOverride:
     def _look(self, image: Image) -> None:
         """Take over what the file holds when it has changed."""
         with contextlib.suppress(LateError):
-            stamp, content = self._file.do(self._changed)
+            content = self._file.news()
             if content is not None:
-                self._stamp = stamp
                 leases = _leases(content)
                 self._say(leases, str(content.get(GIVEN_BACK_BY) or ""), image)
                 self._take(leases, image)
-
-    def _changed(self) -> tuple[tuple[int, int] | None, dict[str, object] | None]:
-        """Return the file's stamp, and its content where it has changed (aside)."""
-        stamp = self._file_stamp()
-        return stamp, None if stamp == self._stamp else self._file.content()
 
     def _say(self, leases: Mapping[str, Lease], given_back_by: str, image: Image) -> None:
         """Tell what is new, and what was given back before its time; what a restart finds again is neither."""
@@ -180,16 +173,7 @@ class GrowerOverride:
             dated[name] = replace(lease, until=end if lease.until is None else lease.until, seen=lease.seen or now)
         self._leases = dated
         if dated != leases:
-            read = self._stamp
-            # Not over another override that the grower has left in the meantime.
-            self._file.write(_plain(dated), unless=lambda: self._file_stamp() != read)
-
-    def _file_stamp(self) -> tuple[int, int] | None:
-        try:
-            status = self._file.path.stat()
-        except OSError:
-            return None
-        return status.st_mtime_ns, status.st_ino
+            self._file.answer(_plain(dated))
 
 
 class WantedRecipe:

@@ -262,7 +262,7 @@ def test_it_needs_a_whole_night_and_a_clock(gateway: Gateway) -> None:
 
 def test_a_file_that_cannot_be_written_begins_nothing(gateway: Gateway, monkeypatch: pytest.MonkeyPatch) -> None:
     gateway.approve()
-    monkeypatch.setattr(StateFile, "write", lambda *_, **__: None)
+    monkeypatch.setattr(StateFile, "answer", lambda *_: None)
     assert gateway.cycle(50) == {}
     assert gateway.kinds() == ["approved"]
 
@@ -274,3 +274,16 @@ def test_a_broken_file_is_no_approval(gateway: Gateway, content: str) -> None:
     gateway.path.write_text(content)
     assert gateway.cycle(5) == {}
     assert gateway.events == []
+
+
+def test_a_file_that_is_broken_while_a_test_runs_ends_it_only_when_it_stays_so(gateway: Gateway) -> None:
+    gateway.approve()
+    gateway.cycle(5)
+    whole = gateway.path.read_bytes()
+    gateway.path.write_bytes(whole[: len(whole) // 2])
+    assert gateway.cycle(5)
+    gateway.path.write_bytes(whole)
+    assert gateway.cycle(5)
+    gateway.path.write_bytes(whole[: len(whole) // 2])
+    assert gateway.cycle(12) == {}
+    assert gateway.why == "nobody can read whether it was withdrawn"
