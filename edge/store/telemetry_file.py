@@ -45,7 +45,10 @@ class TelemetryFile:
         """What was cured since the owner last emptied this list, one line each."""
 
     def add(self, rows: Sequence[Row]) -> None:
-        """Commit rows together; a row of a time that is there already replaces it."""
+        """Commit rows together; one of a time that is there already, after a clock stepped back, goes right behind it.
+
+        The same row is not added twice, so that a commit of which nobody knows whether it was made can be repeated.
+        """
         try:
             self._add(rows)
         except sqlite3.Error as error:
@@ -93,10 +96,8 @@ class TelemetryFile:
         connection = self._open()
         connection.execute("BEGIN IMMEDIATE")
         try:
-            connection.executemany(
-                "INSERT OR REPLACE INTO rows VALUES (?, ?, ?)",
-                [(row.milliseconds, self._layout(connection, row.names), row.packed) for row in rows],
-            )
+            for row in rows:
+                _insert(connection, row.milliseconds, self._layout(connection, row.names), row.packed)
             connection.execute("COMMIT")
         except BaseException:
             self._layouts = {}
@@ -207,6 +208,17 @@ def salvage(damaged: Path, connection: sqlite3.Connection, *, tries: int = 4096)
                 connection.execute("COMMIT")
                 saved += len(rows)
     return saved
+
+
+def _insert(connection: sqlite3.Connection, milliseconds: int, layout: int, packed: bytes) -> None:
+    """Add a row at its time or, where another one stands there, at the next free millisecond."""
+    while (
+        connection.execute("INSERT OR IGNORE INTO rows VALUES (?, ?, ?)", (milliseconds, layout, packed)).rowcount == 0
+    ):
+        there = connection.execute("SELECT layout, packed FROM rows WHERE milliseconds = ?", (milliseconds,)).fetchone()
+        if there == (layout, packed):
+            return
+        milliseconds += 1
 
 
 def _read(connection: sqlite3.Connection, start: int, end: int) -> Telemetry:

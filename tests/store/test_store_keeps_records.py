@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +16,8 @@ from igrow.edge.image import Quality, Value
 from igrow.edge.records import AlarmRecord
 from igrow.edge.store import SqliteStore, StoreError, StoreLimits, backup, export, read_records, read_telemetry, restore
 from igrow.edge.store.packing import pack, unpack_good
+from igrow.edge.store.store import TELEMETRY_FILE
+from igrow.edge.store.telemetry_file import TelemetryFile
 from tests.store.store_helpers import START, values, write_record
 
 
@@ -50,6 +54,34 @@ def test_rows_come_back_before_and_after_their_commit(tmp_path: Path) -> None:
     assert telemetry["air_temperature"].tolist() == [21.0 + index for index in range(11)]
     store.close()
     assert len(read_telemetry(tmp_path, START, START + 1e6)) == 30
+
+
+def test_a_clock_that_steps_back_overwrites_no_row(tmp_path: Path) -> None:
+    """What was logged of these times before stays in the file, and what is logged now is what is read of them."""
+    store = SqliteStore(tmp_path)
+    rounds = range(3)
+    for around in rounds:
+        for index in range(30):
+            store.append(START + 5 * index, values(20.0 + index + 100 * around))
+        store.flush()
+    store.close()
+    with closing(sqlite3.connect(tmp_path / TELEMETRY_FILE)) as connection:
+        found = connection.execute("SELECT milliseconds / 1000, packed FROM rows ORDER BY milliseconds").fetchall()
+    names = tuple(values(0.0))
+    kept = [(time - START, unpack_good(names, [packed])[0][names.index("air_temperature")]) for time, packed in found]
+    assert kept == [(5 * index, 20.0 + index + 100 * around) for index in range(30) for around in rounds]
+    telemetry = read_telemetry(tmp_path, START, START + 1e6)
+    assert telemetry["air_temperature"].tolist() == [220.0 + index for index in range(30)]
+
+
+def test_a_commit_of_which_nobody_knows_whether_it_was_made_can_be_repeated(tmp_path: Path) -> None:
+    file = TelemetryFile(tmp_path / TELEMETRY_FILE, max_bytes=2**20, synchronous="OFF")
+    rows = [pack(START + 5 * index, values(20.0 + index)) for index in range(10)]
+    for batch in (rows[:6], rows, rows):
+        file.add(batch)
+    file.close()
+    with closing(sqlite3.connect(tmp_path / TELEMETRY_FILE)) as connection:
+        assert connection.execute("SELECT count(*) FROM rows").fetchone() == (10,)
 
 
 def test_bad_values_read_as_missing_and_points_outside_the_registry_are_left_out(tmp_path: Path) -> None:
