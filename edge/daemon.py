@@ -131,21 +131,34 @@ class Daemon:
     async def _remember(self) -> None:
         """Carry over what a restart must not forget; while its disk hangs, leave all setpoints as they stand."""
         control, earlier = self._control, self._earlier
-        if earlier is None or control is None:
+        assert control is not None
+        if earlier is None:
+            if control.clock.monotonic() >= control.cycle.unknown_until:
+                self._journal.alarm("memory", "")
             return
         if self.cycles == 0:
             patience = SIMULATED_PATIENCE if control.lockstep else PATIENCE
             await settled(earlier, patience)
-        if earlier.done():
+        if not earlier.done():
+            self._leave_all_alone(control, "cannot be read yet")
+            return
+        self._earlier = None
+        try:
             remember(control, earlier.result())
-            self._earlier = None
+        except Exception as error:
+            log.exception("what the run before this one has noted makes no sense")
+            self._leave_all_alone(control, f"makes no sense as it was noted ({type(error).__name__}: {error})")
+        else:
             control.cycle.unknown_until = -math.inf
-            self._journal.alarm("memory", "")
-        elif control.cycle.unknown_until == -math.inf:
+
+    def _leave_all_alone(self, control: Control, why: str) -> None:
+        """Keep every setpoint where it stands, for as long as a hand before the start may have to be respected."""
+        if control.cycle.unknown_until == -math.inf:
             respected = control.configuration.file.cycle.respect_hand.total_seconds()
             control.cycle.unknown_until = control.clock.monotonic() + respected
-            text = "what was set by hand before the start cannot be read yet, so all setpoints are left as they stand"
-            self._journal.alarm("memory", text)
+        self._journal.alarm(
+            "memory", f"what was set by hand before the start {why}, so all setpoints are left as they stand"
+        )
 
     async def _cycle(self, control: Control) -> None:
         result = await control.cycle.run()

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeGuard
 
 BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 
@@ -41,9 +43,13 @@ def from_json(content: object) -> Moment | None:
     if not isinstance(content, Mapping):
         return None
     boot, monotonic, time = content.get("boot"), content.get("monotonic"), content.get("time")
-    if not isinstance(boot, str) or not isinstance(monotonic, int | float):
+    if not isinstance(boot, str) or not _is_time(monotonic):
         return None
-    return Moment(boot, float(monotonic), float(time) if isinstance(time, int | float) else None)
+    return Moment(boot, monotonic, time if _is_time(time) else None)
+
+
+def _is_time(value: object) -> TypeGuard[float]:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def this_boot() -> str:

@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TypeVar
 
+from igrow.core.errors import IgrowError
+from igrow.core.exchange.documents import parse_object
 from igrow.core.whole_files import write_whole
 from igrow.edge.hand_off import HandOff, LateError
 
@@ -22,10 +24,9 @@ def read_state(path: Path) -> dict[str, object]:
     A broken state file is as good as none: what it holds (leases, holds) is safe to forget.
     """
     try:
-        content = json.loads(path.read_text("utf-8"))
-    except (OSError, ValueError, RecursionError):
+        return parse_object(path.read_bytes(), str(path))
+    except (OSError, IgrowError):
         return {}
-    return content if isinstance(content, dict) else {}
 
 
 def write_state(path: Path, content: Mapping[str, object]) -> str:
@@ -130,12 +131,10 @@ class StateFile:
 
     def _content(self) -> dict[str, object] | None:
         try:
-            content = json.loads(self.path.read_text("utf-8"))
-            if not isinstance(content, dict):
-                raise ValueError("no JSON object")
+            content = parse_object(self.path.read_bytes(), self.path.name)
         except FileNotFoundError:
             content = {}
-        except (OSError, ValueError, RecursionError) as error:
+        except (OSError, IgrowError) as error:
             why = error.strerror if isinstance(error, OSError) else error
             self.unread = f"{self.path} cannot be read ({why}), so what it said before goes on"
             return None

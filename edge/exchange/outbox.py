@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import secrets
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -256,7 +257,7 @@ def _read_state(path: Path) -> ChainState | None:
     try:
         document = parse_object(path.read_bytes(), str(path))
         behind = document["behind"]
-        return ChainState(
+        state = ChainState(
             str(document["chain"]),
             int(document["number"]),
             str(document["digest"]),
@@ -267,5 +268,6 @@ def _read_state(path: Path) -> ChainState | None:
             tuple((int(first), int(last)) for first, last in document["given_up"]),
             str(document.get("site", "")),
         )
-    except (IgrowError, OSError, KeyError, TypeError, ValueError):
+    except (IgrowError, OSError, LookupError, TypeError, ValueError, ArithmeticError):
         return None
+    return state if all(map(math.isfinite, (state.sealed_at, *(state.behind or ())))) else None

@@ -6,6 +6,7 @@ begins only once the file says so; whatever dies after that, the note stands and
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -57,6 +58,8 @@ def approval_of(content: Mapping[str, object]) -> Approval | None:
     """Return the approval that `to_plain` made plain, or None for anything else."""
     test, by, asked, seconds = (content.get(key) for key in ("test", "by", "asked", "seconds"))
     if not (isinstance(test, str) and isinstance(asked, int) and isinstance(seconds, int | float)):
+        return None
+    if not math.isfinite(seconds):
         return None
     seen, begun = from_json(content.get("seen")), from_json(content.get("begun"))
     return Approval(test, str(by or ""), asked, float(seconds), seen, begun, str(content.get("ended") or ""))

@@ -7,6 +7,8 @@ import json
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from igrow.core.errors import IgrowError
+from igrow.core.exchange.documents import parse_object
 from igrow.core.whole_files import sync_folder, write_whole
 
 
@@ -48,14 +50,28 @@ class UpdateState:
 def load_state(path: Path) -> UpdateState:
     """Read the state; a file that is lost or damaged gives an empty one."""
     try:
-        document = json.loads(path.read_text())
+        document = parse_object(path.read_bytes(), str(path))
         known = {item.name for item in dataclasses.fields(UpdateState)}
         state = UpdateState(**{key: value for key, value in document.items() if key in known})
+        state.live_before, state.rejected = dict(state.live_before), dict(state.rejected)
         state.live_errors = [(float(time), dict(errors)) for time, errors in state.live_errors]
-        state.rejected = dict(state.rejected)
-    except (OSError, ValueError, TypeError, AttributeError):
+    except (OSError, IgrowError, ValueError, TypeError):
         return UpdateState()
-    return state
+    names = (state.active, state.previous, state.candidate, state.attempt, state.judged)
+    watch_since = 0.0 if state.watch_since is None else state.watch_since
+    times = (state.candidate_since, watch_since, state.judged_since)
+    errors = (state.live_before, *(errors for _, errors in state.live_errors))
+    makes_sense = (
+        all(name is None or isinstance(name, str) for name in names)
+        and all(map(_is_number, times))
+        and all(_is_number(error) for each in errors for error in each.values())
+        and all(isinstance(why, str) for why in (state.last_verdict, *state.rejected.values()))
+    )
+    return state if makes_sense else UpdateState()
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def save_state(path: Path, state: UpdateState) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from typing import Any
 
 from igrow.core.errors import IgrowError
@@ -16,7 +17,7 @@ def parse_object(data: bytes, what: str, *, largest: int = LARGEST_DOCUMENT) -> 
     if len(data) > largest:
         raise IgrowError(f"{what}: {len(data)} bytes long, at most {largest} are right")
     try:
-        document = json.loads(data)
+        document = json.loads(data, parse_int=_integer)
     except RecursionError:
         raise IgrowError(f"{what}: nested too deeply for anything that igrow writes") from None
     except ValueError as error:
@@ -24,6 +25,14 @@ def parse_object(data: bytes, what: str, *, largest: int = LARGEST_DOCUMENT) -> 
     if not isinstance(document, dict):
         raise IgrowError(f"{what}: a {type(document).__name__} where an object with names is needed")
     return document
+
+
+def _integer(digits: str) -> int:
+    """Return an integer that is some number of the world; ValueError for one that no float64 holds."""
+    number = int(digits)
+    if abs(number) > sys.float_info.max:
+        raise ValueError(f"a number of {len(digits)} digits")
+    return number
 
 
 def parse_lines(data: bytes, what: str) -> list[dict[str, Any]]:
