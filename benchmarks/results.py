@@ -116,6 +116,14 @@ RESULTS = {
         "greenhouses and weather 700; searches 0 and on",
         long=True,
     ),
+    "algorithm-1": Result(
+        "Algorithm 1 with and without its lower level",
+        ("benchmarks.algorithm_1", "--figure", "docs/results/algorithm-1.svg"),
+        "35 days in three greenhouses that lack something the simulator does not know; a plan a day, by its simulator "
+        "as it is, corrected by recent use, and renewed from the log every two weeks.",
+        "greenhouses and weather 700; searches 0 and on",
+        long=True,
+    ),
     "march": Result(
         "Five days of March, with the day after and without it",
         (
@@ -188,11 +196,12 @@ RESULTS = {
 def page(result: Result, output: str, seconds: float) -> str:
     """Return the page of a result."""
     made = provenance(" ".join(("python -m", *(shlex.quote(part) for part in result.command))))
+    figures = "".join(f"![{result.title}]({Path(part).name})\n\n" for part in result.command if part.endswith(".svg"))
     return (
         f"# {result.title}\n\n{result.about}\n\n"
         f"| command | date | commit | seeds | took |\n|---|---|---|---|---|\n"
         f"| `{made['command']}` | {made['date']} | {made['commit']} | {result.seeds} | {seconds / 60.0:.0f} min |\n\n"
-        f"```\n{output.rstrip()}\n```\n"
+        f"{figures}```\n{output.rstrip()}\n```\n"
     )
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -125,7 +125,11 @@ class Houses:
         each = [made[number] for number in numbers]
         self.hourly = np.stack([one.hourly for one in each])
         """From `FIRST` on, (rows, days, 24, 6)."""
-        self.plant = Plant(
+        self.plant = self.stand(each)
+
+    def stand(self, each: Sequence[House]) -> Plant:
+        """Return the plant that these houses are."""
+        return Plant(
             stack([one.parameters for one in each]),
             WeatherTable([one.weather for one in each]),
             float(unix_seconds(START - BEFORE * DAY)),
@@ -134,6 +138,10 @@ class Houses:
             disturbances=QUIET,
             sensors=EXACT,
         )
+
+    def advance(self, setpoints: Values, begin: np.datetime64) -> Outcome:
+        """Live from local midnight on under setpoints (rows, 24, 4); returns what happened, (1, rows, 24)."""
+        return run(self.plant, setpoints)
 
     def weather(self, day: int) -> Values:
         """Return the weather of a day counted from the season's first, (rows, 24, 6)."""
@@ -150,20 +158,22 @@ class Houses:
 
 
 @dataclass(frozen=True)
-class _House:
+class House:
+    """What one of them is."""
+
     parameters: GreenhouseParameters
     weather: Telemetry
     hourly: Values
     effects: Sequence[HiddenEffect]
 
 
-def _house(days: int, number: int) -> _House:
+def _house(days: int, number: int) -> House:
     rng = np.random.default_rng((SEED, number))
     begin, count = START + FIRST * DAY, days - FIRST
     weather = generate_weather(begin, START + (days + 1) * DAY, seed=int(rng.integers(2**31)))
     hourly = hourly_weather(weather, begin, 24 * count).reshape(count, 24, 6)
     varied = GreenhouseParameters().varied(rng, relative=0.08)
-    return _House(varied, weather, hourly, [HiddenEffect(str(name)) for name in rng.choice(EFFECTS, 2, replace=False)])
+    return House(varied, weather, hourly, [HiddenEffect(str(name)) for name in rng.choice(EFFECTS, 2, replace=False)])
 
 
 @dataclass(frozen=True)
@@ -192,19 +202,23 @@ class Past:
 
 
 def lead(
-    site: Site, days: int, ways: Mapping[str, Way], houses: Mapping[str, Sequence[int]]
+    site: Site,
+    days: int,
+    ways: Mapping[str, Way],
+    houses: Mapping[str, Sequence[int]],
+    stood: Callable[[int, Sequence[int]], Houses] = Houses,
 ) -> tuple[dict[str, dict[str, Values]], Past]:
     """Lead houses by each way; return what each used and picked by day, and what all did before.
 
     By way and name, (its houses, days): `heat` MJ m-2, `electricity` kWh m-2 (and `peak` of it), `co2`, `net_growth`
-    and `kg` (fresh fruit picked) kg m-2. The past's rows are all ways' houses, one way after the other.
+    and `kg` (fresh fruit picked) kg m-2. The past's rows are all houses, way after way; `stood` makes them.
     """
     numbers: list[int] = []
     rows: dict[str, slice] = {}
     for name in ways:
         rows[name] = slice(len(numbers), len(numbers) + len(houses[name]))
         numbers += houses[name]
-    led = Houses(days, numbers)
+    led = stood(days, numbers)
     past, applied, memory = settle(site, led)
     co2 = np.zeros(len(numbers))
     books: dict[str, list[Values]] = {name: [] for name in (*USED, "peak", "kg")}
@@ -223,7 +237,7 @@ def lead(
         }  # fmt: skip
         course = template.follow(np.concatenate([ways[name].ask(mornings[name]) for name in ways]), applied, memory)
         applied, memory = course.setpoints[:, -1], course.memory
-        outcome = run(led.plant, course.setpoints)
+        outcome = led.advance(course.setpoints, begin)
         for name, part in rows.items():
             mine = Outcome(**{key: value[:, part] for key, value in vars(outcome).items()})
             ways[name].learn(mornings[name], mine, led.weather(day)[part])
@@ -253,7 +267,7 @@ def settle(site: Site, led: Houses) -> tuple[Past, Values, Memory]:
         recipe = np.repeat(recipe_table(site, begin, 24)[None], len(led.hourly), axis=0)
         course = for_site(site, begin, 24, radiation=radiation).follow(recipe, applied, memory)
         applied, memory = course.setpoints[:, -1], course.memory
-        outcome = run(led.plant, course.setpoints)
+        outcome = led.advance(course.setpoints, begin)
         setpoints.append(course.setpoints)
         used.append({name: getattr(outcome, name)[0].sum(axis=-1) for name in SCALED})
     judged = np.concatenate([led.weather(day) for day in range(-JUDGED, 0)], axis=1)

@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections import deque
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,8 +24,8 @@ from benchmarks.strategies import Day, recently
 from igrow.core.agronomy.memory import one_of
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.greenhouse import tomato
-from igrow.core.planner import Budget, EvolutionSettings, NumpyGeneration, PlanningState, optimise
-from igrow.core.planner.objective import Outcome
+from igrow.core.planner import Budget, EvolutionSettings, NumpyGeneration, PlanningState, PlanResult, optimise
+from igrow.core.planner.objective import Outcome, Simulator
 from igrow.core.planner.recent_use import grown_days, totals
 from igrow.core.planner.season import SeasonPlan, valued
 from igrow.core.planner.season.course import RADIATION
@@ -38,6 +39,29 @@ from igrow.edge.planning.make_plan import RECENT_DAYS
 SEARCH = NumpyGeneration(EvolutionSettings(parents=24, offspring=48))
 
 
+@dataclass(frozen=True)
+class Lived:
+    """A day that a house lived through."""
+
+    begin: np.datetime64
+    present: dict[str, float]
+    """As measured at its beginning."""
+    weather: Values
+    """(24, 6)."""
+    setpoints: Values
+    """(24, 4)."""
+    had: dict[str, Values]
+    """What it used and grew, (1,) each."""
+    warmth: float
+    """Mean of the air's temperature, degC."""
+
+    def beside(self, simulator: BundleSimulator) -> Day:
+        """Return what a simulator says of the day, and what it was."""
+        again = simulator.simulate(self.present, self.weather, self.setpoints[None], self.begin)
+        driven = (0.0, 0.0) if simulator.growth is None else grown_days(simulator.growth, again)
+        return totals(again), self.had, driven, (float(again.air_temperature.mean()), self.warmth)
+
+
 class Planned(Recipe):
     """A search each midnight, over the day that follows and the one after it."""
 
@@ -46,17 +70,26 @@ class Planned(Recipe):
         self._simulator = simulator
         self._season = season
         self._budget = Budget(generations, generations)
-        self._past: dict[int, deque[Day]] = {}
-        self._warmth: dict[int, float] = {}
+        self._past: dict[int, deque[Lived]] = {}
         self._chosen: list[Values] = []
 
     def ask(self, morning: Morning) -> Values:
         """Return the first day of a plan for each house."""
-        self._chosen = [self._plan(morning, house) for house in range(len(morning.weather))]
+        self._chosen = [self.plan(morning, house).setpoints[:24] for house in range(len(morning.weather))]
         return np.stack(self._chosen)
 
-    def _plan(self, morning: Morning, house: int) -> Values:
-        past = self._past.setdefault(house, deque(maxlen=RECENT_DAYS))
+    def simulator(self, house: int) -> BundleSimulator:
+        """Return the simulator in force."""
+        return self._simulator
+
+    def believed(self, house: int) -> Simulator:
+        """Return it corrected by what the last days used and grew."""
+        simulator = self.simulator(house)
+        past = self._past.get(house, ())
+        return recently(simulator, self._site, [one.beside(simulator) for one in past])
+
+    def plan(self, morning: Morning, house: int) -> PlanResult:
+        """Return the plan of a house."""
         present = _present(morning, house)
         row = morning.rows.start + house
         state = PlanningState(
@@ -70,10 +103,11 @@ class Planned(Recipe):
         template = for_site(self._site, morning.begin, len(weather), radiation=weather[:, RADIATION])
         worth, seeds = None, []
         if self._season is not None:
-            worth = self._season.worth(self._site, morning.begin, present, self._warmth.get(house))
+            past = self._past.get(house)
+            worth = self._season.worth(self._site, morning.begin, present, past[-1].warmth if past else None)
             seeds = [self._season.setpoints(template, weather, recipe, morning.begin)]
-        found = optimise(
-            recently(self._simulator, self._site, past),
+        return optimise(
+            self.believed(house),
             self._site,
             state,
             weather,
@@ -85,17 +119,14 @@ class Planned(Recipe):
             seeds=seeds,
             worth=worth,
         )
-        return found.setpoints[:24]
 
     def learn(self, morning: Morning, outcome: Outcome, weather: Values) -> None:
-        """Remember what the day used and grew beside what the simulator says of it."""
+        """Remember what the day was."""
         for house, chosen in enumerate(self._chosen):
-            again = self._simulator.simulate(_present(morning, house), weather[house], chosen[None], morning.begin)
             had = {name: each[[house]] for name, each in totals(outcome).items()}
-            driven = (0.0, 0.0) if self._simulator.growth is None else grown_days(self._simulator.growth, again)
             warmth = float(outcome.air_temperature[:, house].mean())
-            self._past[house].append((totals(again), had, driven, (float(again.air_temperature.mean()), warmth)))
-            self._warmth[house] = warmth
+            lived = Lived(morning.begin, _present(morning, house), weather[house], chosen, had, warmth)
+            self._past.setdefault(house, deque(maxlen=RECENT_DAYS)).append(lived)
 
 
 def _present(morning: Morning, house: int) -> dict[str, float]:
