@@ -7,6 +7,7 @@ and data sets are not to be installed; a test that lacks one is skipped everywhe
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import shutil
 import subprocess
@@ -40,6 +41,12 @@ def program(name: str, script: str) -> str:
 def file(path: Path, script: str) -> Path:
     """Return the path of what a script installs or builds."""
     return path if path.exists() else absent(path.name, f"sh {script}")
+
+
+def package(module: str, extra: str) -> None:
+    """Need a module that comes with an optional extra of this project."""
+    if importlib.util.find_spec(module) is None:
+        absent(module, f"pip install '.[{extra}]'")
 
 
 def mount_namespace() -> None:

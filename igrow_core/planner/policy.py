@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from igrow.core.bundle import open_session
 from igrow.core.errors import IgrowError
 from igrow.core.planner.objective import Objective
-from igrow.core.planner.template import Setpoints
+from igrow.core.planner.template import BY_HOUR, STEPS, Setpoints
 from igrow.core.quantities import SETPOINTS, WEATHER
 from igrow.core.site import Site
 
@@ -53,11 +53,24 @@ def observe(site: Site, present: Mapping[str, Values], forecast: Values, start: 
 
 
 def to_setpoints(site: Site, actions: NDArray[np.float32]) -> Setpoints:
-    """Return the setpoints (B, 24, 4) of actions (B, 96), -1 to 1, within the site's limits."""
+    """Return the setpoints (B, 24, 4) of actions (B, 96), -1 to 1, within the site's limits; lamps are on or off."""
     low = np.array([site.limits[name].low for name in SETPOINTS])
     high = np.array([site.limits[name].high for name in SETPOINTS])
     share = (np.clip(actions.astype(np.float64), -1.0, 1.0).reshape(len(actions), HOURS, len(SETPOINTS)) + 1.0) / 2.0
-    return np.asarray(low + share * (high - low))
+    setpoints = low + share * (high - low)
+    for name in BY_HOUR:
+        column = SETPOINTS.index(name)
+        setpoints[..., column] = np.round(setpoints[..., column] / STEPS[name]) * STEPS[name]
+    return np.asarray(setpoints)
+
+
+def chosen(site: Site, setpoints: Setpoints, recipe: Setpoints) -> Setpoints:
+    """Return setpoints (..., H, 4) in which those that the site's plans do not choose are the recipe's, (H, 4).
+
+    A policy sees no slab, and its simulator none either: it would water at random.
+    """
+    free = [name in site.setpoints and name in site.planning.optimise for name in SETPOINTS]
+    return np.where(free, setpoints, recipe)
 
 
 class OnnxPolicy:

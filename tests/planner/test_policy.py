@@ -1,4 +1,4 @@
-"""The learnt policy: what it sees, what it may do, that it learns, and that the graph does what the network does."""
+"""The policy in a plan: what it sees, what it may do, and where it is judged."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from igrow.core.errors import IgrowError
-from igrow.core.planner.policy import ACTIONS, OBSERVATIONS, OnnxPolicy, observe, to_setpoints
+from igrow.core.planner.policy import ACTIONS, OBSERVATIONS, OnnxPolicy, chosen, observe, to_setpoints
 from igrow.core.quantities import SETPOINTS
-from tests.planner.toy_greenhouse import START, ToySimulator
+from tests.planner.toy_greenhouse import START
 
 
 def test_it_sees_76_numbers_and_gives_96() -> None:
@@ -39,24 +39,18 @@ def test_every_action_is_within_the_limits(site) -> None:
         assert setpoints[..., column].max() == pytest.approx(limits.high)
 
 
-def test_the_graph_does_what_the_network_does(site, weather, tmp_path: Path) -> None:
-    import torch
+def test_lamps_are_on_or_off(site) -> None:
+    actions = np.random.default_rng(0).uniform(-1, 1, (5, ACTIONS)).astype(np.float32)
+    assert set(np.unique(to_setpoints(site, actions)[..., SETPOINTS.index("lamp_on")])) == {0.0, 1.0}
 
-    from igrow.trainer.research.policies.sac import Actor
-    from igrow.trainer.research.policies.train import export
 
-    torch.manual_seed(0)
-    actor = Actor((32, 16))
-    path = tmp_path / "policy.onnx"
-    path.write_bytes(export(actor).SerializeToString())
-    policy = OnnxPolicy(path)
-    seen = np.random.default_rng(0).standard_normal((7, OBSERVATIONS)).astype(np.float32)
-    with torch.no_grad():
-        expected = actor(torch.from_numpy(seen)).numpy()
-    np.testing.assert_allclose(policy.act(seen), expected, atol=1e-6)
-    plan = policy.plan(site, {"air_temperature": 19.0}, weather[:40], START)
-    assert plan.shape == (40, 4)
-    assert np.isfinite(plan).all()
+def test_what_plans_do_not_choose_is_the_recipes(site, recipe) -> None:
+    free = replace(site, planning=replace(site.planning, optimise=("heating_setpoint", "lamp_on")))
+    setpoints = to_setpoints(site, np.zeros((2, ACTIONS), dtype=np.float32))
+    followed = chosen(free, setpoints, recipe[:24])
+    for column, name in enumerate(SETPOINTS):
+        expected = setpoints[..., column] if name in free.planning.optimise else recipe[None, :24, column]
+        np.testing.assert_array_equal(followed[..., column], np.broadcast_to(expected, (2, 24)))
 
 
 def test_a_file_that_is_no_policy_is_refused(tmp_path: Path) -> None:
@@ -68,38 +62,10 @@ def test_a_file_that_is_no_policy_is_refused(tmp_path: Path) -> None:
         OnnxPolicy(tmp_path / "a.onnx")
 
 
-def test_the_learner_finds_the_action_that_is_paid() -> None:
-    import torch
-
-    from igrow.trainer.research.policies.sac import SacSettings, SoftActorCritic
-
-    settings = replace(SacSettings(), hidden=(32,), batch=64, learning_rate=5e-3, discount=0.0)
-    learner = SoftActorCritic(settings, seed=1)
-    rng = np.random.default_rng(1)
-    wanted = np.where(np.arange(ACTIONS) % 2, 0.6, -0.6)
-
-    def paid(action: np.ndarray) -> np.ndarray:
-        return np.asarray(-np.square(action - wanted).mean(axis=1))
-
-    seen = rng.standard_normal((256, OBSERVATIONS)).astype(np.float32)
-    before = paid(learner.act(seen, explore=False)).mean()
-    random = paid(rng.uniform(-1, 1, (256, ACTIONS))).mean()
-    torch.set_num_threads(1)
-    for _ in range(8):
-        action = learner.act(seen, explore=True)
-        learner.memory.add(seen, action, paid(action), seen, False)
-        for _ in range(30):
-            learner.learn()
-    after = paid(learner.act(seen, explore=False)).mean()
-    assert after > before / 2
-    assert after > random / 2
-
-
 def test_greenhouses_of_an_environment_are_the_same_for_the_same_seed(site) -> None:
     from igrow.trainer.research.policies.environment import DailyGreenhouses, Scenario
-    from igrow.trainer.research.policies.train import first_actions
 
-    actions = first_actions(np.random.default_rng(0), 2)
+    actions = np.random.default_rng(0).uniform(-1, 1, (2, ACTIONS)).astype(np.float32)
     worth = []
     for seed in (3, 3, 4):
         world = DailyGreenhouses(site, Scenario(START, 1, 2, seed))
@@ -110,24 +76,3 @@ def test_greenhouses_of_an_environment_are_the_same_for_the_same_seed(site) -> N
     np.testing.assert_array_equal(worth[0][0], worth[1][0])
     np.testing.assert_array_equal(worth[0][1], worth[1][1])
     assert (worth[0][1] != worth[2][1]).all()
-
-
-def test_trials_of_one_course_share_what_they_see_and_the_first_is_followed(site) -> None:
-    from igrow.trainer.research.policies.environment import Scenario, SimulatedDays
-
-    world = SimulatedDays(site, Scenario(START, 2, 6, seed=1), ToySimulator(), trials=3)
-    seen = world.observe()
-    assert seen.shape == (6, OBSERVATIONS)
-    np.testing.assert_array_equal(seen[0], seen[2])
-    assert (seen[0] != seen[3]).any()
-    actions = np.zeros((6, ACTIONS), dtype=np.float32)
-    actions[0] = -0.1875
-    setpoints = to_setpoints(site, actions)
-    score = world.step(setpoints).score
-    assert score.shape == (1, 6)
-    assert score[0, 0] != score[0, 1]
-    assert score[0, 1] == score[0, 2]
-    # The toy's air is as warm as its setpoint, so the next day begins with that of the first trial.
-    expected = (setpoints[0, -1, 0] - 20.0) / 5.0
-    np.testing.assert_allclose(world.observe()[:3, 72], expected, rtol=1e-6)
-    assert not world.done

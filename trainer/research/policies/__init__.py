@@ -1,1 +1,1 @@
-"""Learnt policies: soft actor-critic on batches of mechanistic greenhouses, exported as policy.onnx."""
+"""Learnt policies: soft actor-critic on a bundle's simulator, by stable-baselines3, exported as policy.onnx."""

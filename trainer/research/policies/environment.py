@@ -1,32 +1,24 @@
-"""What a policy learns in, a day at a time, each greenhouse under weather of its own.
-
-`DailyGreenhouses` are mechanistic greenhouses (`Greenhouses`, which any strategy can lead). `SimulatedDays` is a
-bundle's simulator: some hundred times cheaper, and what the paper trains on; whether that carries over to a
-greenhouse is then to be judged in the other.
-"""
+"""Where a policy is judged: mechanistic greenhouses, each under weather of its own, which any strategy can lead."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
-from typing import Protocol
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from igrow.core.agronomy import Memory, one_of
 from igrow.core.arrays import Floats
-from igrow.core.economics import Balance
 from igrow.core.greenhouse import GreenhouseParameters, generate_weather
 from igrow.core.greenhouse.disturbances import QUIET
 from igrow.core.greenhouse.parameters import stack
 from igrow.core.greenhouse.plant import Plant
 from igrow.core.greenhouse.sensors import EXACT
 from igrow.core.greenhouse.weather_table import WeatherTable
-from igrow.core.planner.objective import Objective, Outcome, Simulator, Valuation
+from igrow.core.planner.objective import Objective, Outcome, Valuation
 from igrow.core.planner.optimise import RADIATION
 from igrow.core.planner.plant_simulator import run
-from igrow.core.planner.policy import HOURS, PRESENT, observe
+from igrow.core.planner.policy import HOURS, observe
 from igrow.core.planner.template import Setpoints, for_site
 from igrow.core.quantities import WEATHER
 from igrow.core.site import Site
@@ -51,20 +43,6 @@ class Scenario:
     """Relative spread of the greenhouses' parameters."""
     copies: int = 1
     """How often each greenhouse stands there, so that methods can be compared in one batch: N = count * copies."""
-
-
-class World(Protocol):
-    """Greenhouses that live through days, one action each day."""
-
-    @property
-    def done(self) -> bool:
-        """All days are over."""
-
-    def observe(self) -> NDArray[np.float32]:
-        """Return the observations of the day that comes, (N, 76)."""
-
-    def step(self, setpoints: Setpoints) -> Valuation:
-        """Live through a day under setpoints (N, 24, 4), and return what it was worth, arrays (1, N)."""
 
 
 class Greenhouses:
@@ -143,75 +121,6 @@ class DailyGreenhouses:
         time = self._greenhouses.time + np.arange(HOURS) * np.timedelta64(3600, "s")
         self.day += 1
         return Objective(self._greenhouses.site, time).value(self._greenhouses.advance(setpoints))
-
-
-class SimulatedDays:
-    """A simulator under `count // trials` courses of weather, in each of which `trials` actions are tried a day.
-
-    The first of them is followed: the climate at its end begins the next day. Leaf area and fruit load are drawn for
-    each course and stay, as a day changes them little.
-    """
-
-    def __init__(self, site: Site, scenario: Scenario, simulator: Simulator, trials: int = 8) -> None:
-        rng = np.random.default_rng(scenario.seed)
-        self.site, self.scenario, self.trials, self.day = site, scenario, trials, 0
-        self._simulator = simulator
-        courses = max(1, scenario.count // trials)
-        end = scenario.start + (scenario.days + 1) * DAY
-        weather = [generate_weather(scenario.start, end, seed=int(rng.integers(2**31))) for _ in range(courses)]
-        self._forecast = np.stack([hourly_weather(table, scenario.start, 24 * scenario.days) for table in weather])
-        self._state = [
-            {
-                "air_temperature": float(rng.uniform(16.0, 22.0)),
-                "air_humidity": float(rng.uniform(65.0, 90.0)),
-                "air_co2": float(rng.uniform(400.0, 900.0)),
-                "leaf_area_index": float(rng.uniform(2.0, 4.0)),
-                "plant_load": float(rng.uniform(100.0, 500.0)),
-            }
-            for _ in range(courses)
-        ]
-
-    @property
-    def done(self) -> bool:
-        """All days are over."""
-        return self.day >= self.scenario.days
-
-    def observe(self) -> NDArray[np.float32]:
-        """Return the observations of the day that comes, (N, 76), equal for the trials of one course."""
-        day = min(self.day, self.scenario.days - 1)
-        forecast = self._forecast[:, day * HOURS : (day + 1) * HOURS]
-        present = {name: np.array([state[name] for state in self._state]) for name in PRESENT}
-        return observe(self.site, present, forecast, self.scenario.start + day * DAY).repeat(self.trials, axis=0)
-
-    def step(self, setpoints: Setpoints) -> Valuation:
-        """Try a day's setpoints (N, 24, 4), and return what each was worth, arrays (1, N)."""
-        start = self.scenario.start + self.day * DAY
-        objective = Objective(self.site, start + np.arange(HOURS) * np.timedelta64(3600, "s"))
-        template = for_site(self.site, start, HOURS)
-        limited = template.limit(setpoints, np.full(4, np.nan))
-        parts = []
-        for course, state in enumerate(self._state):
-            tried = limited[course * self.trials : (course + 1) * self.trials]
-            forecast = self._forecast[course, self.day * HOURS : (self.day + 1) * HOURS]
-            outcome = self._simulator.simulate(state, forecast, tried, start)
-            parts.append(objective.value(outcome))
-            for name in ("air_temperature", "air_humidity", "air_co2"):
-                state[name] = float(getattr(outcome, name)[0, 0, -1])
-        self.day += 1
-        return join(parts)
-
-
-def join(parts: Sequence[Valuation]) -> Valuation:
-    """Put valuations of candidates side by side."""
-
-    def side(arrays: Sequence[Floats]) -> Floats:
-        return np.concatenate(arrays, axis=1)
-
-    return Valuation(
-        Balance(**{one.name: side([getattr(part.balance, one.name) for part in parts]) for one in fields(Balance)}),
-        side([part.harm for part in parts]),
-        side([part.outside for part in parts]),
-    )
 
 
 def hourly_weather(weather: Telemetry, start: np.datetime64, hours: int) -> Floats:

@@ -1,112 +1,127 @@
-"""Train a policy and write policy.onnx: `igrow-trainer policy --site site.yaml --out policy.onnx`."""
+"""Train a policy by soft actor-critic and write policy.onnx: `igrow-trainer policy --site site.yaml --out policy.onnx`.
+
+The learner is stable-baselines3's (`pip install 'igrow[research]'`; Raffin and others 2021, J. Mach. Learn. Res. 22,
+268), of the algorithm of Haarnoja and others (2018, arXiv:1812.05905).
+"""
 
 from __future__ import annotations
 
 import argparse
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from onnx import ModelProto, TensorProto, helper, numpy_helper
 from torch import nn
 
-from igrow.core.bundle import read_bundle
+from igrow.core.bundle import default_bundle_folder, read_bundle
+from igrow.core.errors import IgrowError
 from igrow.core.planner.objective import Simulator
-from igrow.core.planner.policy import ACTIONS, OBSERVATIONS, to_setpoints
+from igrow.core.planner.policy import ACTIONS, OBSERVATIONS
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Site, load_site
 from igrow.trainer.exporting.wiring import finished_model
-from igrow.trainer.research.policies.environment import DailyGreenhouses, Scenario, SimulatedDays, World
-from igrow.trainer.research.policies.sac import Actor, SacSettings, SoftActorCritic
 
-EXAMPLE = "igrow-trainer policy --site config/site.yaml --bundle igrow_core/default_bundle --out policy.onnx"
-TRAINING_SEEDS = 1_000_000
-"""Seeds of training weather begin here; tests use smaller ones, so that no season is in both."""
-FIRST_START = np.datetime64("2020-01-04T23:00:00", "s")
-LAST_START_DAYS = 110
-"""Episodes begin on a day up to this long after the first start."""
+EXAMPLE = "igrow-trainer policy --site config/site.yaml --out policy.onnx"
+SETTINGS: dict[str, Any] = {
+    "learning_rate": 5e-4,
+    "buffer_size": 200_000,
+    "learning_starts": 1500,
+    "batch_size": 256,
+    "gamma": 0.5,
+    "ent_coef": "auto_0.05",
+    "target_entropy": -32.0,
+    "policy_kwargs": {"net_arch": [256, 256]},
+}
+"""Of the learner, where not the library's own. A day's setpoints act little beyond the day that follows; entropy begins
+small beside the reward, which is of order 1 (`days.EUROS`)."""
 
 
-@dataclass(frozen=True)
-class TrainingPlan:
-    """How long and on how much."""
+@dataclass
+class Training:
+    """What came of a training."""
 
-    episodes: int = 12
-    days: int = 10
-    count: int = 256
-    """Greenhouses at once."""
-    steps_per_day: int = 100
-    """Gradient steps after each day of all greenhouses."""
-    seconds: float = float("inf")
-    """Training ends after the episode in which this time is over."""
+    actor: nn.Module
+    """stable-baselines3's."""
+    days: int
+    """Simulated, each one step of the learner."""
+    gains: list[float] = field(default_factory=list)
+    """EUR m-2 a day more than the recipe, mean over each `REPORTED` days as they were explored."""
+    seconds: float = 0.0
+    """Of the processor."""
+
+    def course(self, parts: int) -> list[float]:
+        """Return the gains as means over so many parts of the training."""
+        return [float(part.mean()) for part in np.array_split(np.array(self.gains), parts) if part.size]
+
+
+REPORTED = 500
+"""Days between two reports."""
 
 
 def train(
     site: Site,
-    plan: TrainingPlan,
-    settings: SacSettings,
-    seed: int,
+    simulator: Simulator,
+    seconds: float,
+    *,
+    days: int = 10_000_000,
+    seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
-    simulator: Simulator | None = None,
-) -> SoftActorCritic:
-    """Return a learner after its episodes; every episode has new weather, greenhouses and dates.
+    settings: dict[str, Any] | None = None,
+) -> Training:
+    """Return a policy that learnt in a simulator for so many seconds of the processor, or days of the simulator.
 
-    It learns in a simulator where one is given, else in mechanistic greenhouses.
+    Raises:
+        IgrowError: stable-baselines3 is not installed.
     """
-    learner = SoftActorCritic(settings, seed)
-    rng = np.random.default_rng(seed)
-    began = time.monotonic()
-    for episode in range(plan.episodes):
-        start = FIRST_START + int(rng.integers(LAST_START_DAYS)) * np.timedelta64(1, "D")
-        scenario = Scenario(start, plan.days, plan.count, TRAINING_SEEDS + 1000 * seed + episode)
-        world: World = (
-            DailyGreenhouses(site, scenario) if simulator is None else SimulatedDays(site, scenario, simulator)
-        )
-        rewards = []
-        while not world.done:
-            observation = world.observe()
-            first = episode == 0
-            action = first_actions(rng, len(observation)) if first else learner.act(observation, explore=True)
-            reward = world.step(to_setpoints(site, action)).score.mean(axis=0)
-            learner.memory.add(observation, action, reward, world.observe(), not world.done)
-            rewards.append(reward.mean())
-            if len(learner.memory) >= settings.batch:
-                for _ in range(plan.steps_per_day):
-                    learner.learn()
-        seconds = time.monotonic() - began
-        progress(f"episode {episode + 1:3d}  {np.mean(rewards):+.4f} EUR/m2 a day  {seconds:6.0f} s")
-        if seconds > plan.seconds:
-            break
-    return learner
+    try:
+        from stable_baselines3 import SAC  # noqa: PLC0415 - an optional extra
+        from stable_baselines3.common.callbacks import BaseCallback  # noqa: PLC0415
+
+        from igrow.trainer.research.policies.days import EUROS, SimulatedDays  # noqa: PLC0415
+    except ModuleNotFoundError as error:
+        raise IgrowError(f"{error.name} is not installed; it comes with pip install 'igrow[research]'") from None
+    began = time.process_time()
+    learner = SAC("MlpPolicy", SimulatedDays(site, simulator, seed), seed=seed, device="cpu", **(settings or SETTINGS))
+    training = Training(learner.actor, 0)
+    rewards: list[float] = []
+
+    class Clock(BaseCallback):  # type: ignore[misc]
+        """Ends the training when its time is over."""
+
+        def _on_step(self) -> bool:
+            rewards.append(float(np.mean(self.locals["rewards"])))
+            training.seconds = time.process_time() - began
+            if len(rewards) == REPORTED:
+                training.gains.append(float(np.mean(rewards)) / EUROS)
+                rewards.clear()
+                progress(f"{self.num_timesteps:7d} days {training.gains[-1]:+.4f} EUR/m2 {training.seconds:6.0f} s")
+            return training.seconds < seconds
+
+    learner.learn(days, callback=Clock())
+    training.days = int(learner.num_timesteps)
+    return training
 
 
-def first_actions(rng: np.random.Generator, count: int) -> NDArray[np.float32]:
-    """Return actions (N, 96) to begin with: each setpoint at two random levels, by day and by night, with noise.
+def export(actor: Any) -> ModelProto:
+    """Return policy.onnx of stable-baselines3's actor: `observation` (batch, 76) to `action` (batch, 96), -1 to 1.
 
-    Independent hours would all have the same mean, and the critics would never see a cold night or a dark day.
+    The mean action, without the spread of exploration; each hour says what its block of the day says.
     """
-    hours = np.arange(24)
-    day = (hours[None] >= rng.integers(0, 10, (count, 1))) & (hours[None] < rng.integers(14, 24, (count, 1)))
-    levels = rng.uniform(-1.0, 1.0, (2, count, 1, 4))
-    actions = np.where(day[:, :, None], levels[0], levels[1]) + 0.3 * rng.standard_normal((count, 24, 4))
-    return np.asarray(np.clip(actions, -1.0, 1.0).reshape(count, ACTIONS), dtype=np.float32)
+    from igrow.trainer.research.policies.days import LEVELS, by_hour  # noqa: PLC0415 - with gymnasium, an extra
 
-
-def export(actor: Actor) -> ModelProto:
-    """Return policy.onnx: `observation` (batch, 76) to `action` (batch, 96), -1 to 1."""
+    rows = by_hour(np.arange(LEVELS, dtype=np.float32)[None])[0].astype(int)
+    layers = [layer for layer in actor.latent_pi if isinstance(layer, nn.Linear)]
     nodes, weights, tensor = [], [], "observation"
-    layers = [layer for layer in actor.body if isinstance(layer, nn.Linear)]
-    for number, layer in enumerate(layers):
-        last = number == len(layers) - 1
-        # The second half of the last layer is the spread of exploration, which a policy in use has not.
-        rows = slice(0, ACTIONS) if last else slice(None)
-        for kind, array in (("weight", layer.weight[rows].T), ("bias", layer.bias[rows])):
-            values = np.ascontiguousarray(array.detach().numpy(), dtype=np.float32)
-            weights.append(numpy_helper.from_array(values, f"{kind}_{number}"))
+    for number, layer in enumerate([*layers, actor.mu]):
+        last = number == len(layers)
+        weight, bias = layer.weight.detach().numpy().T, layer.bias.detach().numpy()
+        for kind, array in (("weight", weight[:, rows] if last else weight), ("bias", bias[rows] if last else bias)):
+            weights.append(numpy_helper.from_array(np.ascontiguousarray(array), f"{kind}_{number}"))
         nodes.append(helper.make_node("Gemm", [tensor, f"weight_{number}", f"bias_{number}"], [f"layer_{number}"]))
         tensor = "action" if last else f"hidden_{number}"
         nodes.append(helper.make_node("Tanh" if last else "Relu", [f"layer_{number}"], [tensor]))
@@ -124,21 +139,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Define the options of `igrow-trainer policy`."""
     parser.add_argument("--site", type=Path, required=True, help="site file")
     parser.add_argument("--out", type=Path, required=True, help="policy.onnx to write")
-    parser.add_argument("--bundle", type=Path, help="learn in this bundle's simulator, not in mechanistic greenhouses")
-    parser.add_argument("--minutes", type=float, default=8.0, help="training ends soon after (default: 8)")
+    parser.add_argument("--bundle", type=Path, default=default_bundle_folder(), help="in whose simulator it learns")
+    parser.add_argument("--minutes", type=float, default=15.0, help="of the processor (default: 15)")
     parser.add_argument("--seed", type=int, default=0, help="of networks, weather and exploration (default: 0)")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Train and write the policy; returns the exit code."""
     torch.set_num_threads(1)
-    plan = TrainingPlan(episodes=1000, seconds=60.0 * arguments.minutes)
     site = load_site(arguments.site)
-    simulator = None
-    if arguments.bundle:
-        simulator = BundleSimulator(read_bundle(arguments.bundle), site.greenhouse, members=1)
-    learner = train(site, plan, SacSettings(), arguments.seed, _say, simulator)
-    arguments.out.write_bytes(export(learner.actor).SerializeToString())
+    simulator = BundleSimulator(read_bundle(arguments.bundle), site.greenhouse, members=1)
+    training = train(site, simulator, 60.0 * arguments.minutes, seed=arguments.seed, progress=_say)
+    arguments.out.write_bytes(export(training.actor).SerializeToString())
     print(f"{arguments.out} written")
     return 0
 
