@@ -243,7 +243,7 @@ def draw(
     path: Path, site: Site, books: Mapping[str, Mapping[str, Values]], errors: Mapping[int, Mapping[str, list[Values]]]
 ) -> None:
     """Draw what plans netted more than the recipe from day to day, and the simulators' error of temperature."""
-    from igrow.trainer.figure_style import COLOURS, legend, name_above, panels  # noqa: PLC0415, only this draws
+    from igrow.trainer.figure_style import COLOURS, name_above, panels  # noqa: PLC0415, only this draws
 
     figure, (gain, error) = panels(2, 5.0, width=6.0)
     days = books["recipe"]["kg"].shape[1]
@@ -264,7 +264,7 @@ def draw(
     for name, (colour, stroke) in ((name, strokes[name]) for name in books if name in strokes):
         gain.plot(np.arange(1, days + 1), net(name) - net("recipe"), stroke, color=COLOURS[colour], label=name)
     name_above(gain, "net profit more than by the recipe, EUR/m²")
-    legend(gain, columns=3)
+    gain.legend(loc="upper left")
     turns = sorted(errors)
     for name, colour, stroke in (("before", "deployed", ":"), ("after", "corrected", "-")):
         for number, day in enumerate(turns):
@@ -274,7 +274,7 @@ def draw(
             error.plot([day, until], [level, level], stroke, color=COLOURS[colour], label=label)
     error.set_ylim(bottom=0.0)
     name_above(error, "error of the temperature a day ahead, K")
-    legend(error)
+    error.legend(loc="lower left")
     error.set_xlabel("day of the season")
     figure.savefig(path, facecolor="white")
 

@@ -65,7 +65,7 @@ def main() -> int:
 
 def draw(path: Path, site: Site, books: Mapping[str, Mapping[str, Mapping[str, Values]]]) -> None:
     """Draw cumulative net profit from day to day, mean over the houses, in the simulator and in the plant."""
-    from igrow.trainer.figure_style import legend, name_above, panels  # noqa: PLC0415, only this draws
+    from igrow.trainer.figure_style import name_above, panels  # noqa: PLC0415, only this draws
 
     figure, axes = panels(2, 6.4, width=6.0)
     strokes = ("-", "--", ":", "-.", (0, (5, 1)), (0, (1, 1)))
@@ -75,7 +75,7 @@ def draw(path: Path, site: Site, books: Mapping[str, Mapping[str, Mapping[str, V
             net = [money(site, {key: one[:, :day] for key, one in book.items()})["net"].mean() for day in until]
             panel.plot(np.array(until), net, linestyle=strokes[number], color=f"C{number}", label=name)
         name_above(panel, f"cumulative net profit {where}, EUR/m²")
-    legend(axes[0], columns=3)
+    axes[0].legend(loc="upper left")
     axes[-1].set_xlabel("day of the season")
     figure.savefig(path, facecolor="white")
 
