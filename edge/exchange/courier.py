@@ -24,7 +24,7 @@ from igrow.core.exchange.signed_files import signed_files
 from igrow.core.whole_files import write_whole
 from igrow.edge.exchange.outbox import REPORTS, Outbox
 from igrow.edge.exchange.places import open_place
-from igrow.edge.exchange.sealing import seal_due
+from igrow.edge.exchange.sealing import notice, seal_due
 from igrow.edge.parent import end_with_parent
 
 STATUS_FILE = "status.json"
@@ -57,7 +57,7 @@ class Order:
     deadline: float = 600.0
     """Seconds after which the round is ended, wherever it is."""
     seen: tuple[float, float] | None = None
-    """Lowest and highest time that the clock showed after it went back, since the order before; None: it did not."""
+    """Lowest and highest time that the clock showed after it went back, where no round has noted it yet."""
 
 
 @dataclass
@@ -67,6 +67,8 @@ class RoundStatus:
     ended: float = 0.0
     """Wall clock, seconds since 1970 UTC."""
     problem: str = ""
+    seen: tuple[float, float] | None = None
+    """What of a clock that went back is noted on the disk."""
     sealed: int = 0
     sent: int = 0
     sent_bytes: int = 0
@@ -98,10 +100,10 @@ def run_round(order: Order, place: Place | None = None) -> RoundStatus:
 def _round(order: Order, folder: Path, place: Place | None, status: RoundStatus) -> None:
     outbox = Outbox(folder, order.site, order.igrow_version)
     try:
+        outbox.move(notice(outbox.state, order.seen or ()))
+        status.seen = order.seen
         if order.time is not None:
-            status.sealed = seal_due(
-                outbox, Path(order.store), order.time, order.period, partly=order.partly, seen=order.seen
-            )
+            status.sealed = seal_due(outbox, Path(order.store), order.time, order.period, partly=order.partly)
         place = place or open_place(order.url, known_hosts=order.known_hosts, identity=order.identity)
         _receive(outbox, place, order.site, status)
         _send(outbox, place, order.site, status)

@@ -8,7 +8,7 @@ once that is over, or once it has lasted for a whole period and so is the truth.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -42,22 +42,22 @@ class Span:
     """False for rows from before `through`, which a clock that was behind has left."""
 
 
-def observe(
-    state: ChainState, time: float, period: int, seen: tuple[float, float] | None = None
-) -> tuple[ChainState, Span | None]:
-    """Return the state after the clock showed `time`, and a span that a clock behind the log has left, if any.
+def notice(state: ChainState, times: Sequence[float]) -> ChainState:
+    """Return the state after the clock showed these times: how far it went behind what is sealed."""
+    if not state.through or not times or min(times) >= state.through - GRACE_SECONDS:
+        return state
+    known = state.behind or times
+    return replace(state, behind=(min(*times, *known), min(max(*times, *known), state.through)))
 
-    `seen` are the lowest and the highest time that it showed after it had gone back, since the round before.
-    """
+
+def catch_up(state: ChainState, time: float, period: int) -> tuple[ChainState, Span | None]:
+    """Return the state at `time`, and the span that a clock which was behind has left, if that is over."""
     through, behind = state.through, state.behind
-    shown = [one for one in (time, *(seen or ())) if through and one < through - GRACE_SECONDS]
-    if shown:
-        behind = (min(*shown, *(behind or shown)), max(*shown, *(behind or shown)))
-    if time in shown and behind is not None:
+    if behind is None:
+        return state, None
+    if time < through - GRACE_SECONDS:
         if behind[1] - behind[0] >= period:
             return replace(state, through=int(behind[0]) - SLACK_SECONDS, behind=None), None
-        return replace(state, behind=behind), None
-    if behind is None:
         return state, None
     state = replace(state, behind=None)
     if behind[1] - behind[0] < SHORTEST_SECONDS:
@@ -78,15 +78,7 @@ def due_span(first: int | None, through: int, time: float, period: int, *, partl
     return Span(start, now) if partly and now - first >= PARTLY_SECONDS else None
 
 
-def seal_due(
-    outbox: Outbox,
-    store: Path,
-    time: float,
-    period: int,
-    *,
-    partly: bool = False,
-    seen: tuple[float, float] | None = None,
-) -> int:
+def seal_due(outbox: Outbox, store: Path, time: float, period: int, *, partly: bool = False) -> int:
     """Seal what is due at `time`; returns the number of new segments.
 
     Args:
@@ -95,14 +87,14 @@ def seal_due(
         time: the plant's time, seconds since 1970 UTC.
         period: seconds that a segment covers.
         partly: seal also what there is of a period that is not over.
-        seen: lowest and highest time that the clock showed after it had gone back, since the round before.
 
     Raises OSError, and StoreError where the log cannot be read.
     """
     before = outbox.state.number
     if not outbox.state.sealed_at:
         outbox.move(replace(outbox.state, sealed_at=time))
-    state, left = observe(outbox.state, time, period, seen)
+    outbox.move(notice(outbox.state, [time]))
+    state, left = catch_up(outbox.state, time, period)
     if newest_sequence(store) < state.sequence:
         state = replace(state, sequence=0)  # the ledger was lost and began again
     if left is not None:

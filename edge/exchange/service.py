@@ -176,7 +176,6 @@ class ExchangeService:
             self._problem = f"exchange: no round can be started: {error.strerror or error}"
         self._started = self._monotonic()
         self._report_waits = False
-        self._seen = None  # the round seals what it tells of before it touches the exchange
 
     def _reap(self) -> None:
         """Look whether the round is over; end one that is too long."""
@@ -197,6 +196,8 @@ class ExchangeService:
         try:
             status = parse_object((self._folder / STATUS_FILE).read_bytes(), STATUS_FILE)
             self._problem = str(status.get("problem", ""))
+            if self._seen is not None and status.get("seen") == list(self._seen):
+                self._seen = None
         except (IgrowError, OSError) as error:
             self._problem = f"exchange: {error}"
 

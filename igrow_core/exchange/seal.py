@@ -14,6 +14,8 @@ from igrow.core.errors import IgrowError
 from igrow.core.exchange.errors import SegmentError
 
 FORMAT = 1
+LATEST_YEAR = 9999
+"""No calendar of Python's goes further."""
 MOST_GIVEN_UP = 100_000
 """Segments: eleven years of hours."""
 _NAME = re.compile(r"([0-9a-f]{12})-([0-9]{8})-([0-9a-f]{64})\.zip")
@@ -100,7 +102,7 @@ def read_seal(document: Mapping[str, Any]) -> Seal:
         seal = Seal(
             site=_text(document["site"]),
             chain=_text(document["chain"]),
-            number=_count(document["number"]),
+            number=_count(document["number"], least=1),
             previous=_text(document["previous"]),
             start=parse_time(document["start"]),
             end=parse_time(document["end"]),
@@ -138,7 +140,7 @@ def parse_time(text: object) -> float:
         moment = np.datetime64(text[:-1], "ms")
     except ValueError:
         raise IgrowError(f"{text!r}: a time needs the form 2020-01-31T12:05:00Z") from None
-    if np.isnat(moment):
+    if np.isnat(moment) or not 1 <= moment.astype("datetime64[Y]").astype(int) + 1970 <= LATEST_YEAR:
         raise IgrowError(f"{text!r}: a time needs the form 2020-01-31T12:05:00Z")
     return float(moment.astype(np.int64)) / 1000.0
 
@@ -146,11 +148,12 @@ def parse_time(text: object) -> float:
 def _text(value: object) -> str:
     if not isinstance(value, str):
         raise TypeError(f"{value!r} is no text")
+    value.encode()  # half of a surrogate pair is a letter in JSON and in no file
     return value
 
 
-def _count(value: object) -> int:
-    if not isinstance(value, int) or isinstance(value, bool) or value < 0:
+def _count(value: object, least: int = 0) -> int:
+    if not isinstance(value, int) or isinstance(value, bool) or value < least:
         raise TypeError(f"{value!r} is no count")
     return value
 

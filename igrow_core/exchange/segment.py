@@ -28,6 +28,8 @@ LARGEST_SEGMENT = 64 * 2**20
 """Bytes of the file; a day of 60 points every 5 s has less than 2 MB."""
 LARGEST_CONTENT = 512 * 2**20
 """Bytes once unpacked."""
+LARGEST_VALUE = 1e30
+"""Far above any quantity in any unit, and within what four bytes hold."""
 _ZIP_EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
@@ -106,7 +108,12 @@ def _open(name: SegmentName, data: bytes, site: str) -> Segment:
     if _digest(table) != seal.telemetry_digest or _digest(lines) != seal.events_digest:
         raise SegmentError("its content is not what its seal says")
     known, foreign = _columns(table, seal)
-    return Segment(name, seal, known, foreign, tuple(parse_lines(lines, EVENTS)))
+    events = tuple(parse_lines(lines, EVENTS))
+    if (len(known), len(events)) != (seal.rows, seal.records):
+        raise SegmentError(
+            f"has {len(known)} rows and {len(events)} records, its seal says {seal.rows} and {seal.records}"
+        )
+    return Segment(name, seal, known, foreign, events)
 
 
 def _columns(table: bytes, seal: Seal) -> tuple[Telemetry, Telemetry]:
@@ -128,6 +135,8 @@ def _columns(table: bytes, seal: Seal) -> tuple[Telemetry, Telemetry]:
         if unit is None:
             raise SegmentError(f"{TELEMETRY}:1: its seal gives no unit of {name}")
         values = parse_numbers(TELEMETRY, name, column, numbers)
+        if (np.abs(values) > LARGEST_VALUE).any():
+            raise SegmentError(f"{TELEMETRY}: {name} has a value above {LARGEST_VALUE:.0e}, which no sensor shows")
         factors = conversion(name, unit)
         if factors is None:
             foreign[f"{name} [{unit}]"] = values

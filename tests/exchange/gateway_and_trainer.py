@@ -30,7 +30,7 @@ class World:
         self.folder = folder
         self.site = SITE
         self.seen: tuple[float, float] | None = None
-        """What the daemon saw of a clock that went back, since the round before."""
+        """What the daemon saw of a clock that went back, and no round has noted yet."""
         self.place = place or FolderPlace(folder / "exchange")
         self.budget = budget
         self.period = period
@@ -64,8 +64,10 @@ class World:
             str(self.outbox), str(self.store.folder), self.site, "exchange", "0.1.0", time, self.period,
             self.budget, partly, seen=self.seen,
         )  # fmt: skip
-        self.seen = None
-        return run_round(order, place or self.place)
+        status = run_round(order, place or self.place)
+        if status.seen == self.seen:
+            self.seen = None
+        return status
 
     def collect(self, now: float, place: Place | None = None, *, take_over: bool = False) -> Collected:
         moment = datetime.fromtimestamp(now, UTC)

@@ -154,8 +154,8 @@ def test_what_was_collected_first_is_not_rewritten_by_what_comes_late(world: Wor
     assert any("1 values differ" in note for note in done.notes)
 
 
-def forged(table: bytes, lines: bytes) -> tuple[SegmentName, bytes]:
-    """Return a segment of any content under a seal that fits it."""
+def forged(table: bytes, lines: bytes, **changed: object) -> tuple[SegmentName, bytes]:
+    """Return a segment of any content under a seal that fits it, but for what is changed."""
     name, data = segment(
         1,
         Telemetry(np.array([START], dtype="datetime64[s]"), {"air_temperature": np.array([1.0])}),
@@ -164,7 +164,8 @@ def forged(table: bytes, lines: bytes) -> tuple[SegmentName, bytes]:
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         seal = json.loads(archive.read("seal.json"))
     seal["telemetry"]["sha256"] = hashlib.sha256(table).hexdigest()
-    seal["events"]["sha256"] = hashlib.sha256(lines).hexdigest()
+    seal["events"] |= {"sha256": hashlib.sha256(lines).hexdigest(), "records": len(lines.splitlines())}
+    seal |= changed
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("seal.json", json.dumps(seal))
@@ -187,11 +188,47 @@ GOOD = b"time,air_temperature\n2026-02-16T00:00:00Z,20\n"
         (GOOD, b'{"a":' + b"[" * 200_000 + b"]" * 200_000 + b"}\n", "nested too deeply"),
         (GOOD, b"[1, 2]\n", "a list where an object"),
         (GOOD, b"{broken\n", "not JSON"),
+        (b"", b"", "first column must be time"),
+        (b"time,air_temperature\n", b"", "has 0 rows and 0 records, its seal says 1 and 0"),
+        (GOOD.replace(b",20\n", b",1e39\n"), b"", "which no sensor shows"),
     ],
 )
 def test_content_that_cannot_be_used_is_refused_in_one_sentence(table: bytes, lines: bytes, reason: str) -> None:
     with pytest.raises(SegmentError, match=reason):
         open_segment(*forged(table, lines), SITE)
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        b'{"sequence": 1' + b"0" * 30 + b', "category": "event", "time": 1.0}\n',
+        b'{"sequence": -1, "category": "event", "time": 1.0}\n',
+        b'{"sequence": 1, "category": "\\ud800", "time": 1.0}\n',
+    ],
+)
+def test_records_that_no_archive_can_hold_leave_the_rows_beside_them_alone(world: World, lines: bytes) -> None:
+    name, data = forged(GOOD, lines)
+    world.place.put(f"{SITE}/segments/{name}", data)
+    (note,) = world.collect(START + DAY).notes
+    assert "its records are not used" in note
+    assert world.archived() == {START: 20.0}
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"end": "20000-01-01T00:00:00.000Z"},
+        {"start": "-9999-01-01T00:00:00.000Z"},
+        {"number": 0},
+        {"telemetry": {"rows": 1, "sha256": hashlib.sha256(GOOD).hexdigest(), "units": {"air_temperature": "\ud800"}}},
+    ],
+)
+def test_a_seal_that_says_what_cannot_be_is_set_aside(world: World, changed: dict[str, object]) -> None:
+    name, data = forged(GOOD, b"", **changed)
+    world.place.put(f"{SITE}/segments/{name}", data)
+    (note,) = world.collect(START + DAY).notes
+    assert "its seal cannot be read" in note
+    assert world.collect(START + DAY).notes == []
 
 
 def test_a_refused_segment_is_set_aside_receipted_and_holds_nothing_up(world: World, tmp_path: Path) -> None:

@@ -5,15 +5,18 @@ from __future__ import annotations
 import json
 import os
 import time
+from datetime import UTC, date, datetime
 from pathlib import Path
 
 import pytest
 
-from igrow.core.exchange import SegmentName
+from igrow.core.exchange import FolderPlace, SegmentName
 from igrow.edge.exchange import ExchangeService
 from igrow.edge.exchange.service import TransferRules
 from igrow.edge.image import Quality, Value
 from igrow.edge.store import SqliteStore, StoreLimits
+from igrow.trainer.service.archive import Archive
+from igrow.trainer.service.collecting import collect
 from tests.patience import PATIENCE
 
 DAY = 86_400
@@ -67,6 +70,28 @@ def test_without_a_true_clock_nothing_is_sealed_and_receipts_are_still_taken(
     finish(exchange, START)
     assert exchange.health == ""
     assert json.loads((tmp_path / "state" / "status.json").read_text())["sealed"] == 0
+    exchange.close()
+
+
+def test_what_a_clock_that_went_back_between_two_rounds_has_logged_arrives_too(
+    tmp_path: Path, store: SqliteStore
+) -> None:
+    exchange = service(tmp_path, store)
+    exchange.tick(START + DAY + 300)
+    finish(exchange, START + DAY + 300)
+    for second in range(0, 600, 60):
+        moment = START + 5000.5 + second
+        store.append(moment, {"air_temperature": Value(21.0, Quality.GOOD, 0.0)})
+        exchange.tick(moment)
+    store.append(START + DAY + 900, {"air_temperature": Value(20.0, Quality.GOOD, 0.0)})
+    exchange._started = float("-inf")  # as if the time of the next round had come
+    exchange.tick(START + DAY + 1200)
+    finish(exchange, START + DAY + 1200)
+    assert exchange.health == ""
+    assert exchange._seen is None
+    archive = Archive(tmp_path / "archive")
+    collect(FolderPlace(tmp_path / "exchange"), "house", archive, datetime.fromtimestamp(START + 2 * DAY, UTC))
+    assert len(archive.read("house", date(2026, 2, 16), date(2026, 2, 17)).telemetry) == 24 + 10
     exchange.close()
 
 

@@ -134,7 +134,8 @@ def log_with_jumps(world: World, chance: Chance, now: float, later: float) -> No
         begin = now - chance.random.choice([5, 30, 60]) * 3600 + chance.random.randrange(1, 3000)
         end = begin + chance.random.choice([600, 3000])
         world.log(begin, end, 300)
-        world.seen = (begin, end)
+        low, high = world.seen or (begin, end)
+        world.seen = (min(low, begin), max(high, end))
 
 
 def run_sequence(folder: Path, seed: int, patch: pytest.MonkeyPatch) -> None:

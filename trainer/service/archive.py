@@ -202,8 +202,10 @@ def _read_events(path: Path) -> list[tuple[int | None, int, str, str]]:
 def _event_row(event: Mapping[str, Any]) -> tuple[int | None, int, str, str]:
     """Return one record as a row; raises IgrowError where it lacks what each has."""
     time, sequence, category = event.get("time"), event.get("sequence"), event.get("category")
-    if type(sequence) is not int or not isinstance(category, str):
+    if type(sequence) is not int or not 0 <= sequence < 2**63 or not isinstance(category, str):
         raise IgrowError("a record without sequence number or category")
+    if not category.isascii():
+        raise IgrowError(f"record {sequence}: category {category!a} is none")
     if time is not None and (not isinstance(time, int | float) or not 0 <= time < 2**33):
         raise IgrowError(f"record {sequence}: time {time!r} is no time since 1970")
     body = {key: value for key, value in event.items() if key not in ("sequence", "category")}
