@@ -104,6 +104,8 @@ def parse(text: str, schema: type[T], name: str = "text") -> T:
         raise SchemaError(f"{place}: not valid YAML: {error.problem or error.context}") from None
     except yaml.YAMLError as error:
         raise SchemaError(f"{name}: not valid YAML: {str(error).splitlines()[0]}") from None
+    except RecursionError:
+        raise SchemaError(f"{name}: nested too deeply for any file of igrow") from None
     if node is None:
         raise SchemaError(f"{name}:1:1: the file is empty: it needs {_required(schema)}")
     value: T = _Reader(name).read(node, schema, "", {})
@@ -117,7 +119,7 @@ def place(path: str | os.PathLike[str], *keys: str | int) -> str:
     """
     try:
         node = yaml.compose(Path(path).read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
-    except (OSError, UnicodeDecodeError, yaml.YAMLError):
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError):
         node = None
     if node is None:
         return str(path)

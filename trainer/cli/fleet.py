@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
     file = registry.file
     outcomes = run_tasks(tasks, file.backend, workers=file.workers, address=file.ray_address)
     for number, outcome in enumerate(outcomes, 1):
-        failed += outcome.ending is not Ending.DONE
+        failed += outcome.ending is not Ending.DONE or outcome.result.get("verdict") == "error"
         remember(registry, arguments.action, outcome, now)
         print(f"[{number}/{len(tasks)}] {sentence(outcome)}", flush=True)
     print(f"{len(tasks) + len(registry.problems)} sites, {failed} failed", file=sys.stderr)
@@ -150,13 +150,16 @@ def write_shared(registry: Registry, entries: Sequence[Entry]) -> str:
 
 def remember(registry: Registry, action: str, outcome: Outcome, now: datetime) -> None:
     """Write into a site's history what its task could not write itself."""
-    written = action in ("diagnose", "recalibrate", "calibrate") and outcome.ending is Ending.FAILED
-    if outcome.ending is Ending.DONE or written:
+    if outcome.ending is Ending.DONE:
         return
     command = "recalibrate" if action == "diagnose" else action
     line = {"time": now.strftime("%Y-%m-%dT%H:%M:%SZ"), "command": command, "site": outcome.name,
             "verdict": "error", "note": outcome.note}  # fmt: skip
-    history.append(site_folder(registry.state, outcome.name), line)
+    folder = site_folder(registry.state, outcome.name)
+    try:
+        history.append(folder, line)
+    except OSError as error:
+        print(f"{outcome.name}: its history cannot be written: {folder}: {error.strerror}", file=sys.stderr, flush=True)
 
 
 def sentence(outcome: Outcome) -> str:

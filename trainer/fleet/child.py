@@ -25,21 +25,23 @@ def main() -> int:
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
     for line in sys.stdin:
-        answers.write(json.dumps(_do(json.loads(line))) + "\n")
+        answers.write(json.dumps(_do(json.loads(line), limit)) + "\n")
         answers.flush()
     return 0
 
 
-def _do(task: dict[str, Any]) -> dict[str, Any]:
+def _do(task: dict[str, Any], limit: int) -> dict[str, Any]:
     began = time.process_time()
     try:
         module, _, name = str(task["function"]).partition(":")
         result = getattr(importlib.import_module(module), name)(**task["arguments"])
         answer: dict[str, Any] = {"result": result}
     except MemoryError:
-        answer = {"note": "it needs more memory than its limit", "spent": True}
-    except (IgrowError, OSError) as error:
+        answer = {"note": f"it needs more memory than its limit of {limit >> 20} MB", "spent": True}
+    except IgrowError as error:
         answer = {"note": str(error)}
+    except OSError as error:
+        answer = {"note": f"{error.filename}: {error.strerror}" if error.filename else str(error)}
     except Exception as error:  # a fault in one site's task is that site's
         traceback.print_exc()
         answer = {"note": f"a fault of this program: {type(error).__name__}: {(str(error).splitlines() or [''])[0]}"}

@@ -56,12 +56,25 @@ class SiteRow:
 
 def overview(registry: Registry, now: datetime) -> list[SiteRow]:
     """Return all sites, who needs attention first."""
-    rows = [_row(registry, entry, now) for entry in registry.entries]
-    rows += [
-        SiteRow(name, 100, (problem,), None, "", "", None, None, None, None, None)
-        for name, problem in registry.problems.items()
-    ]
+    rows = [_row_of_any(registry, entry, now) for entry in registry.entries]
+    rows += [_broken(name, problem) for name, problem in registry.problems.items()]
     return sorted(rows, key=lambda row: (-row.attention, -(row.worth or 0.0), row.site))
+
+
+def _broken(name: str, problem: str) -> SiteRow:
+    return SiteRow(name, 100, (problem,), None, "", "", None, None, None, None, None)
+
+
+def _row_of_any(registry: Registry, entry: Entry, now: datetime) -> SiteRow:
+    try:
+        return _row(registry, entry, now)
+    except Exception as error:  # whatever lies in one site's folder, the others are shown
+        what = str(error) if isinstance(error, IgrowError | OSError) else f"{type(error).__name__}: {error}"
+        folder = site_folder(registry.state, entry.site.name)
+        return _broken(
+            entry.site.name,
+            f"its files cannot be shown: {what}; look into {folder}, and put back or delete what is odd",
+        )
 
 
 def _row(registry: Registry, entry: Entry, now: datetime) -> SiteRow:
@@ -79,13 +92,16 @@ def _row(registry: Registry, entry: Entry, now: datetime) -> SiteRow:
     if failed:
         reasons.append((90, failed))
     if newest is None:
-        reasons.append((70, "nothing was ever collected"))
+        reasons.append((70, f"nothing was ever collected: does its gateway run, and is its exchange {entry.exchange}?"))
     elif now - newest > SILENT:
-        reasons.append((80, f"silent for {(now - newest).days} days"))
+        days = (now - newest).days
+        reasons.append((80, f"silent for {days} days: does its gateway run, and does it reach the exchange?"))
     reasons += [(60, str(note)) for note in collected.get("notes", [])[:3]]
     if last.get("verdict") in VERDICTS_OPEN:
         causes = ", ".join(map(str, last.get("causes", []))).replace("_", " ")
-        reasons.append((50, f"finding: {causes or last['verdict']}"))
+        reasons.append(
+            (50, f"finding: {causes or str(last['verdict']).replace('_', ' ')}; the report says what to look at")
+        )
     if reports and str(reports[-1].get("identity")) in refused_bundles(reports):
         reasons.append(
             (40, f"the gateway {str(reports[-1].get('verdict')).replace('_', ' ')}: {reports[-1].get('reason')}")
@@ -115,7 +131,7 @@ def _last_failure(lines: list[dict[str, Any]]) -> str:
     for line in lines:
         newest[str(line.get("command"))] = line
     return "; ".join(
-        f"{command} failed: {line.get('note', '')}"
+        f"{command} failed: {line.get('note', '')} (tried again at the next run)"
         for command, line in newest.items()
         if line.get("verdict") == "error"
     )

@@ -87,7 +87,8 @@ class Registry:
     file: FleetFile
     entries: tuple[Entry, ...]
     problems: Mapping[str, str]
-    """Site files that cannot be read: name of the file without ending -> the error, in one line."""
+    """Site files that cannot be read, by the file's name without ending, and sites with options but without a file: the
+    error in one line."""
 
     @property
     def state(self) -> Path:
@@ -117,7 +118,8 @@ class Registry:
 def load_registry(folder: Path, only: Sequence[str] = ()) -> Registry:
     """Read the registry; `only` names the sites that are wanted, none of them means all.
 
-    Raises IgrowError for a bad `fleet.yaml` and for a name that is not there; a bad site file is that site's problem.
+    Raises IgrowError for a bad `fleet.yaml` and where `only` has a name that is not there. A bad site file, and options
+    of a site that is not there, are that site's problem.
     """
     path = folder / "fleet.yaml"
     file = load(path, FleetFile)
@@ -136,9 +138,8 @@ def load_registry(folder: Path, only: Sequence[str] = ()) -> Registry:
     known = {*entries, *problems}
     if not known:
         raise IgrowError(f"{folder / 'sites'}: no site file (*.yaml) in it")
-    for name in file.sites:
-        if name not in known:
-            raise IgrowError(f"{place(path, 'sites', name)}: no site {name} in {folder / 'sites'}")
+    for name in set(file.sites) - known:
+        problems[name] = f"{place(path, 'sites', name)}: no site {name} in {folder / 'sites'}"
     for name in only:
         if name not in known:
             raise IgrowError(f"{name}: no such site in {folder / 'sites'}; there are {len(known)}")

@@ -77,7 +77,7 @@ def recalibrate_site(
     days: int,
     drift: str | None = None,
 ) -> dict[str, Any]:
-    """Diagnose one site, and publish what is better where `publish` says so."""
+    """Diagnose one site, and publish what is better where `publish` says so; an error is a verdict."""
     from igrow.trainer.publishing import publish_in as publish_bundle  # noqa: PLC0415  (collecting needs no signatures)
 
     site = load_site(file)
@@ -91,8 +91,6 @@ def recalibrate_site(
         force=force,
         drift=None if drift is None else Path(drift),
     )
-    if turn.verdict == "error":
-        raise IgrowError(turn.note)  # its line is in the history already
     return turn.to_json()
 
 
@@ -140,7 +138,7 @@ def calibrate_site(
     days: int,
     population: str | None,
 ) -> dict[str, Any]:
-    """Calibrate a site that has no bundle of its own yet, and publish it."""
+    """Calibrate a site that has no bundle of its own yet, and publish it; an error is a verdict."""
     from igrow.trainer.publishing import publish_in  # noqa: PLC0415
     from igrow.trainer.service.first_calibration import calibrate_first  # noqa: PLC0415
 
@@ -154,8 +152,6 @@ def calibrate_site(
         days=days,
         population=None if population is None else Path(population),
     )
-    if turn.verdict == "error":
-        raise IgrowError(turn.note)  # its line is in the history already
     return turn.to_json()
 
 

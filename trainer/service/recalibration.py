@@ -90,6 +90,7 @@ def recalibrate(
     """Diagnose one site and publish a better bundle; what happened goes into its history.
 
     Never raises for what the site sent: whatever fails is a line of its history and is tried again at the next run.
+    Raises MemoryError, and OSError where the history cannot be written.
 
     Args:
         site: whose log it is.
@@ -108,6 +109,8 @@ def recalibrate(
         turn = _run(site, archive, folder, publish_bundle, now, days, drift)
     except (IgrowError, OSError) as error:
         turn = Turn(site.name, now, "error", False, str(error))
+    except MemoryError:
+        raise  # whoever gave the limit says so
     except Exception as error:  # a fault of ours in one site's data must not cost the others
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "fault.txt").write_text(traceback.format_exc(), encoding="utf-8")
