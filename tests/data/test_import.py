@@ -99,6 +99,8 @@ def test_what_is_certain_is_set_right_and_said(tmp_path: Path, site: Path, truth
     odd = truth.with_columns(
         {
             "air_temperature": truth["air_temperature"] * 1.8 + 32.0,
+            "outdoor_temperature": truth["outdoor_temperature"] * 1.8 + 32.0,
+            "wind_speed": truth["wind_speed"] / 0.44704,
             "air_humidity": truth["air_humidity"] / 100.0,
             "energy_screen": 100.0 - truth["energy_screen"],
             "global_radiation": truth["global_radiation"] * 0.001,
@@ -107,10 +109,10 @@ def test_what_is_certain_is_set_right_and_said(tmp_path: Path, site: Path, truth
     path = write(tmp_path, odd)
     assert main(["import", str(path), "--site", str(site)]) == 0
     told = capsys.readouterr().out
-    assert told.count("set right:") == 4
+    assert told.count("set right:") == 6
     log = read_log(path, site)
     assert log.faults == ()
-    for name in ("air_temperature", "energy_screen"):
+    for name in ("air_temperature", "outdoor_temperature", "wind_speed", "energy_screen"):
         np.testing.assert_allclose(log.telemetry[name], truth[name], atol=0.01)
     np.testing.assert_allclose(log.telemetry["air_humidity"], truth["air_humidity"], atol=0.6)
     np.testing.assert_allclose(log.telemetry["global_radiation"], truth["global_radiation"], atol=5.1)
@@ -236,8 +238,8 @@ def test_delimiter_decimal_and_encoding_are_told() -> None:
     assert find_delimiter("a,b,c\n1.5,2.5,3\n") == ","
     assert find_delimiter("a\tb\n1,5\t2\n") == "\t"
     assert find_delimiter("sep=|\na|b\n1|2\n") == "|"
-    assert find_decimal(["1,5", "20", "3,25"], ";") == ","
-    assert find_decimal(["1.5", "1,234.5"], ";") == "."
+    assert find_decimal([["1,5", "20", "3,25"]]) == ","
+    assert find_decimal([["1.5", "1,234.5"]]) == "."
     assert find_encoding("Außen;ö".encode("cp1252") * 50) == "cp1252"
     assert find_encoding("室外温度".encode("gb18030") * 50) == "gb18030"
     assert find_encoding("a;b".encode("utf-16")) == "utf-16"

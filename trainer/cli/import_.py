@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from igrow.core.errors import IgrowError
 from igrow.core.site import Site, load_site
+from igrow.core.telemetry import concatenate
 from igrow.core.whole_files import write_whole
 from igrow.trainer.data.importing.check import Checked, check
+from igrow.trainer.data.importing.folder import alike
 from igrow.trainer.data.importing.proposal import Proposal, propose
 from igrow.trainer.data.importing.question import Answers, Question
-from igrow.trainer.data.importing.show import as_yaml, mapping_path, understood
+from igrow.trainer.data.importing.show import as_yaml, aside, understood
 from igrow.trainer.data.reading import prepare_log
-from igrow.trainer.data.telemetry_files import files_in
+from igrow.trainer.data.telemetry_files import MAPPING_FILE, files_in, own_mapping
 
 EXAMPLE = "igrow-trainer import export.csv --site site.yaml"
 
@@ -78,16 +80,60 @@ def _pairs(option: str, texts: Sequence[str]) -> dict[str, str]:
     return pairs
 
 
+@dataclass(frozen=True)
+class _Group:
+    """Files of one layout, and what was understood of them."""
+
+    files: Sequence[Path]
+    targets: Sequence[Path]
+    proposal: Proposal
+    checked: Checked
+    open_ones: Sequence[Question]
+
+
 def _import(given: Path, site: Site | None, answers: Answers, arguments: argparse.Namespace) -> bool:
-    """Import one file, or the layout that all files of a folder share; tells whether nothing is left open."""
-    path = files_in(given)[0]
-    target = mapping_path(path, given)
-    if target.exists() and not (arguments.force or arguments.dry_run):
-        raise IgrowError(f"{target} exists already: --force replaces it")
-    if sys.stderr.isatty():
-        print(f"reading {path}", file=sys.stderr)
-    proposal, open_ones = _asked(path, site, answers)
-    checked = check(proposal, site)
+    """Import one file, or the layouts of a folder's files; tells whether nothing is left open."""
+    alikes = alike(files_in(given), answers.sheet)
+    shared = given.is_dir() and len(alikes) == 1
+    groups = []
+    for files in alikes:
+        targets = [given / MAPPING_FILE] if shared else [own_mapping(path) for path in files]
+        there = next((target for target in targets if target.exists()), None)
+        if there is not None and not (arguments.force or arguments.dry_run):
+            raise IgrowError(f"{there} exists already: --force replaces it")
+        if sys.stderr.isatty():
+            print(f"reading {files[0]}", file=sys.stderr)
+        proposal, open_ones = _asked(files, site, answers)
+        groups.append(_Group(files, targets, proposal, check(proposal, site), open_ones))
+    parts = [group.checked.merged.telemetry for group in groups if group.checked.mapping.columns]
+    log = prepare_log(concatenate(parts), site, name=given.name) if parts and any(map(len, parts)) else None
+    needed = [question for group in groups for question in _told(group, _known_to(groups))]
+    for line in aside(log) if log is not None else ():
+        print(f"note: {line}")
+    for question in needed:
+        print(f"open: {question.text} ({', '.join(question.choices[:8])}): answer with {question.option}")
+    if arguments.dry_run:
+        return not needed
+    if any(question.blocks for question in needed):
+        print(f"error: {groups[0].targets[0]} is not written while this is open", file=sys.stderr)
+        return False
+    for group in groups:
+        for path, target in zip(group.files, group.targets, strict=False):
+            name = given.name if shared else path.name
+            remarks = [f"How {name} is to be read; written by igrow-trainer import.", *group.checked.mended]
+            write_whole(target, as_yaml(group.checked.mapping, remarks).encode())
+            print(f"wrote {target}")
+    first = groups[0].files[0]
+    plot = arguments.plot or first.with_name(f"{first.name.split('.')[0]}.import.svg")
+    if log is not None and len(log) > 1:
+        log.plot(plot)
+        print(f"wrote {plot}")
+    return True
+
+
+def _told(group: _Group, known: Collection[str]) -> list[Question]:
+    """Print what was understood of files of one layout; returns what is left open."""
+    proposal, checked = group.proposal, group.checked
     print("\n".join(understood(proposal, checked)))
     for label, lines in (
         ("note", (*proposal.notes, *checked.merged.notes)),
@@ -96,22 +142,16 @@ def _import(given: Path, site: Site | None, answers: Answers, arguments: argpars
     ):
         for line in lines:
             print(f"{label}: {line}")
-    needed = [question for question in open_ones if not _settled(question, proposal, checked)]
-    for question in needed:
-        print(f"open: {question.text} ({', '.join(question.choices[:8])}): answer with {question.option}")
-    if arguments.dry_run:
-        return not needed
-    if any(question.about in ("compartment", "date_order", "time_zone") for question in needed):
-        print(f"error: {target} is not written while this is open", file=sys.stderr)
-        return False
-    remarks = [f"How {given.name} is to be read; written by igrow-trainer import.", *checked.mended]
-    write_whole(target, as_yaml(checked.mapping, remarks).encode())
-    print(f"wrote {target}")
-    plot = arguments.plot or path.with_name(f"{path.name.split('.')[0]}.import.svg")
-    if len(checked.merged.telemetry) > 1 and checked.mapping.columns:
-        prepare_log(checked.merged.telemetry, site, name=path.name).plot(plot)
-        print(f"wrote {plot}")
-    return True
+    return [
+        one
+        for one in group.open_ones
+        if not _settled(one, proposal, checked) and (one.blocks or one.about.removeprefix("columns:") not in known)
+    ]
+
+
+def _known_to(groups: Sequence[_Group]) -> set[str]:
+    """Return the quantities that some files have."""
+    return {name for group in groups for name in group.checked.mapping.columns}
 
 
 def _settled(question: Question, proposal: Proposal, checked: Checked) -> bool:
@@ -119,9 +159,10 @@ def _settled(question: Question, proposal: Proposal, checked: Checked) -> bool:
     return question.about == "time_zone" and checked.mapping.time.time_zone != proposal.mapping.time.time_zone
 
 
-def _asked(path: Path, site: Site | None, answers: Answers) -> tuple[Proposal, tuple[Question, ...]]:
+def _asked(files: Sequence[Path], site: Site | None, answers: Answers) -> tuple[Proposal, tuple[Question, ...]]:
     """Return the proposal with the answers that a user at a terminal gives, and the questions that stay open."""
-    proposal = propose(path, site, answers)
+    path, further = files[0], files[1:]
+    proposal = propose(path, site, answers, further)
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         return proposal, proposal.questions
     skipped: set[str] = set()
@@ -141,7 +182,7 @@ def _asked(path: Path, site: Site | None, answers: Answers) -> tuple[Proposal, t
         )
         try:
             answered = _with_answer(answers, question.about, chosen)
-            proposal, answers = propose(path, site, answered), answered
+            proposal, answers = propose(path, site, answered, further), answered
         except IgrowError as error:
             print(f"error: {error}")
 

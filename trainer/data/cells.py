@@ -6,6 +6,7 @@ import csv
 import datetime
 import gzip
 import io
+import re
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -35,9 +36,40 @@ class Cells:
         return max((len(row) for row in self.rows), default=0)
 
 
+_MARKS = (b"\xff\xfe", b"\xfe\xff")
+"""Of texts in UTF-16, which are full of zeros."""
+_ZIP, _OLD_WORKBOOK, _PDF = b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"%PDF"
+
+
 def is_text(path: Path) -> bool:
-    """Tell whether a file is read as text."""
-    return not path.name.lower().endswith((".parquet", *EXCEL))
+    """Tell whether a file is read as text; many a computer calls a text with tabs ``.xls``."""
+    name = path.name.lower()
+    if not name.endswith(EXCEL):
+        return not name.endswith(".parquet")
+    start = _start(path)
+    return name.endswith(".xls") and bool(start) and (start.startswith(_MARKS) or b"\x00" not in start)
+
+
+def _start(path: Path) -> bytes:
+    try:
+        with path.open("rb") as file:
+            return file.read(4096)
+    except OSError:
+        return b""
+
+
+def _refuse_what_is_no_text(path: Path, data: bytes) -> None:
+    """Raise IgrowError that names what a file is, where it is something else than text."""
+    what = {
+        _ZIP: "a zip archive or a workbook: unpack it into a folder and import that, or let its name end in .xlsx",
+        _OLD_WORKBOOK: "a workbook: let its name end in .xls",
+        _PDF: "a PDF: a table is needed, such as CSV or Excel",
+    }
+    told = next((text for start, text in what.items() if data.startswith(start)), None)
+    if told is None and re.match(rb"\s*<(!doctype|html|table|\?xml)", data[:200], re.IGNORECASE):
+        told = "a page of HTML or XML: open it in a spreadsheet and save it as CSV or .xlsx"
+    if told is not None:
+        raise IgrowError(f"{path}: is {told}")
 
 
 def read_bytes(path: Path) -> bytes:
@@ -54,6 +86,7 @@ def read_bytes(path: Path) -> bytes:
 def read_text(path: Path, encoding: str) -> str:
     """Return a text file; raises IgrowError where it is not of that encoding."""
     data = read_bytes(path)
+    _refuse_what_is_no_text(path, data)
     try:
         # A byte order mark is no part of the text.
         return data.decode("utf-8-sig" if encoding.lower() in {"utf-8", "utf8"} else encoding).removeprefix("\ufeff")
@@ -75,7 +108,7 @@ def read_cells(path: Path, *, delimiter: str = ",", encoding: str = "utf-8", she
     Raises:
         IgrowError: the file cannot be read, or has no such sheet.
     """
-    if path.name.lower().endswith(EXCEL):
+    if path.name.lower().endswith(EXCEL) and not is_text(path):
         table = _workbook(path, sheet)
     elif path.name.lower().endswith(".parquet"):
         table = _parquet(path)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,14 +11,16 @@ import numpy as np
 
 from igrow.core.errors import IgrowError
 from igrow.core.local_time import to_local
-from igrow.core.telemetry import Times, Values
+from igrow.core.telemetry import Times, Values, concatenate
 from igrow.trainer.data.cells import Cells, read_cells
-from igrow.trainer.data.mapping import ColumnMapping, ExportMapping
+from igrow.trainer.data.mapping import ColumnMapping, ExportMapping, TimeColumn
 from igrow.trainer.data.number_texts import number
 from igrow.trainer.data.rows import Merged, merge
-from igrow.trainer.data.timestamps import to_utc
-from igrow.trainer.data.vocabulary import switch_words
+from igrow.trainer.data.timestamps import parser, to_utc
+from igrow.trainer.data.vocabulary import folded, words_of
 
+MOST_UNREADABLE = 0.02
+"""Share of rows whose time cannot be read up to which they are no readings; beyond it the form is wrong."""
 LONGEST_INTERVAL = 7200.0
 """Seconds; what fell in a longer one is no rate."""
 
@@ -51,13 +53,25 @@ def read(path: Path, mapping: ExportMapping) -> Merged:
 
 def read_table(table: ExportTable, mapping: ExportMapping) -> Merged:
     """Return the telemetry of an export's chosen rows; raises IgrowError as `read` does."""
-    table, notes = readings(table, mapping.time.column, mapping.time.time_of_day)
+    table, notes = readings(table, mapping.time)
     if mapping.long is not None:
         merged = _read_long(table, mapping)
     else:
         time = times(table, mapping)
-        merged = merge(time, {name: quantity(table, rule, mapping, time) for name, rule in mapping.columns.items()})
+        merged = merge(
+            time, {name: quantity(name, table, rule, mapping, time) for name, rule in mapping.columns.items()}
+        )
     return replace(merged, notes=(*notes, *merged.notes))
+
+
+def read_tables(tables: Sequence[ExportTable], mapping: ExportMapping) -> Merged:
+    """Return the telemetry of several tables of one layout, joined in time; raises IgrowError as `read` does."""
+    parts = [read_table(chosen_rows(table, mapping.only), mapping) for table in tables]
+    if len(parts) == 1:
+        return parts[0]
+    notes = dict.fromkeys(note for one in parts for note in one.notes)
+    faults = dict.fromkeys(fault for one in parts for fault in one.faults)
+    return Merged(concatenate([one.telemetry for one in parts]), tuple(notes), tuple(faults))
 
 
 def as_table(cells: Cells, header: Sequence[int] = (1,), first_row: int | None = None) -> ExportTable:
@@ -109,12 +123,14 @@ def chosen_rows(table: ExportTable, only: Mapping[str, str]) -> ExportTable:
     return table
 
 
-def readings(table: ExportTable, column: str, time_of_day: str | None) -> tuple[ExportTable, tuple[str, ...]]:
+def readings(table: ExportTable, time: TimeColumn) -> tuple[ExportTable, tuple[str, ...]]:
     """Return the rows that are readings, with notes on the others.
 
-    A text without any digit is no time: a line of sums below the table, or its header once more. A day that stands on
-    the first of its rows alone holds for those below it.
+    A text without any digit is no time: a line of sums below the table, or its header once more; nor are the few that
+    cannot be read as one, such as a month with its means. A day that stands on the first of its rows alone holds for
+    those below it.
     """
+    column, time_of_day = time.column, time.time_of_day
     notes: list[str] = []
     if time_of_day is not None and not all(table[column]):
         days, hours = _held(table[column]), table[time_of_day]
@@ -124,6 +140,7 @@ def readings(table: ExportTable, column: str, time_of_day: str | None) -> tuple[
             table = ExportTable(table.path, {**table.columns, column: filled}, table.lines)
     texts = table[column]
     strange = [row for row, text in enumerate(texts) if text and not any(map(str.isdigit, text))]
+    strange = sorted({*strange, *_unreadable(table, time, set(strange))})
     if not strange:
         return table, tuple(notes)
     where = ", ".join(f"line {table.lines[row]} ({texts[row]!r})" for row in strange[:3])
@@ -133,6 +150,28 @@ def readings(table: ExportTable, column: str, time_of_day: str | None) -> tuple[
     kept = [row for row in range(len(texts)) if row not in out]
     columns = {name: [cells[row] for row in kept] for name, cells in table.columns.items()}
     return ExportTable(table.path, columns, [table.lines[row] for row in kept]), tuple(notes)
+
+
+def _unreadable(table: ExportTable, time: TimeColumn, known: Container[int]) -> list[int]:
+    """Return the rows beside those known whose time cannot be read, where they are few."""
+    read, wrong = parser(time.format), []
+    for row, text in enumerate(_written(table, time)):
+        if text and row not in known:
+            try:
+                read(text)
+            except (ValueError, OverflowError):
+                wrong.append(row)
+                if len(wrong) > MOST_UNREADABLE * len(table.lines):
+                    return []
+    return wrong
+
+
+def _written(table: ExportTable, time: TimeColumn) -> Sequence[str]:
+    """Return the texts of the times, day and hour together."""
+    days = table[time.column]
+    if time.time_of_day is None:
+        return days
+    return [f"{day} {hour}".strip() for day, hour in zip(days, table[time.time_of_day], strict=True)]
 
 
 def _held(texts: Sequence[str]) -> list[str]:
@@ -146,9 +185,7 @@ def _held(texts: Sequence[str]) -> list[str]:
 def times(table: ExportTable, mapping: ExportMapping) -> Times:
     """Return the UTC times of an export's rows; raises IgrowError with the line of the first that cannot be read."""
     rule = mapping.time
-    texts = table[rule.column]
-    if rule.time_of_day is not None:
-        texts = [f"{day} {hour}".strip() for day, hour in zip(texts, table[rule.time_of_day], strict=True)]
+    texts = _written(table, rule)
     empty = np.array([not text for text in texts], dtype=bool)
     written = [text for text in texts if text]
     found, wrong = to_utc(written, rule.format, rule.time_zone)
@@ -160,17 +197,26 @@ def times(table: ExportTable, mapping: ExportMapping) -> Times:
     return result
 
 
-def numbers(table: ExportTable, name: str, mapping: ExportMapping, words: Mapping[str, float] | None = None) -> Values:
-    """Return one column as numbers, NaN where it says that there is none; raises IgrowError with the line."""
+def numbers(table: ExportTable, name: str, mapping: ExportMapping, words: Mapping[str, float], ours: str) -> Values:
+    """Return one column as numbers, NaN where it says that there is none; raises IgrowError with the line.
+
+    Args:
+        table: the export.
+        name: of its column.
+        mapping: of the export.
+        words: what words of the column stand for.
+        ours: the quantity that it is.
+    """
     missing = frozenset(mapping.missing)
     # A word of the other language or state may come later than the file that the mapping was made from.
-    known: dict[str, float] = {**dict.fromkeys(missing, float("nan")), **(words or {})}
+    known: dict[str, float] = {**dict.fromkeys(missing, float("nan")), **words}
+    known_words = words_of(ours)
     values = np.empty(len(table.lines))
     for position, text in enumerate(table[name]):
         if text not in known:
             value = number(text, mapping.decimal)
             if value is None and words:
-                value = switch_words().get(text.lower())
+                value = known_words.get(folded(text))
             if value is None:
                 where = f"{table.path}:{table.lines[position]}"
                 raise IgrowError(f"{where}: {name} is {text!r}: a number or an empty cell is needed")
@@ -179,11 +225,11 @@ def numbers(table: ExportTable, name: str, mapping: ExportMapping, words: Mappin
     return values
 
 
-def quantity(table: ExportTable, rule: ColumnMapping, mapping: ExportMapping, time: Times) -> Values:
+def quantity(ours: str, table: ExportTable, rule: ColumnMapping, mapping: ExportMapping, time: Times) -> Values:
     """Return one of our quantities from the columns that a rule names, in the registry's unit."""
-    total = numbers(table, rule.column, mapping, rule.words)
+    total = numbers(table, rule.column, mapping, rule.words, ours)
     for further in rule.add:
-        total = total + numbers(table, further, mapping, rule.words)
+        total = total + numbers(table, further, mapping, rule.words, ours)
     if rule.amount != "rate":
         total = _rates(total, rule.amount, time, mapping.time.time_zone)
     return total * rule.scale + rule.offset
@@ -226,7 +272,7 @@ def _read_long(table: ExportTable, mapping: ExportMapping) -> Merged:
             part = ExportTable(table.path, {name: [values[row] for row in rows]}, [table.lines[row] for row in rows])
             column = np.full(len(time), np.nan)
             own = ColumnMapping(name, amount=rule.amount, words=rule.words)
-            column[np.searchsorted(time, when[rows])] = quantity(part, own, mapping, when[rows])
+            column[np.searchsorted(time, when[rows])] = quantity(ours, part, own, mapping, when[rows])
             total = total + column
         columns[ours] = total * rule.scale + rule.offset
     return merge(time, columns)

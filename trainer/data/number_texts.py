@@ -27,3 +27,9 @@ def number(text: str, decimal: str) -> float | None:
         digits = digits.replace(group, "")
     digits = digits.replace(",", ".")
     return float(digits) if _PLAIN.fullmatch(digits) else None
+
+
+def unit_behind(text: str) -> str:
+    """Return what stands behind the number of a text, such as ``°C``; empty where nothing does."""
+    found = None if _POWER.fullmatch(text) else _WITH_UNIT.fullmatch(text)
+    return (found[2] or "").strip() if found is not None else ""

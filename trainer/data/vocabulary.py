@@ -14,7 +14,8 @@ import yaml
 
 from igrow.trainer.data.mapping import Amount
 
-_FOLDED = str.maketrans({"æ": "ae", "ø": "o", "œ": "oe", "−": "-", "–": "-", "’": "'"})
+_FOLDED = str.maketrans({"æ": "ae", "ø": "o", "œ": "oe", "ł": "l", "ß": "ss", "−": "-", "–": "-", "’": "'"})
+OPENINGS, CLOSURES = ("vent_lee", "vent_wind"), ("energy_screen", "blackout_screen")
 _BRACKETS = re.compile(r"[(\[{]([^()\[\]{}]*)[)\]}]")
 
 
@@ -35,6 +36,8 @@ class Rule:
 
     needed: tuple[tuple[str, ...], ...]
     """Sets of words, of which one must be there whole."""
+    by_unit: tuple[tuple[str, ...], ...]
+    """Sets of words that are enough where the column has a unit of the quantity."""
     excluded: frozenset[str]
     likelier: tuple[str, ...]
     dimension: str
@@ -63,8 +66,8 @@ def month_names() -> Mapping[str, str]:
 
 @cache
 def switch_words() -> Mapping[str, float]:
-    """Return 1 or 0 for each word that says on or off, in small letters."""
-    return {word: float(value) for value, words in _table()["switched"].items() for word in words}
+    """Return 1 or 0 for each word that says on or off, folded."""
+    return {folded(word): float(value) for value, words in _table()["switched"].items() for word in words}
 
 
 @cache
@@ -81,7 +84,8 @@ def rules() -> Mapping[str, Rule]:
     """Return the rule of each quantity."""
     return {
         name: Rule(
-            tuple(tuple(rule[key]) for key in ("all", "or") if key in rule),
+            (tuple(rule["all"]), *map(tuple, rule.get("or", ()))),
+            tuple(map(tuple, rule.get("by_unit", ()))),
             frozenset(rule["none"]),
             tuple(rule.get("more", ())),
             _table()["unit_of"].get(name, ""),
@@ -105,6 +109,21 @@ def units() -> Mapping[str, Mapping[str, Unit]]:
             )
             for spelling in (name, *unit["spelt"]):
                 found.setdefault(dimension, {})[compact(spelling)] = one
+    return found
+
+
+@cache
+def words_of(quantity: str) -> Mapping[str, float]:
+    """Return the value of each word, folded, that a quantity's cells may hold in place of a number.
+
+    A vent that is open is open to 100 %, a screen that is closed or on is closed to 100 %.
+    """
+    if quantity not in OPENINGS and quantity not in CLOSURES:
+        return switch_words()
+    ends = (100.0, 0.0) if quantity in OPENINGS else (0.0, 100.0)
+    found = {word: 100.0 * value for word, value in switch_words().items()}
+    for state, value in zip(("open", "closed"), ends, strict=True):
+        found |= {folded(word): value for word in _table()["positions"][state]}
     return found
 
 

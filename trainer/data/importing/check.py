@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from igrow.core.site import Site
 from igrow.trainer.data import export
 from igrow.trainer.data.fault import DataFault
 from igrow.trainer.data.importing.proposal import Proposal
+from igrow.trainer.data.importing.told_units import like_the_others
 from igrow.trainer.data.importing.zone import fixed
 from igrow.trainer.data.mapping import ColumnMapping, ExportMapping
 from igrow.trainer.data.plausibility import find_faults
@@ -44,9 +45,11 @@ def check(proposal: Proposal, site: Site | None) -> Checked:
     mapping = proposal.mapping
     mended: list[str] = []
     for _ in range(_ROUNDS):
-        merged = export.read_table(proposal.table, mapping)
+        merged = export.read_tables(proposal.tables, mapping)
         faults = (*merged.faults, *find_faults(merged.telemetry, site))
-        better = _on_another_clock(proposal, mapping, faults, site, mended) or _remedied(mapping, faults, mended)
+        better = _on_another_clock(proposal, mapping, faults, site, mended) or _remedied(
+            mapping, faults, proposal.units, mended
+        )
         if better is None:
             break
         mapping = better
@@ -64,11 +67,11 @@ def _on_another_clock(
     if not wrong:
         return None
     best: tuple[float, ExportMapping] | None = None
-    for zone in _candidates(site, export.read_table(proposal.table, mapping)):
+    for zone in _candidates(site, export.read_tables(proposal.tables, mapping)):
         if zone == mapping.time.time_zone:
             continue
         moved = replace(mapping, time=replace(mapping.time, time_zone=zone))
-        merged = export.read_table(proposal.table, moved)
+        merged = export.read_tables(proposal.tables, moved)
         if any(fault.kind in CLOCK for fault in find_faults(merged.telemetry, site)):
             continue
         late = abs(noon_is_late(merged.telemetry, site))
@@ -96,11 +99,20 @@ def _candidates(site: Site, merged: Merged) -> list[str]:
     return list(dict.fromkeys([*zones, "UTC", fixed(solar)]))
 
 
-def _remedied(mapping: ExportMapping, faults: Iterable[DataFault], mended: list[str]) -> ExportMapping | None:
+def _remedied(
+    mapping: ExportMapping, faults: Sequence[DataFault], units: Mapping[str, str], mended: list[str]
+) -> ExportMapping | None:
     """Return the mapping with every certain remedy in it, or None where there is none."""
     columns: Mapping[str, ColumnMapping] = mapping.columns
     changed = dict(columns)
+    american = next((fault for fault in faults if fault.kind == "fahrenheit" and not units.get(fault.quantity)), None)
+    if american is not None:
+        faulty = {fault.quantity: "told" for fault in faults if fault.kind != "kilometres_per_hour"}
+        changed, _, notes = like_the_others(changed, {**units, **faulty}, american.quantity)
+        mended += notes
     for fault in faults:
+        if fault.kind == "kilometres_per_hour" and american is not None and not units.get(fault.quantity):
+            continue
         if fault.kind == "swapped_columns":
             one, other = fault.quantity.split(", ")
             changed[one], changed[other] = changed[other], changed[one]

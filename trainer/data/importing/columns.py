@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import QUANTITIES
@@ -58,8 +59,11 @@ def find_matches(columns: Iterable[str], unit_line: Mapping[str, str]) -> list[M
             found.append(Match(exact, column, _CERTAIN, units.get(dimension(exact)), compartment))
             continue
         for quantity, rule in vocabulary.rules().items():
-            needed = max((len(one) for one in rule.needed if words.issuperset(one)), default=0)
-            if not needed or words & rule.excluded or foreign or (units and rule.dimension not in units):
+            enough = (*rule.needed, *(rule.by_unit if rule.dimension in units else ()))
+            # A word that is needed excludes nothing.
+            fitting = [one for one in enough if words.issuperset(one) and not words & rule.excluded.difference(one)]
+            needed = max(map(len, fitting), default=0)
+            if not needed or foreign or (units and rule.dimension not in units):
                 continue
             more = sum(word in words for word in rule.likelier)
             score = 10 * needed + 3 * more + 4 * bool(units) - 12 * ("other" in words) - 2 * ("sum" in words)
@@ -71,6 +75,38 @@ def dimension(quantity: str) -> str:
     """Return the dimension of a quantity's units; empty where it has none to choose from."""
     rule = vocabulary.rules().get(quantity)
     return "" if rule is None else rule.dimension
+
+
+def side_by_side(matches: Sequence[Match]) -> Sequence[Match]:
+    """Return matches with the compartments that names tell which no word for one stands in, such as north and south.
+
+    Where several columns would do for the air temperature, what their names do not have in common tells compartments if
+    their humidity or CO2 has the same beside it.
+    """
+    airs = [one for one in matches if one.quantity == "air_temperature"]
+    best = max((one.score for one in airs), default=0)
+    airs = [one for one in airs if one.score == best]
+    if len(airs) < 2 or compartments(matches):
+        return matches
+    words = {one.column: _words(one.column) for one in airs}
+    common = set.intersection(*map(set, words.values()))
+    labels = {" ".join(word for word in found if word not in common): None for found in words.values()}
+    others = [one for one in matches if one.quantity in ("air_humidity", "air_co2")]
+    if "" in labels or not any(sum(_called(one.column, label) for one in others) for label in list(labels)[1:]):
+        return matches
+    return [
+        one if one.quantity in WEATHER else replace(one, compartment=label)
+        for one in matches
+        for label in [next((label for label in labels if _called(one.column, label)), "")]
+    ]
+
+
+def _words(name: str) -> list[str]:
+    return re.findall(r"\w+", vocabulary.folded(name))
+
+
+def _called(column: str, label: str) -> bool:
+    return set(label.split()) <= set(_words(column))
 
 
 def compartments(matches: Sequence[Match]) -> list[str]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import io
 import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
 
 import charset_normalizer
@@ -20,11 +22,15 @@ from igrow.trainer.data.mapping import MISSING
 
 DELIMITERS = (";", "\t", "|", ",")
 """In the order in which they are believed: a comma may be a decimal sign."""
-_ENCODINGS = ("utf_8", "utf_16", "gb18030", "big5", "cp1252")
+_ENCODINGS = ("cp1252", "cp1250", "cp1254", "cp1251", "gb18030", "cp932", "big5")
+"""Of which the first that fits best is taken."""
+_BYTES, _HEAD = 100_000, 30
+"""Of a text that are looked at for its encoding, and lines in which columns' names stand."""
 _SAMPLE = 400
 """Rows that are looked at."""
-_NUMERIC = re.compile(r"[-+]?\d[\d.,'\u00a0 ]*([eE][-+]?\d+)?\s*(%|°?[CF]|ppm|W/m²|W/m2|m/s)?")
-_COMMA, _POINT = re.compile(r"[-+]?\d+,\d+"), re.compile(r"[-+]?\d+\.\d+")
+_NUMERIC = re.compile(r"[-+]?\d[\d.,'\u00a0 ]*([eE][-+]?\d+)?\s*(%|°?[CF]|ppm|W/m²|W/m2|m/s|km/h|mph)?")
+_DIGITS = re.compile(r"[-+]?(\d[\d.,]*)(?![\d:/-])")
+_GROUPED = re.compile(r"[1-9]\d{0,2}([.,]\d{3})+")
 
 
 @dataclass(frozen=True)
@@ -56,11 +62,11 @@ def find_layout(path: Path, sheet: str | None = None) -> tuple[Layout, Cells]:
     cells = read_cells(path, delimiter=delimiter, encoding=encoding, sheet=sheet)
     first = _first_reading(cells)
     head, units = _header(cells, first)
-    body = [cell for row in cells.rows[first : first + _SAMPLE] for cell in row]
+    body = list(zip_longest(*cells.rows[first : first + _SAMPLE], fillvalue=""))
     return Layout(
         encoding,
         delimiter,
-        find_decimal(body, delimiter),
+        find_decimal(body),
         sheet,
         tuple(cells.lines[row] for row in head),
         None if units is None else cells.lines[units],
@@ -76,9 +82,25 @@ def find_encoding(data: bytes) -> str:
     try:
         data.decode("utf-8")
     except UnicodeDecodeError:
-        best = charset_normalizer.from_bytes(data[:100_000], cp_isolation=list(_ENCODINGS)).best()
-        return "cp1252" if best is None else best.encoding.replace("_", "-")
+        return _likeliest_encoding(data[:_BYTES])
     return "utf-8"
+
+
+def _likeliest_encoding(data: bytes) -> str:
+    """Return the encoding in which a text has most of the words that columns are made of."""
+    told: dict[str, int] = {}
+    for name in _ENCODINGS:
+        try:
+            # The last character may be cut in two.
+            text = codecs.getincrementaldecoder(name)().decode(data)
+        except UnicodeDecodeError:
+            continue
+        told[name] = sum(len(vocabulary.words_in(line)) for line in text.splitlines()[:_HEAD])
+    best = max(told, key=lambda name: told[name], default="cp1252")
+    if told.get(best, 0):
+        return best
+    guess = charset_normalizer.from_bytes(data, cp_isolation=list(_ENCODINGS)).best()
+    return "cp1252" if guess is None else guess.encoding.replace("_", "-")
 
 
 def find_delimiter(text: str) -> str:
@@ -99,14 +121,39 @@ def find_delimiter(text: str) -> str:
     return found
 
 
-def find_decimal(cells: Sequence[str], delimiter: str) -> str:
-    """Return the decimal sign of numbers."""
-    if delimiter == ",":
-        # Quoted numbers may still have a comma.
-        return "," if any(_COMMA.fullmatch(cell) for cell in cells) else "."
-    commas = sum(_COMMA.fullmatch(cell) is not None for cell in cells)
-    points = sum(_POINT.fullmatch(cell) is not None for cell in cells)
-    return "," if commas > points else "."
+def find_decimal(columns: Sequence[Sequence[str]]) -> str:
+    """Return the decimal sign of the numbers in a table's columns, each a sequence of cells.
+
+    A sign that stands before three digits may be one of thousands. It is, where other numbers of its column have none:
+    980, then 1.020.
+    """
+    certain: Counter[str] = Counter()
+    unsure: Counter[str] = Counter()
+    for cells in columns:
+        own: Counter[str] = Counter()
+        grouped: Counter[str] = Counter()
+        whole = 0
+        for cell in cells:
+            digits = _DIGITS.match(cell)
+            signs = [sign for sign in (digits[1].rstrip(".,") if digits else "") if sign in ".,"]
+            if digits is not None and not signs:
+                whole += 1
+            elif len(set(signs)) == 2 or (signs and digits is not None and _is_decimal(digits[1])):
+                own[signs[-1]] += 1
+            elif digits is not None and _GROUPED.fullmatch(digits[1]):
+                grouped[signs[0]] += 1
+        certain += own
+        for sign, count in grouped.items():
+            if whole and not own[sign]:
+                certain["," if sign == "." else "."] += count
+            else:
+                unsure[sign] += count
+    told = certain or unsure
+    return "," if told[","] > told["."] else "."
+
+
+def _is_decimal(digits: str) -> bool:
+    return len(re.findall(r"[.,]", digits)) == 1 and _GROUPED.fullmatch(digits) is None
 
 
 def _fullest_sheet(path: Path) -> str | None:

@@ -13,14 +13,20 @@ from igrow.core.yaml_schema import nearest
 from igrow.trainer.data import vocabulary
 from igrow.trainer.data.export import ExportTable, as_table, chosen_rows, readings
 from igrow.trainer.data.importing import columns as names
+from igrow.trainer.data.importing.capacity import add_lamp_power, by_capacity
+from igrow.trainer.data.importing.folder import further_cells, joined
 from igrow.trainer.data.importing.layout import Layout, find_layout
 from igrow.trainer.data.importing.question import Answers, Question
 from igrow.trainer.data.importing.texts import ColumnTexts, column_texts
-from igrow.trainer.data.importing.time_format import TimeForm, find_time
+from igrow.trainer.data.importing.time_format import TimeForm, find_time, why_none
+from igrow.trainer.data.importing.told_units import like_the_others, unit_of_cells
 from igrow.trainer.data.importing.zone import find_zone
 from igrow.trainer.data.mapping import MISSING, ColumnMapping, ExportMapping, LongTable, TimeColumn
+from igrow.trainer.data.vocabulary import Unit
 
 ORDERS = {"dmy": ("%d", "%m"), "mdy": ("%m", "%d"), "ymd": ("%Y", "%m")}
+MUST_BE_RIGHT = ("air_temperature", "outdoor_temperature", "air_humidity", "air_co2", "global_radiation")
+"""Quantities of which no column is taken where another would do as well."""
 _MOST_COMPARTMENTS = 60
 
 
@@ -31,9 +37,10 @@ class Proposal:
     path: Path
     layout: Layout
     mapping: ExportMapping
-    table: ExportTable
+    tables: tuple[ExportTable, ...]
+    """Of the file and of further ones."""
     units: Mapping[str, str]
-    """Quantity -> name of the unit that its column is taken to be in; empty where nothing tells it."""
+    """Quantity -> the unit that its column is taken to be in; empty where nothing tells it."""
     unused: tuple[str, ...]
     notes: tuple[str, ...]
     questions: tuple[Question, ...]
@@ -44,15 +51,19 @@ class _Body:
     """The readings of a file."""
 
     table: ExportTable
+    labels: Sequence[str]
     long: LongTable | None
     decimal: str
 
-    def texts(self, label: str) -> ColumnTexts:
-        """Return what the readings under a label are."""
-        if self.long is None:
-            return column_texts(self.table[label], self.decimal)
-        names, values = self.table[self.long.name], self.table[self.long.value]
-        return column_texts([value for name, value in zip(names, values, strict=True) if name == label], self.decimal)
+    def texts(self, label: str, quantity: str) -> ColumnTexts:
+        """Return what the readings under a label are, which are taken for a quantity."""
+        cells = self.table[label] if self.long is None else self._named(self.long, label)
+        return column_texts(cells, self.decimal, vocabulary.words_of(quantity))
+
+    def _named(self, long: LongTable, label: str) -> list[str]:
+        return [
+            value for name, value in zip(self.table[long.name], self.table[long.value], strict=True) if name == label
+        ]
 
 
 @dataclass
@@ -63,8 +74,16 @@ class _Draft:
     questions: list[Question] = field(default_factory=list)
 
 
-def propose(path: Path, site: Site | None = None, answers: Answers | None = None) -> Proposal:
+def propose(
+    path: Path, site: Site | None = None, answers: Answers | None = None, further: Sequence[Path] = ()
+) -> Proposal:
     """Return the mapping of an export as far as the file tells it, and what only the user knows.
+
+    Args:
+        path: of the file.
+        site: the greenhouse, where it is known.
+        answers: what the user said.
+        further: files of the same layout, such as those of other days (`alike`).
 
     Raises:
         IgrowError: the file is no table of readings over time.
@@ -72,14 +91,14 @@ def propose(path: Path, site: Site | None = None, answers: Answers | None = None
     answers = answers or Answers()
     draft = _Draft()
     layout, cells = find_layout(path, answers.sheet)
-    table = as_table(cells, layout.header, layout.first_row)
+    tables = [as_table(one, layout.header, layout.first_row) for one in (cells, *further_cells(further, layout))]
+    table = joined(tables)
     unit_line = _unit_line(cells.rows, cells.lines, layout, table)
     time = find_time(dict(table.columns))
     if time is None:
-        raise IgrowError(f"{path}: no column is a time; it has {', '.join(table.columns)}")
+        raise IgrowError(f"{path}: {why_none(dict(table.columns))}")
     time = _ordered(time, answers, draft)
-    table, told = readings(table, time.column, time.time_of_day)
-    draft.notes += told
+    table, _ = readings(table, TimeColumn(time.column, time.time_of_day, time.form))
     long = _long(table, time, layout)
     only: dict[str, str] = {}
     if long is None:
@@ -90,17 +109,17 @@ def propose(path: Path, site: Site | None = None, answers: Answers | None = None
         if long is not None
         else [name for name in table.columns if name not in (time.column, time.time_of_day)]
     )
-    matches = names.find_matches(labels, unit_line)
+    matches = names.side_by_side(names.find_matches(labels, unit_line))
     compartment = _compartment(matches, answers, draft)
     _check_given(answers, labels)
-    body = _Body(table, long, layout.decimal)
+    body = _Body(table, labels, long, layout.decimal)
     assigned = names.assign(matches, compartment, answers.columns)
     mapped, units = _mapped(body, assigned, site, answers, draft)
     zone, why = find_zone(time, table, site, answers.time_zone)
     if zone is None:
         choices = ("Europe/Amsterdam", "UTC")
         question = "in which time zone are its times?"
-        draft.questions.append(Question("time_zone", question, choices, "--time-zone Europe/Amsterdam"))
+        draft.questions.append(Question("time_zone", question, choices, "--time-zone Europe/Amsterdam", blocks=True))
     if why:
         draft.notes.append(why)
     mapping = ExportMapping(
@@ -118,7 +137,7 @@ def propose(path: Path, site: Site | None = None, answers: Answers | None = None
     )
     read = {one for rule in mapped.values() for one in (rule.column, *rule.add)}
     unused = tuple(name for name in labels if name not in read and name not in only)
-    return Proposal(path, layout, mapping, table, units, unused, tuple(draft.notes), tuple(draft.questions))
+    return Proposal(path, layout, mapping, tuple(tables), units, unused, tuple(draft.notes), tuple(draft.questions))
 
 
 def _unit_line(
@@ -142,9 +161,8 @@ def _ordered(time: TimeForm, answers: Answers, draft: _Draft) -> TimeForm:
         return replace(time, form=chosen, alternatives=())
     if time.alternatives:
         orders = tuple(order for order, parts in ORDERS.items() if any(form.startswith(parts[0]) for form in forms))
-        draft.questions.append(
-            Question("date_order", "does the day or the month come first in its dates?", orders, "--date-order dmy")
-        )
+        text = "does the day or the month come first in its dates?"
+        draft.questions.append(Question("date_order", text, orders, "--date-order dmy", blocks=True))
     return time
 
 
@@ -200,7 +218,9 @@ def _compartment(matches: Sequence[names.Match], answers: Answers, draft: _Draft
 
 def _ask_compartment(labels: Sequence[str], draft: _Draft) -> None:
     option = f"--compartment {labels[0]!r}"
-    draft.questions.append(Question("compartment", "which compartment is the log of?", tuple(labels), option))
+    draft.questions.append(
+        Question("compartment", "which compartment is the log of?", tuple(labels), option, blocks=True)
+    )
 
 
 def _check_given(answers: Answers, labels: Sequence[str]) -> None:
@@ -225,11 +245,14 @@ def _mapped(
         match = assigned.chosen.get(quantity)
         if match is None:
             continue
-        texts = body.texts(match.column)
+        texts = body.texts(match.column, quantity)
         if texts.numeric + texts.missing < 0.5 and not texts.words:
             draft.notes.append(f"{match.column!r} was taken for {quantity}, but its cells are no numbers: left out")
             continue
-        unit = names.unit_called(quantity, answers.units[quantity]) if quantity in answers.units else match.unit
+        if quantity in answers.units:
+            unit: Unit | None = names.unit_called(quantity, answers.units[quantity])
+        else:
+            unit = match.unit or unit_of_cells(quantity, texts.unit)
         rule = ColumnMapping(match.column, words=texts.words)
         if unit is not None:
             scale, amount, offset = unit.scale, unit.amount, unit.offset
@@ -237,7 +260,7 @@ def _mapped(
                 amount = "day"
             rule = replace(rule, scale=scale, offset=offset, amount=amount)
         elif names.dimension(quantity) in ("dose", "water", "power"):
-            rescued = _by_capacity(quantity, rule, texts.highest, site)
+            rescued = by_capacity(quantity, rule, texts.highest, site)
             if rescued is None:
                 _ask_unit(quantity, match.column, draft)
                 continue
@@ -245,39 +268,23 @@ def _mapped(
             draft.notes.append(f"{match.column!r} has no unit: taken for a switch, times what the site can do at most")
         rules[quantity] = rule
         units[quantity] = unit.name if unit is not None else ""
-        for rival in assigned.rivals.get(quantity, ()):
+        rivals = assigned.rivals.get(quantity, ())
+        if rivals and quantity in MUST_BE_RIGHT:
+            question, columns = f"which column is the {quantity}?", (match.column, *rivals)
+            option = f"--column {quantity}={match.column!r}"
+            draft.questions.append(Question(f"columns:{quantity}", question, columns, option, blocks=True))
+        for rival in rivals:
             draft.notes.append(f"{rival!r} would do for {quantity} as well: --column {quantity}={rival!r} takes it")
-    _add_lamp_power(rules, units, site, draft)
+    rules, units, told = like_the_others(rules, units)
+    draft.notes += told
+    draft.notes += filter(None, [add_lamp_power(rules, units, site)])
     for quantity in ("air_temperature", "outdoor_temperature"):
-        if quantity not in rules:
+        if quantity not in rules and not any(one.about == f"columns:{quantity}" for one in draft.questions):
             taken = {rule.column for rule in rules.values()}
-            left = tuple(name for name in body.table.columns if name not in taken)[:40]
+            left = tuple(name for name in body.labels if name not in taken)[:40]
             text = f"which column is the {quantity}, or in which other file does it stand?"
             draft.questions.append(Question(f"columns:{quantity}", text, left, f"--column {quantity}=NAME"))
     return rules, units
-
-
-def _by_capacity(quantity: str, rule: ColumnMapping, highest: float, site: Site | None) -> ColumnMapping | None:
-    """Return a switch (0 to 1, or to 100) as a rate of what the site can do, or None where that is not known."""
-    if site is None or not 0.0 < highest <= 100.0 or (highest > 1.0 and highest < 90.0):
-        return None
-    share = 1.0 if highest <= 1.0 else 0.01
-    if quantity == "co2_dosing" and site.greenhouse.co2_dosing_capacity > 0.0:
-        return replace(rule, scale=share * site.greenhouse.co2_dosing_capacity)
-    if quantity == "lamp_power" and site.greenhouse.lamps is not None:
-        return replace(rule, scale=share * site.greenhouse.lamps.power)
-    return None
-
-
-def _add_lamp_power(rules: dict[str, ColumnMapping], units: dict[str, str], site: Site | None, draft: _Draft) -> None:
-    """Give the lamps' power where the log tells only that they burn, and the site how strong they are."""
-    if "lamp_on" not in rules or "lamp_power" in rules or site is None or site.greenhouse.lamps is None:
-        return
-    rule = rules["lamp_on"]
-    power = site.greenhouse.lamps.power
-    rules["lamp_power"] = replace(rule, scale=rule.scale * power)
-    units["lamp_power"] = units["lamp_on"]
-    draft.notes.append(f"lamp_power is {power:g} W m-2, as the site says, where {rule.column!r} says that lamps burn")
 
 
 def _ask_unit(quantity: str, column: str, draft: _Draft) -> None:
@@ -288,5 +295,5 @@ def _ask_unit(quantity: str, column: str, draft: _Draft) -> None:
 
 def _marks(body: _Body, rules: Mapping[str, ColumnMapping]) -> tuple[str, ...]:
     """Return the texts in mapped columns that are neither numbers nor words: marks of a missing value."""
-    found = dict.fromkeys(mark for rule in rules.values() for mark in body.texts(rule.column).marks)
+    found = dict.fromkeys(mark for quantity, rule in rules.items() for mark in body.texts(rule.column, quantity).marks)
     return tuple(mark for mark in found if mark not in MISSING)

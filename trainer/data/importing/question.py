@@ -31,3 +31,5 @@ class Question:
     choices: tuple[str, ...]
     option: str
     """That answers it, as it is typed."""
+    blocks: bool = False
+    """No mapping is written while it is open: every guess could be wrong without anybody seeing it."""

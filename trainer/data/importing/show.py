@@ -5,17 +5,19 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 from dataclasses import fields
-from pathlib import Path
 
 import numpy as np
 
-from igrow.core.quantities import QUANTITIES
+from igrow.core.quantities import CLIMATE, QUANTITIES, WEATHER
 from igrow.trainer.data.grid import own_step
 from igrow.trainer.data.importing.check import Checked
 from igrow.trainer.data.importing.proposal import Proposal
+from igrow.trainer.data.log import Log
 from igrow.trainer.data.mapping import MISSING, ColumnMapping, ExportMapping, TimeColumn
 
 _ROWS = 3
+_RARE = ("sky_temperature", "outdoor_co2", "par")
+"""Weather and climate that few greenhouses measure."""
 
 
 def understood(proposal: Proposal, checked: Checked) -> list[str]:
@@ -48,6 +50,16 @@ def understood(proposal: Proposal, checked: Checked) -> list[str]:
         lines.append(f"  {str(table.time[row]).replace('T', ' ')[:16]}  {cells}")
     if proposal.unused:
         lines += ["", "not used: " + ", ".join(proposal.unused)]
+    return lines
+
+
+def aside(log: Log) -> list[str]:
+    """Return what was set aside of a log, and which quantities it has no readings of, in lines."""
+    lines = [note for note in log.notes if "set aside" in note]
+    needed = [name for name in (*WEATHER, *CLIMATE) if name not in _RARE and not QUANTITIES[name].optional]
+    lacking = [name for name in needed if name not in log.telemetry or not np.isfinite(log.telemetry[name]).any()]
+    if lacking:
+        lines.append(f"no readings of {', '.join(lacking)}: nothing is said of what needs them")
     return lines
 
 
@@ -101,10 +113,3 @@ def _value(value: object) -> str:
     if isinstance(value, dict):
         return "{" + ", ".join(f"{_value(name)}: {_value(one)}" for name, one in value.items()) + "}"
     return json.dumps(value, ensure_ascii=False)
-
-
-def mapping_path(path: Path, given: Path) -> Path:
-    """Return where the mapping of a file goes: beside it, or into the folder that was given."""
-    from igrow.trainer.data.telemetry_files import MAPPING_FILE, own_mapping  # noqa: PLC0415  (imports this package)
-
-    return given / MAPPING_FILE if given.is_dir() else own_mapping(path)

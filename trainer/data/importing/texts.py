@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from igrow.trainer.data import vocabulary
 from igrow.trainer.data.mapping import MISSING
-from igrow.trainer.data.number_texts import number
+from igrow.trainer.data.number_texts import number, unit_behind
 
 
 @dataclass(frozen=True)
@@ -25,21 +25,26 @@ class ColumnTexts:
     """Other texts."""
     highest: float
     """Largest number, nan without any."""
+    unit: str
+    """What stands behind most of the numbers; empty for nothing."""
 
 
-def column_texts(cells: Sequence[str], decimal: str) -> ColumnTexts:
-    """Return what the cells of a column are; `decimal` is the sign before decimals."""
+def column_texts(cells: Sequence[str], decimal: str, known: Mapping[str, float] | None = None) -> ColumnTexts:
+    """Return what the cells of a column are; `decimal` is the sign before decimals, `known` the words it may have."""
+    known = vocabulary.switch_words() if known is None else known
     count = Counter(cells)
     total = max(len(cells), 1)
     values = {text: value for text in count if text not in MISSING and (value := number(text, decimal)) is not None}
     rest = [text for text in count if text not in values and text not in MISSING]
-    words = {
-        text: vocabulary.switch_words()[text.lower()] for text in rest if text.lower() in vocabulary.switch_words()
-    }
+    behind: Counter[str] = Counter()
+    for text in values:
+        behind[unit_behind(text)] += count[text]
+    words = {text: known[vocabulary.folded(text)] for text in rest if vocabulary.folded(text) in known}
     return ColumnTexts(
         sum(count[text] for text in values) / total,
         sum(count[text] for text in count if text in MISSING) / total,
         words,
         tuple(text for text in rest if text not in words),
         max(values.values(), default=float("nan")),
+        behind.most_common(1)[0][0] if behind else "",
     )

@@ -16,9 +16,10 @@ from igrow.trainer.data.timestamps import EXCEL, ISO, UNIX, UNIX_MS, parser
 _SAMPLE = 1500
 _LEAST_READ = 0.98
 """Share of a column's texts that a form must read."""
-_CLOCK = re.compile(r"\d{1,2}[:.]\d{2}([:.]\d{2})?([.,]\d+)?(\s?[ap]\.?\s?m\.?)?", re.IGNORECASE)
+_CLOCK = re.compile(r"\d{1,2}[:.h]\d{2}([:.]\d{2})?([.,]\d+)?(\s?[ap]\.?\s?m\.?)?(\s?(uhr|hrs?|hs?|u))?", re.IGNORECASE)
 _DATE = re.compile(
-    r"(\d{1,4}[-/.年]\s?\d{1,2}[-/.月]\s?\d{1,4}日?|\d{8}|\d{1,2}[-\s.]+[^\W\d_]{3,}\.?[-\s]+\d{2,4})(\D.*)?"
+    r"(\d{1,4}[-/.年]\s?\d{1,2}[-/.月]\s?\d{1,4}日?|\d{8}|\d{1,2}[-\s.]+[^\W\d_]{3,}\.?[-\s]+\d{2,4}|"
+    r"[^\W\d_]{3,}\.?\s+\d{1,2},?\s+\d{4})(\D.*)?"
 )
 _TOKEN = re.compile(r"\d+|[^\W\d_]+|[^\w]+|_")
 
@@ -72,6 +73,16 @@ def find_time(columns: dict[str, Sequence[str]]) -> TimeForm | None:
                     continue
         found.append((likely, _best(name, None, forms, texts)))
     return max(found, key=lambda one: one[0])[1] if found else None
+
+
+def why_none(columns: dict[str, Sequence[str]]) -> str:
+    """Return why no column of a table is a time, in a line."""
+    for name, texts in columns.items():
+        first, *rest = [text for text in texts if text] or [""]
+        strange = next((text for text in rest if not looks_like_time(text)), None)
+        if first and looks_like_time(first) and strange is not None:
+            return f"no column is a time: {name!r} begins with {first!r}, but has {strange!r} too"
+    return f"no column is a time; it has {', '.join(columns)}"
 
 
 def _sample(texts: Sequence[str]) -> list[str]:

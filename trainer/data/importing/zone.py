@@ -9,6 +9,8 @@ from igrow.trainer.data.export import ExportTable
 from igrow.trainer.data.importing.time_format import TimeForm
 
 _OFFSET = re.compile(r"(?:GMT|UTC)\s*([+-])\s*(\d{1,2})(?::?(\d{2}))?")
+_WITH_OFFSET = re.compile(r"(\dT|:)\S*\s*(Z|[+-]\d\d:?\d\d)$")
+"""A time of day with its offset: the year of 18-10-2020 is none."""
 _NAMED = re.compile(r"\b(UTC|GMT|CET|CEST)\b")
 
 
@@ -27,7 +29,7 @@ def find_zone(time: TimeForm, table: ExportTable, site: Site | None, given: str 
     if told is not None:
         return told, f"the column's name says that times are {told}"
     sample = next((text for text in table[time.column] if text), "")
-    if time.form.startswith("unix") or re.search(r"(Z|[+-]\d\d:?\d\d)$", sample.strip()):
+    if time.form.startswith("unix") or _WITH_OFFSET.search(sample.strip()):
         return "UTC", ""
     if site is not None and site.time_zone != "UTC":
         return site.time_zone, f"times are taken for wall times of {site.time_zone}, the site's zone"

@@ -1,0 +1,258 @@
+"""Exports of other languages, units and habits: each reads as the truth, or nothing is written and it is said why."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from igrow.core import sun
+from igrow.core.local_time import to_local
+from igrow.core.telemetry import Telemetry, to_grid
+from igrow.trainer.cli import main
+from igrow.trainer.data import read_log
+from tests.virtual_log import virtual_log
+
+AMSTERDAM = "Europe/Amsterdam"
+EXPECTED = ("air_temperature", "air_humidity", "air_co2", "outdoor_temperature", "global_radiation", "wind_speed")
+Frame = tuple[pd.DataFrame, dict[str, object]]
+
+
+@pytest.fixture(scope="module")
+def log() -> Telemetry:
+    """A fortnight of a mild winter, every half hour; as cold as where degF are written, so that 30 is no degC."""
+    table = to_grid(virtual_log(14, seed=9), 1800)
+    return table.with_columns({"outdoor_temperature": table["outdoor_temperature"] - 10.0})
+
+
+def degrees_fahrenheit(values: np.ndarray) -> np.ndarray:
+    return values * 1.8 + 32.0
+
+
+def written(log: Telemetry, names: Sequence[str], form: str = "%d/%m/%Y %H:%M", zone: str = AMSTERDAM) -> pd.DataFrame:
+    """The time and six columns, called as `names` say."""
+    frame = pd.DataFrame({name: log[ours] for name, ours in zip(names[1:], EXPECTED, strict=True)}).round(3)
+    frame.insert(0, names[0], pd.DatetimeIndex(to_local(log.time, zone)).strftime(form))
+    return frame
+
+
+def imported(folder: Path, *options: str, zone: str = AMSTERDAM, export: str = "export.csv") -> int:
+    (folder / "site.yaml").write_text(f"name: westland\nlatitude: 52.0\nlongitude: 4.5\ntime_zone: {zone}\n")
+    return main(["import", str(folder / export), "--site", str(folder / "site.yaml"), *options])
+
+
+def assert_reads_as(folder: Path, log: Telemetry, export: str = "export.csv", near: float = 0.06) -> None:
+    read = read_log(folder / export, folder / "site.yaml")
+    assert read.faults == ()
+    table = read.telemetry
+    assert table.time[0] == log.time[0]
+    for name in EXPECTED:
+        far = {"air_co2": 0.6, "global_radiation": 2.0}.get(name, near)
+        there = np.isfinite(table[name])
+        assert there.sum() >= len(log) - 2, name
+        np.testing.assert_allclose(table[name][there], log[name][there], atol=far, err_msg=name)
+
+
+LANGUAGES = {
+    "fr": (
+        "cp1252", "Date/heure", "Température intérieure (°C)", "Humidité relative (%)", "Concentration CO2 (ppm)",
+        "Température extérieure (°C)", "Rayonnement global (W/m²)", "Vitesse du vent (m/s)",
+    ),
+    "pl": (
+        "cp1250", "Data i godzina", "Temperatura wewnętrzna [°C]", "Wilgotność względna [%]", "Stężenie CO2 [ppm]",
+        "Temperatura zewnętrzna [°C]", "Promieniowanie słoneczne [W/m2]", "Prędkość wiatru [m/s]",
+    ),
+    "it": (
+        "cp1252", "Data e ora", "Temperatura interna", "Umidità relativa", "CO2", "Temperatura esterna",
+        "Radiazione solare", "Velocità vento",
+    ),
+    "pt": (
+        "utf-8", "Data/Hora", "Temperatura interior (°C)", "Umidade relativa (%)", "CO2 (ppm)",
+        "Temperatura exterior (°C)", "Radiação solar (W/m²)", "Velocidade do vento (m/s)",
+    ),
+    "ja": ("cp932", "日時", "室内温度(℃)", "室内湿度(%)", "CO2濃度(ppm)", "外気温(℃)", "日射量(W/m2)", "風速(m/s)"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("code", LANGUAGES)
+def test_a_language_is_read_in_the_encoding_of_its_country(tmp_path: Path, log: Telemetry, code: str) -> None:
+    encoding, *names = LANGUAGES[code]
+    written(log, names).to_csv(tmp_path / "export.csv", sep=";", decimal=",", index=False, encoding=encoding)
+    assert imported(tmp_path) == 0
+    assert_reads_as(tmp_path, log)
+
+
+def _american(log: Telemetry, names: Sequence[str]) -> pd.DataFrame:
+    frame = written(log, names, "%m/%d/%Y %I:%M:%S %p")
+    for column in (1, 4):
+        frame.isetitem(column, degrees_fahrenheit(frame.iloc[:, column]))
+    frame.isetitem(6, frame.iloc[:, 6] / 0.44704)
+    return frame.round(3)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("Date/Time", "Inside (°F)", "RH", "CO2", "Outside (°F)", "Solar (W/m2)", "Wind (mph)"),
+        ("Date/Time", "Inside Temp (°F)", "RH", "CO2", "Outside Temp", "Solar", "Wind Speed"),
+        ("Date/Time", "Zone 1 Temp", "Zone 1 RH", "Zone 1 CO2", "Outside Temp", "Solar", "Wind Speed"),
+    ],
+    ids=["told", "one is told", "by their size"],
+)
+def test_degrees_fahrenheit_are_found_on_a_day_that_is_mild_in_degc(
+    tmp_path: Path, log: Telemetry, capsys, names: Sequence[str]
+) -> None:
+    """Of an outdoor temperature of 30 alone nobody knows what it is in; the columns beside it tell."""
+    _american(log, names).to_csv(tmp_path / "export.csv", index=False)
+    assert imported(tmp_path) == 0
+    assert ("has no unit: taken for degF, as air_temperature is" in capsys.readouterr().out) == (
+        "Outside (" not in names[4]
+    )
+    assert_reads_as(tmp_path, log)
+
+
+def test_a_unit_that_the_user_gives_is_not_taken_for_another(tmp_path: Path, log: Telemetry) -> None:
+    names = ("Date/Time", "Inside Temp (°F)", "RH", "CO2", "Outside Temp", "Solar", "Wind Speed")
+    _american(log, names).to_csv(tmp_path / "export.csv", index=False)
+    assert imported(tmp_path, "--unit", "outdoor_temperature=degC") == 0
+    raw = degrees_fahrenheit(log["outdoor_temperature"])
+    np.testing.assert_allclose(read_log(tmp_path / "export.csv").telemetry["outdoor_temperature"], raw, atol=0.01)
+
+
+def test_units_behind_the_numbers_count(tmp_path: Path, log: Telemetry) -> None:
+    names = ("Time", "Greenhouse temp", "Greenhouse RH", "CO2", "Outside temp", "Solar radiation", "Wind speed")
+    frame = _american(log, names)
+    for column, unit in ((1, "°F"), (2, "%"), (3, "ppm"), (4, "°F"), (5, "W/m²"), (6, "mph")):
+        frame.isetitem(column, [f"{value:.2f} {unit}" for value in frame.iloc[:, column]])
+    frame.to_csv(tmp_path / "export.csv", index=False)
+    assert imported(tmp_path) == 0
+    assert_reads_as(tmp_path, log)
+
+
+@pytest.mark.parametrize(
+    ("name", "factor"),
+    [
+        ("Outside light (ft-candles)", 1.0 / 0.09360104),
+        ("Outside PAR (µmol/m2/s)", 2.05),
+        ("Outside light [klux]", 0.115),
+    ],
+)
+def test_light_outside_is_the_suns_radiation(tmp_path: Path, log: Telemetry, name: str, factor: float) -> None:
+    frame = written(log, ("Time", "Air temp (C)", "RH (%)", "CO2 (ppm)", "Outside temp (C)", name, "Wind (m/s)"))
+    frame[name] *= factor
+    frame.to_csv(tmp_path / "export.csv", index=False)
+    assert imported(tmp_path) == 0
+    assert_reads_as(tmp_path, log)
+
+
+@pytest.mark.parametrize("locale", ["en", "de", "whole"])
+def test_thousands_are_no_decimals(tmp_path: Path, log: Telemetry, locale: str) -> None:
+    """980, then 1,020: the comma before three digits is none of decimals."""
+    plenty = log.with_columns({"air_co2": np.round(log["air_co2"] * 2.0)})
+    names = ("Time", "Air temp (C)", "RH (%)", "CO2 (ppm)", "Outside temp (C)", "Radiation (W/m2)", "Wind (m/s)")
+    digits = 0 if locale == "whole" else 1
+    frame = written(plenty, names, "%Y-%m-%d %H:%M")
+    for column in frame.columns[1:]:
+        texts = [f"{value:,.{0 if column.startswith('CO2') else digits}f}" for value in frame[column]]
+        frame[column] = texts if locale == "en" else [text.translate(str.maketrans(",.", ".,")) for text in texts]
+    frame.to_csv(tmp_path / "export.csv", sep="," if locale == "en" else ";", index=False)
+    assert imported(tmp_path) == 0
+    assert_reads_as(tmp_path, plenty, near=0.51)
+
+
+@pytest.mark.parametrize("houses", [("Comp A", "Comp B"), ("North house", "South house")])
+def test_houses_side_by_side_are_never_guessed(tmp_path: Path, log: Telemetry, capsys, houses: Sequence[str]) -> None:
+    names = ("Time", *(f"{houses[1]} {one}" for one in ("temp (C)", "RH (%)", "CO2 (ppm)")))
+    frame = written(log, (*names, "Outside temp (C)", "Solar (W/m2)", "Wind (m/s)"))
+    for column, name in enumerate(names[1:], 1):
+        frame.insert(column, name.replace(houses[1], houses[0]), frame[name] + 3.0)
+    frame.to_csv(tmp_path / "export.csv", index=False)
+    assert imported(tmp_path) == 2
+    told = capsys.readouterr()
+    assert "which compartment is the log of?" in told.out
+    assert "is not written while this is open" in told.err
+    label = {"Comp B": "b", "South house": "south"}[houses[1]]
+    assert imported(tmp_path, "--compartment", label) == 0
+    assert_reads_as(tmp_path, log)
+
+
+def test_of_two_columns_with_one_name_none_is_taken(tmp_path: Path, log: Telemetry, capsys) -> None:
+    names = ("Time", "Temperature", "Humidity", "CO2", "Temperature ", "Radiation", "Wind speed")
+    written(log, names).rename(columns=str.strip).to_csv(tmp_path / "export.csv", index=False)
+    assert imported(tmp_path) == 2
+    assert "which column is the air_temperature? (Temperature, Temperature (2))" in capsys.readouterr().out
+    both = ("--column", "air_temperature=Temperature", "--column", "outdoor_temperature=Temperature (2)")
+    assert imported(tmp_path, *both) == 0
+    assert_reads_as(tmp_path, log)
+
+
+PLAIN = ("Time", "Air temp (C)", "RH (%)", "CO2 (ppm)", "Outside temp (C)", "Radiation (W/m2)", "Wind (m/s)")
+
+
+def _footer(frame: pd.DataFrame) -> tuple[str, str]:
+    return frame.to_csv(index=False) + "2020-02,20.1,80,500,7,60,3\nPage 1 of 1\n", "set aside: line 674 ('2020-02')"
+
+
+def _uhr(frame: pd.DataFrame) -> tuple[str, str]:
+    days, hours = zip(*(text.split() for text in frame["Time"]), strict=True)
+    frame = frame.assign(Time=[f"{hour} Uhr" for hour in hours])
+    frame.insert(0, "Datum", days)
+    return frame.to_csv(index=False, sep=";"), "as %d/%m/%Y %H:%M Uhr"
+
+
+def _month_first(frame: pd.DataFrame) -> tuple[str, str]:
+    times = pd.to_datetime(frame["Time"], format="%d/%m/%Y %H:%M").dt.strftime("%b %d, %Y %I:%M %p")
+    return frame.assign(Time=times).to_csv(index=False), "as %b %d, %Y %I:%M %p"
+
+
+def _line_breaks(frame: pd.DataFrame) -> tuple[str, str]:
+    return frame.rename(columns=lambda name: name.replace(" ", "\n")).to_csv(index=False), "Air temp (C)"
+
+
+@pytest.mark.parametrize("habit", [_footer, _uhr, _month_first, _line_breaks])
+def test_an_odd_habit_is_read(
+    tmp_path: Path, log: Telemetry, capsys, habit: Callable[[pd.DataFrame], tuple[str, str]]
+) -> None:
+    text, told = habit(written(log, PLAIN))
+    (tmp_path / "export.csv").write_text(text)
+    assert imported(tmp_path) == 0
+    assert told in capsys.readouterr().out
+    assert_reads_as(tmp_path, log)
+
+
+def test_the_year_behind_a_dash_is_no_offset_from_utc(tmp_path: Path, log: Telemetry) -> None:
+    """25-10-2020 in a column of its own: the hour that happens twice is told by the site's zone."""
+    time = log.time + np.timedelta64((np.datetime64("2020-10-18") - np.datetime64("2020-02-01")).astype(int), "D")
+    light = 0.6 * sun.extraterrestrial_radiation(time, 52.0, 4.5)
+    autumn = Telemetry(time, {**log.columns, "global_radiation": light})
+    frame = written(autumn, PLAIN, "%d-%m-%Y %H:%M")
+    parts = frame["Time"].str.split(" ", expand=True)
+    frame = frame.assign(Time=parts[1])
+    frame.insert(0, "Date", parts[0])
+    frame.to_csv(tmp_path / "export.csv", index=False)
+    assert imported(tmp_path) == 0
+    assert_reads_as(tmp_path, autumn)
+
+
+def test_vents_and_screens_that_are_open_or_closed(tmp_path: Path, log: Telemetry) -> None:
+    frame = written(log, PLAIN)
+    frame["Roof vents"] = np.where(log["vent_lee"] > 1.0, "open", "Closed")
+    frame["Thermal screen"] = np.where(log["energy_screen"] > 50.0, "CLOSED", "open")
+    frame.to_csv(tmp_path / "export.csv", index=False)
+    assert imported(tmp_path) == 0
+    table = read_log(tmp_path / "export.csv").telemetry
+    np.testing.assert_array_equal(table["vent_lee"], np.where(log["vent_lee"] > 1.0, 100.0, 0.0))
+    np.testing.assert_array_equal(table["energy_screen"], np.where(log["energy_screen"] > 50.0, 100.0, 0.0))
+
+
+def test_what_is_set_aside_is_said_at_once(tmp_path: Path, log: Telemetry, capsys) -> None:
+    frame = written(log, PLAIN).drop(columns="Wind (m/s)")
+    frame.loc[100:119, "CO2 (ppm)"] = 9999
+    frame.to_csv(tmp_path / "export.csv", index=False)
+    assert imported(tmp_path) == 0
+    told = capsys.readouterr().out
+    assert "note: air_co2: 20 readings" in told
+    assert "note: no readings of outdoor_humidity, wind_speed: nothing is said of what needs them" in told

@@ -1,0 +1,55 @@
+"""Units that no column's name tells: those in its cells, and those of the columns beside it.
+
+One computer writes one system of units. Where its temperatures are in degF, a temperature without a unit is too: by its
+size alone nobody can tell 37 degF, a mild day in winter, from a hot one in degC.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from igrow.trainer.data import vocabulary
+from igrow.trainer.data.importing import columns as names
+from igrow.trainer.data.mapping import ColumnMapping
+from igrow.trainer.data.vocabulary import Unit
+
+_AMERICAN = {"temperature": "degF", "speed": "mph"}
+"""By dimension, what goes with degrees Fahrenheit."""
+
+
+def unit_of_cells(quantity: str, behind: str) -> Unit | None:
+    """Return the unit of a quantity that stands behind its numbers, or None where none that it may have does."""
+    return vocabulary.find_units([vocabulary.compact(behind)]).get(names.dimension(quantity)) if behind else None
+
+
+def like_the_others(
+    rules: Mapping[str, ColumnMapping], units: Mapping[str, str], certain: str | None = None
+) -> tuple[dict[str, ColumnMapping], dict[str, str], list[str]]:
+    """Give temperatures and wind without a unit the American one where the other temperatures have it.
+
+    Args:
+        rules: of the quantities, by name.
+        units: quantity -> its unit; empty where nothing tells it.
+        certain: a temperature that is in degF by its size; None: what the units tell counts.
+
+    Returns:
+        The rules and units, changed, and what was changed in sentences.
+    """
+    told = {units[name]: name for name in rules if names.dimension(name) == "temperature" and units.get(name)}
+    witness = certain or (told["degF"] if "degF" in told and "degC" not in told else None)
+    changed, named, notes = dict(rules), dict(units), list[str]()
+    for name, rule in rules.items():
+        american = _AMERICAN.get(names.dimension(name))
+        untouched = replace(rule, column="", add=()) == ColumnMapping("")
+        if witness is None or american is None or units.get(name) or name == certain or not untouched:
+            continue
+        unit = names.unit_called(name, american)
+        changed[name] = replace(rule, scale=unit.scale, offset=unit.offset)
+        named[name] = american
+        other = "m s-1" if american == "mph" else "degC"
+        notes.append(
+            f"{rule.column!r} has no unit: taken for {american}, as {witness} is in degF "
+            f"(--unit {name}={other!r} says otherwise)"
+        )
+    return changed, named, notes
