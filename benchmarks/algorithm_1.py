@@ -7,9 +7,8 @@ stands, one begins a week later. After four weeks under the recipe the upper lev
 by the season's marginal values: on the built-in bundle as it is; on the same corrected by what the last three days used
 and grew; and, so corrected, on a simulator that the lower level renews every `--every` days (K2). That is the trainer's
 road: the rows that were collected are calibrated to at first and diagnosed against the model in force from then on;
-what unseen days bear out (the service's own rule) is exported as a bundle, and plans go on with it. "Climate alone" is
-the same without what calibration fits of growth. All that counts is fruit that was picked, less costs. Searches are
-smaller than the daemon's.
+what unseen days bear out (the service's own rule) is exported as a bundle, and plans go on with it. All that counts is
+fruit that was picked, less costs. Searches are smaller than the daemon's.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ import argparse
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -39,7 +38,6 @@ from igrow.core.site import Site
 from igrow.trainer import FittedModel, Log, calibrate, compare, diagnose, export, prepare_log, read_model
 from igrow.trainer.service.recalibration import LEAST_GAIN, relative_gain
 
-USUAL = ("as it is", "recent use", "lower level")
 LOOKED_AT = 28
 """Newest days of a log that the lower level looks at."""
 CLIMATE = {"air_temperature": "K", "air_humidity": "%", "air_co2": "ppm"}
@@ -103,19 +101,10 @@ class Renewed(Watched):
     """The same with the lower level: each house's simulator is renewed from its log every so many days."""
 
     def __init__(
-        self,
-        site: Site,
-        simulator: BundleSimulator,
-        season: SeasonPlan,
-        generations: int,
-        every: int,
-        out: Path,
-        *,
-        growth: bool = True,
+        self, site: Site, simulator: BundleSimulator, season: SeasonPlan, generations: int, every: int, out: Path
     ) -> None:
         super().__init__(site, simulator, season, generations, corrected=True)
         self._every = every
-        self._growth = growth
         self._out = out
         self._simulators: dict[int, BundleSimulator] = {}
         self._built_in = read_model(read_bundle(default_bundle_folder()), site)
@@ -143,7 +132,6 @@ class Renewed(Watched):
         log, before = self.log(row, day - LOOKED_AT, day), self._models.get(house, self._built_in)
         if house not in self._models:
             after, said = calibrate(log), "calibrated"
-            after = after if self._growth else replace(after, crop=before.crop)
         else:
             result = diagnose(log, before)
             better = result.verdict != "data_fault" and relative_gain(result.errors) >= LEAST_GAIN
@@ -180,9 +168,6 @@ def main() -> int:
     parser.add_argument("--houses", type=int, default=3)
     parser.add_argument("--generations", type=int, default=5, help="of each day's search")
     parser.add_argument("--every", type=int, default=14, help="days between two runs of the lower level (K2)")
-    parser.add_argument(
-        "--only", nargs="+", metavar="WAY", help=f"ways beside the recipe (default: {', '.join(USUAL)})"
-    )
     parser.add_argument("--figure", type=Path, help="SVG to write")
     given = parser.parse_args()
     site, kinds = described("today", given.days), ways_of(given.days)
@@ -192,47 +177,39 @@ def main() -> int:
     plan = valued(season, kinds["season"], genes, crop)
     simulator = BundleSimulator(read_bundle(default_bundle_folder()), site.greenhouse, members=1)
     with tempfile.TemporaryDirectory() as folder:
-        every, out = given.every, Path(folder)
-        known: dict[str, Watched] = {
+        renewed = Renewed(site, simulator, plan, given.generations, given.every, Path(folder))
+        planned: dict[str, Watched] = {
             "as it is": Watched(site, simulator, plan, given.generations, corrected=False),
             "recent use": Watched(site, simulator, plan, given.generations, corrected=True),
-            "lower level": Renewed(site, simulator, plan, given.generations, every, out / "all"),
-            "climate alone": Renewed(site, simulator, plan, given.generations, every, out / "climate", growth=False),
+            "lower level": renewed,
         }
-        planned = {name: known[name] for name in given.only or USUAL}
-        renewed = {name: way for name, way in planned.items() if isinstance(way, Renewed)}
         ways: dict[str, Way] = {"recipe": Recipe(), **planned}
 
         def stood(days: int, numbers: Sequence[int]) -> Houses:
-            houses = LoggedHouses(days, numbers)
-            for way in renewed.values():
-                way.houses = houses
-            return houses
+            renewed.houses = LoggedHouses(days, numbers)
+            return renewed.houses
 
         books, _ = lead(site, given.days, ways, {name: list(range(given.houses)) for name in ways}, stood)
-        errors = {
-            name: climate_errors(way, list(ways).index(name) * given.houses, given.days, every)
-            for name, way in renewed.items()
-        }
+        errors = climate_errors(renewed, list(ways).index("lower level") * given.houses, given.days, given.every)
     brought(f"{given.days} days", {name: (money(site, book), book) for name, book in books.items()})
     print(f"\n{'expected / obtained':22s}" + "".join(f"{name:>12s}" for name in JUDGED))
     for name, way in planned.items():
         print(f"{name:22s}" + "".join(f"{way.expected_over_obtained(what):12.2f}" for what in JUDGED))
-    for name, way in renewed.items():
-        tell(name, way, errors[name])
+    tell(renewed, errors)
     if given.figure:
-        draw(given.figure, site, books, next(iter(errors.values()), {}))
+        draw(given.figure, site, books, errors)
     return 0
 
 
-def tell(name: str, renewed: Renewed, errors: Mapping[int, Mapping[str, list[Values]]]) -> None:
+def tell(renewed: Renewed, errors: Mapping[int, Mapping[str, list[Values]]]) -> None:
     """Print the simulators' errors before and after each run of the lower level, and what it said."""
     heads = [f"{quantity.removeprefix('air_')}, {unit}" for quantity, unit in CLIMATE.items()]
-    print(f"\n{name}\n{'error a day ahead':22s}" + "".join(f"{head:>18s}" for head in heads))
+    print(f"\n{'error a day ahead':22s}" + "".join(f"{head:>18s}" for head in heads))
     for day, both in errors.items():
         for when, each in both.items():
             cells = "".join(f"{value:18.2f}" for value in np.mean(each, axis=0))
             print(f"{f'day {day}, {when}':22s}{cells}")
+    print("\nwhat the lower level said")
     assert renewed.houses is not None
     for turn in renewed.turns:
         stands, begins = renewed.houses.hidden[turn.house]
@@ -259,9 +236,8 @@ def draw(
         "as it is": ("deployed", ":"),
         "recent use": ("recalibrated", "--"),
         "lower level": ("corrected", "-"),
-        "climate alone": ("aside", "-."),
     }
-    for name, (colour, stroke) in ((name, strokes[name]) for name in books if name in strokes):
+    for name, (colour, stroke) in strokes.items():
         gain.plot(np.arange(1, days + 1), net(name) - net("recipe"), stroke, color=COLOURS[colour], label=name)
     name_above(gain, "net profit more than by the recipe, EUR/m²")
     gain.legend(loc="upper left")

@@ -124,13 +124,6 @@ RESULTS = {
         "greenhouses and weather 700; searches 0 and on",
         long=True,
     ),
-    "algorithm-1-growth": Result(
-        "The lower level without what it fits of growth",
-        ("benchmarks.algorithm_1", "--only", "recent use", "climate alone"),
-        "The same greenhouses; the lower level renews the climate, growth stays that of the built-in bundle.",
-        "greenhouses and weather 700; searches 0 and on",
-        long=True,
-    ),
     "figure-4": Result(
         "Figure 4: a season by the genetic algorithm, by soft actor-critic, and as growers led it",
         ("benchmarks.figure_4", "--minutes", "4", "--figure", "docs/results/figure-4.svg"),
