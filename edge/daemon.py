@@ -140,25 +140,26 @@ class Daemon:
             patience = SIMULATED_PATIENCE if control.lockstep else PATIENCE
             await settled(earlier, patience)
         if not earlier.done():
-            self._leave_all_alone(control, "cannot be read yet")
+            text = "what was set by hand before the start cannot be read yet, so all setpoints are left as they stand"
+            self._leave_all_alone(control, text)
             return
         self._earlier = None
         try:
             remember(control, earlier.result())
-        except Exception as error:
-            log.exception("what the run before this one has noted makes no sense")
-            self._leave_all_alone(control, f"makes no sense as it was noted ({type(error).__name__}: {error})")
+        except Exception:
+            text = "what was noted before the start makes no sense, so all setpoints are left as they stand"
+            log.exception("%s", text)
+            self._leave_all_alone(control, text)
         else:
             control.cycle.unknown_until = -math.inf
+            self._journal.alarm("memory", "")
 
-    def _leave_all_alone(self, control: Control, why: str) -> None:
-        """Keep every setpoint where it stands, for as long as a hand before the start may have to be respected."""
+    def _leave_all_alone(self, control: Control, text: str) -> None:
+        """Keep all setpoints where they stand, for as long as a hand before the start may have to be respected."""
         if control.cycle.unknown_until == -math.inf:
             respected = control.configuration.file.cycle.respect_hand.total_seconds()
             control.cycle.unknown_until = control.clock.monotonic() + respected
-        self._journal.alarm(
-            "memory", f"what was set by hand before the start {why}, so all setpoints are left as they stand"
-        )
+        self._journal.alarm("memory", text)
 
     async def _cycle(self, control: Control) -> None:
         result = await control.cycle.run()

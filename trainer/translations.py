@@ -42,8 +42,8 @@ _SPEAKING = (
         "planning/forecast.py", "planning/make_plan.py", "planning/process.py", "planning/worker.py",
         "planning_schedule.py", "sensors", "separating_tests", "setpoint_statuses.py", "sources", "stopping.py",
         "updates", "hand_off.py", "bus/errors.py", "bus/opening.py", "bus/plc.py", "bus/request_slot.py",
-        "exchange/service.py", "exchange/sftp.py", "page/state.py", "status/client.py", "store/store.py",
-        "store/ledger.py",
+        "exchange/mounted.py", "exchange/service.py", "exchange/sftp.py", "page/state.py", "status/client.py",
+        "store/store.py", "store/ledger.py",
     )),
     _CORE / "separating_tests" / "definition.py",
     *(_TRAINER / name for name in (

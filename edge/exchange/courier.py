@@ -16,12 +16,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from igrow.core.errors import IgrowError
 from igrow.core.exchange import Below, ExchangeError, Place, SegmentName, read_receipt
-from igrow.core.exchange.documents import LARGEST_DOCUMENT
+from igrow.core.exchange.documents import LARGEST_DOCUMENT, parse_object
 from igrow.core.exchange.signed_files import signed_files
 from igrow.core.whole_files import write_whole
+from igrow.edge.exchange.mounted import file_system_of
 from igrow.edge.exchange.outbox import REPORTS, Outbox
 from igrow.edge.exchange.places import open_place
 from igrow.edge.exchange.sealing import notice, seal_due
@@ -77,6 +79,8 @@ class RoundStatus:
     waiting: int = 0
     """Segments that no receipt names yet."""
     waiting_bytes: int = 0
+    file_system: str = ""
+    """The address of the exchange while it is a disk or a share that is mounted."""
 
 
 def run_round(order: Order, place: Place | None = None) -> RoundStatus:
@@ -105,6 +109,9 @@ def _round(order: Order, folder: Path, place: Place | None, status: RoundStatus)
         if order.time is not None:
             status.sealed = seal_due(outbox, Path(order.store), order.time, order.period, partly=order.partly)
         place = place or open_place(order.url, known_hosts=order.known_hosts, identity=order.identity)
+        # What is put into an empty mount point reaches nobody, and a report is sent only once.
+        status.file_system = str(_status_before(folder).get("file_system", ""))
+        status.file_system = file_system_of(place, order.url, folder, status.file_system)
         _receive(outbox, place, order.site, status)
         _send(outbox, place, order.site, status)
         _send_reports(folder / REPORTS, place, order.site)
@@ -114,6 +121,14 @@ def _round(order: Order, folder: Path, place: Place | None, status: RoundStatus)
         waiting = outbox.segments()
         status.waiting = len(waiting)
         status.waiting_bytes = sum(outbox.path(name).stat().st_size for name in waiting)
+
+
+def _status_before(folder: Path) -> dict[str, Any]:
+    """Return how the round before ended, as far as that can be read."""
+    try:
+        return parse_object((folder / STATUS_FILE).read_bytes(), STATUS_FILE)
+    except (IgrowError, OSError):
+        return {}
 
 
 def _receive(outbox: Outbox, place: Place, site: str, status: RoundStatus) -> None:
