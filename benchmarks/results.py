@@ -190,6 +190,13 @@ RESULTS = {
         "300000 and on",
         long=True,
     ),
+    "diagnosis-omission": Result(
+        "A term of the physics that the model lacks from its first day",
+        ("benchmarks.diagnosis", "omission", "--greenhouses", "2"),
+        "Greenhouses calibrated with the whole model, and with one term after the other taken out of it.",
+        "610000 and on",
+        long=True,
+    ),
     "diagnosis-real": Result(
         "Real logs",
         ("benchmarks.diagnosis", "real", "../shared/data"),
