@@ -106,3 +106,16 @@ def test_a_crop_that_is_described_as_another_is_told_to_state_its_own(before: Cr
     assert told == f"crop.species is cucumber, but {missing} are those of a tomato: state this crop's own"
     for crop in (Crop(), Crop(species="cucumber", dry_matter_fraction=0.03, fruit_share=0.6, days_to_harvest=14)):
         assert growth_notes(replace(SITE, crop=crop), before, fit) == (fit.sentence,)
+
+
+def test_growth_that_scatters_from_day_to_day_is_not_underrated(telemetry: Telemetry, before: CropStages) -> None:
+    """Assimilates wait in a buffer, and plants that are counted are a sample: what one day lacks the next one has."""
+    each = np.diff(grown(telemetry, before), prepend=0.0)
+    scattered = np.cumsum(each * (1.0 + 0.6 * (-1.0) ** np.arange(len(each))))
+    log = with_counts(telemetry, scattered, "net_growth", 1)
+    stages, _ = growth_of_log(log, log.record(), PARAMETERS, before)
+    first, days = growth_days(log.record(), PARAMETERS, SITE.time_zone)
+    counts = counts_of(log.telemetry, None, first, len(days.warmth), SITE.time_zone)
+    expected = stages.conversion * days.assimilated - stages.maintenance * days.warmth
+    said = sum(expected[one.first : one.last].sum() for one in counts)
+    assert said == pytest.approx(sum(one.amount for one in counts), rel=0.02)

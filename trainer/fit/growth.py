@@ -26,9 +26,8 @@ from igrow.trainer.training.stage_file import stages_from_bytes
 Values = NDArray[np.float64]
 CROP_FILE = "crop.npz"
 COUNTING = 0.15
-"""Standard deviation of a count over its size: plants that are counted are a sample, and no picking is on time."""
-LEAST = 0.3
-"""A count below this share of the mean one is taken as uncertain as that."""
+"""Standard deviation of a count over what is usual in as many days: plants that are counted are a sample, and no picking
+is on time."""
 WEEK = 7
 """Days over which what is picked is added up at least: what was not picked today is picked tomorrow."""
 FAR = 2.0
@@ -140,7 +139,9 @@ def _between(at: NDArray[np.int64], running: Values, kind: str, days: int) -> li
         if kind == "grown" or at[row] - at[chosen[-1]] >= WEEK:
             chosen.append(row)
     at, amounts = at[chosen], np.diff(running[chosen])
-    deviation = COUNTING * np.maximum(np.abs(amounts), LEAST * float(np.abs(amounts).mean()) if len(amounts) else 0.0)
+    # Of the mean rate, not of each amount: where small counts are believed more than large ones, a sum is underrated.
+    rate = float(np.abs(amounts).sum()) / max(int(at[-1] - at[0]), 1)
+    deviation = COUNTING * rate * np.diff(at)
     rows = zip(at[:-1].tolist(), at[1:].tolist(), amounts.tolist(), deviation.tolist(), strict=True)
     return [
         Count(begin, end, amount, max(spread, 1e-5), kind)
