@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
-from igrow.core.bundle import EffectRecord, Estimate
+from igrow.core.bundle import EffectRecord, Estimate, default_bundle_folder, read_bundle
 from igrow.trainer.diagnosis.candidates import Candidate, Pattern
 from igrow.trainer.diagnosis.correction import (
     Corrected,
@@ -26,8 +26,10 @@ from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.diagnosis.wording import discrepancy, finding
 from igrow.trainer.fit import Gaussian
+from igrow.trainer.fit.growth import crop_of
 from tests.diagnosis.conftest import model_in_force
 
+CROP = crop_of(read_bundle(default_bundle_folder()))
 DAY = np.datetime64("2020-03-14T00:00:00", "s")
 
 
@@ -117,7 +119,7 @@ def test_the_corrected_model_keeps_correlations_adds_causes_and_remembers_where_
     )
     errors = {"air_temperature": {"24_h": {"deployed": 2.0, "recalibrated": 1.0, "corrected": 0.5}}}
     result = Corrected({"corrected": Stage(posterior, ())}, (), ())
-    corrected = corrected_model(model, result, found, errors, {}, (DAY, DAY + np.timedelta64(28, "D")))
+    corrected = corrected_model(model, result, found, errors, {}, (DAY, DAY + np.timedelta64(28, "D")), CROP)
     assert corrected.posterior.correlation[0, 1] == pytest.approx(0.5)
     assert [one.name for one in corrected.effects] == ["lamp_heat", "co2_valve_leak"]
     leak = corrected.effects[1]

@@ -16,7 +16,7 @@ from igrow.trainer import prepare_log
 from igrow.trainer.data import Log
 from igrow.trainer.data.source import DailyTable
 from igrow.trainer.fit import FittedModel
-from igrow.trainer.fit.growth import counts_of, crop_of, growth_days, growth_notes, growth_of_log
+from igrow.trainer.fit.growth import counts_of, crop_of, growth_days, growth_notes, growth_of_log, growth_since
 from tests.virtual_log import SITE, virtual_log
 
 DAYS, STEP = 84, 3600.0
@@ -119,3 +119,24 @@ def test_growth_that_scatters_from_day_to_day_is_not_underrated(telemetry: Telem
     expected = stages.conversion * days.assimilated - stages.maintenance * days.warmth
     said = sum(expected[one.first : one.last].sum() for one in counts)
     assert said == pytest.approx(sum(one.amount for one in counts), rel=0.02)
+
+
+def test_growth_stays_where_a_correction_has_moved_the_uptake_of_co2(telemetry: Telemetry, before: CropStages) -> None:
+    log = prepare_log(telemetry, SITE)
+    record = log.record()
+    moved = {**PARAMETERS, "assimilation_maximum": 0.8 * PARAMETERS["assimilation_maximum"]}
+    stages = growth_since(log, record, (PARAMETERS, moved), before)
+    _, was = growth_days(record, PARAMETERS, SITE.time_zone)
+    _, now = growth_days(record, moved, SITE.time_zone)
+    assert stages.conversion * np.nansum(now.assimilated) == pytest.approx(
+        before.conversion * np.nansum(was.assimilated)
+    )
+    assert stages.maintenance == before.maintenance
+
+
+def test_counts_of_a_later_log_change_growth(telemetry: Telemetry, before: CropStages) -> None:
+    log = with_counts(telemetry, 0.7 * grown(telemetry, before), "net_growth", 7)
+    stages = growth_since(log, log.record(), (PARAMETERS, PARAMETERS), before)
+    _, days = growth_days(log.record(), PARAMETERS, SITE.time_zone)
+    expected = np.nansum(stages.conversion * days.assimilated - stages.maintenance * days.warmth)
+    assert expected == pytest.approx(0.7 * grown(telemetry, before)[-1], rel=0.06)

@@ -12,6 +12,7 @@ from igrow.core.bundle import EffectRecord, Estimate, HeldOutError, Onset, Span
 from igrow.core.effects import EFFECTS
 from igrow.core.local_time import utc_datetime
 from igrow.core.quantities import QUANTITIES
+from igrow.core.simulator.crop import CropStages
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.data.splits import DaySplit
 from igrow.trainer.diagnosis import freerun
@@ -205,6 +206,7 @@ def corrected_model(
     errors: Mapping[str, Mapping[str, Mapping[str, float]]],
     discrepancy: Mapping[str, float],
     span: tuple[np.datetime64, np.datetime64],
+    crop: CropStages,
 ) -> FittedModel:
     """Return a model with what a diagnosis found, ready to export.
 
@@ -215,6 +217,7 @@ def corrected_model(
         errors: quantity -> horizon -> stage -> mean absolute error.
         discrepancy: of the calibration, which goes on.
         span: of the log.
+        crop: its growth, beside the corrected parameters.
     """
     found = tuple(effect_record(one) for one in findings if one.effect in EFFECTS)
     replaced = {one.name for one in found}
@@ -228,6 +231,7 @@ def corrected_model(
             for horizon, stages in horizons.items()
         ],
         discrepancy=discrepancy,
+        crop=crop,
     )
 
 

@@ -7,6 +7,7 @@ harvests. Weekly counts do, and so does one a month.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +27,9 @@ from igrow.trainer.training.stage_file import stages_from_bytes
 Values = NDArray[np.float64]
 CROP_FILE = "crop.npz"
 COUNTING = 0.15
-"""Standard deviation of a count over what is usual in as many days: plants that are counted are a sample, and no picking
-is on time."""
+"""Standard deviation of a count over what is usual in as many days: plants are a sample, no picking is on time."""
+CHANGE = 0.1
+"""Standard deviation by which a crop's conversion may change from one log to the next, over its value."""
 WEEK = 7
 """Days over which what is picked is added up at least: what was not picked today is picked tomorrow."""
 FAR = 2.0
@@ -66,6 +68,35 @@ def growth_of_log(
     first, days = growth_days(record, parameters, site.time_zone)
     counts = counts_of(log.telemetry, log.harvests, first, len(days.warmth), site.time_zone)
     return fit_growth(days, counts, before, site.crop)
+
+
+def growth_since(
+    log: Log,
+    record: Record,
+    parameters: tuple[Mapping[str, float], Mapping[str, float]],
+    before: CropStages,
+) -> CropStages:
+    """Return the stages for parameters that a later log has moved, with what it counts of growth.
+
+    Conversion belongs to the assimilation that it was fitted beside. Where the balance of CO2 has moved that, growth of
+    the log's days stays what it was, and only counts change it.
+
+    Args:
+        log: the later one.
+        record: of it.
+        parameters: of the climate stage, before and after.
+        before: what is known before the log.
+    """
+    site = log.known_site
+    first, was = growth_days(record, parameters[0], site.time_zone)
+    _, now = growth_days(record, parameters[1], site.time_zone)
+    taken_up = float(np.nansum(now.assimilated))
+    share = float(np.nansum(was.assimilated)) / taken_up if taken_up > 0.0 else 1.0
+    scale = np.diag([share, 1.0])
+    grown = np.diag([(CHANGE * share * before.conversion) ** 2, 0.0])
+    known = replace(before, conversion=share * before.conversion, covariance=scale @ prior_of(before) @ scale + grown)
+    counts = counts_of(log.telemetry, log.harvests, first, len(now.warmth), site.time_zone)
+    return fit_growth(now, counts, known, site.crop)[0]
 
 
 def growth_notes(site: Site, before: CropStages, fit: GrowthFit) -> tuple[str, ...]:

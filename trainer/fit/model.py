@@ -91,6 +91,7 @@ class FittedModel:
         span: Span,
         errors: Sequence[HeldOutError],
         discrepancy: Mapping[str, float] | None = None,
+        crop: CropStages | None = None,
     ) -> FittedModel:
         """Return the model with what a later log of its greenhouse taught.
 
@@ -100,6 +101,7 @@ class FittedModel:
             span: of the log.
             errors: of the corrected model, on days that no fit saw.
             discrepancy: None where it stays as it is.
+            crop: its growth as the log counts it; None where it stays as it is.
         """
         return replace(
             self,
@@ -110,6 +112,7 @@ class FittedModel:
             training_span=span,
             errors=tuple(errors),
             discrepancy=self.discrepancy if discrepancy is None else discrepancy,
+            crop=crop or self.crop,
             # The history of another greenhouse is none of this one's.
             history=self.history if self.calibrated_on == self.site.name else None,
         )
