@@ -1,7 +1,9 @@
 """What a fleet costs: collecting a day of each of a thousand sites, a year of history behind one, bytes on the wire.
 
 `python -m benchmarks.fleet [--sites N] [--seconds S]` seals one day of 23 points for each site, puts it into the
-exchange, and runs `igrow-trainer fleet collect` as a user would; then one site day by day through a year.
+exchange, and runs `igrow-trainer fleet collect` as a user would; then one site day by day through a year; then a weekly
+diagnosis. From these it projects what `--project N` sites cost on a cluster of `--cores` and `--memory`
+(`projection.py`).
 """
 
 from __future__ import annotations
@@ -14,12 +16,14 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 
-from igrow.core.exchange import FolderPlace, Seal, pack_segment
+from benchmarks.projection import Cluster, Costs, report
+from igrow.core.exchange import Entry, FolderPlace, Seal, pack_segment
 from igrow.core.quantities import QUANTITIES
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import read_log
@@ -84,7 +88,18 @@ def seal_day(site: str, day: int, previous: str, step: float, seed: int) -> tupl
     return str(name), data, name.digest
 
 
-def collect_fleet(sites: int, step: float) -> None:
+@dataclass(frozen=True)
+class Collected:
+    """What collecting and showing one site of many takes: seconds of processor, MB."""
+
+    collecting: float
+    looking: float
+    showing: float
+    row: float
+
+
+def collect_fleet(sites: int, step: float) -> Collected:
+    """Collect a day of each site as a user would, once more where nothing is there, and write the page."""
     with tempfile.TemporaryDirectory() as text:
         root = Path(text)
         fleet = root / "fleet"
@@ -100,15 +115,19 @@ def collect_fleet(sites: int, step: float) -> None:
             sent += len(data)
         command = [sys.executable, "-c", "import sys; from igrow.trainer.cli import main; sys.exit(main())"]
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, [str(Path.cwd()), *sys.path]))}
-        began, used = time.perf_counter(), os.times()
-        done = subprocess.run(
-            [*command, "fleet", "collect", str(fleet)], env=environment, capture_output=True, text=True, check=False
-        )
-        wall, after = time.perf_counter() - began, os.times()
-        assert done.returncode == 0, done.stderr[-2000:]
-        cpu = after.children_user + after.children_system - used.children_user - used.children_system
+
+        def run(*arguments: str) -> tuple[float, float, str]:
+            """Run a command; returns seconds by the clock, seconds of processor, and what it printed."""
+            began, used = time.perf_counter(), os.times()
+            done = subprocess.run([*command, *arguments], env=environment, capture_output=True, text=True, check=False)
+            wall, after = time.perf_counter() - began, os.times()
+            assert done.returncode == 0, done.stderr[-2000:]
+            cpu = after.children_user + after.children_system - used.children_user - used.children_system
+            return wall, cpu, done.stdout
+
+        wall, cpu, printed = run("fleet", "collect", str(fleet))
         kept = sum(path.stat().st_size for path in (fleet / "state").rglob("*") if path.is_file())
-        peak = max(float(line.rsplit(",", 1)[1].split()[0]) for line in done.stdout.splitlines() if " MB)" in line)
+        peak = max(float(line.rsplit(",", 1)[1].split()[0]) for line in printed.splitlines() if " MB)" in line)
         print(f"sites                                 {sites}")
         print(
             f"a day on the wire                     {sent / sites / 1e6:8.3f} MB a site "
@@ -117,21 +136,45 @@ def collect_fleet(sites: int, step: float) -> None:
         print(f"collecting, one process at a time     {wall / sites:8.3f} s a site ({cpu / sites:.3f} s of processor)")
         print(f"kept in the archive                   {kept / sites / 1e6:8.3f} MB a site and day")
         print(f"largest process                       {peak:8.0f} MB")
-        began = time.perf_counter()
-        subprocess.run([*command, "fleet", "status", str(fleet), "--page", str(root / "www")], env=environment,
-                       check=True, stdout=subprocess.DEVNULL)  # fmt: skip
-        print(f"status and page of all sites          {time.perf_counter() - began:8.1f} s, "
-              f"{(root / 'www' / 'index.html').stat().st_size / 1e6:.2f} MB")  # fmt: skip
+        _, looking, _ = run("fleet", "collect", str(fleet))
+        print(f"a round that finds nothing            {'':8} {looking / sites:.3f} s of processor a site")
+        wall, showing, _ = run("fleet", "status", str(fleet), "--page", str(root / "www"))
+        megabytes = (root / "www" / "index.html").stat().st_size / 1e6
+        print(f"status and page of all sites          {wall:8.1f} s, {megabytes:.2f} MB")
+        return Collected(cpu / sites, looking / sites, showing / sites, megabytes / sites)
 
 
-def with_history(days: int, step: float) -> None:
-    """Compare collecting a day behind a week of history with a day behind a year."""
+class CountingPlace(FolderPlace):
+    """Counts what it is asked."""
+
+    asked = 0
+
+    def entries(self, folder: str) -> list[Entry]:
+        self.asked += 1
+        return super().entries(folder)
+
+    def get(self, path: str, largest: int) -> bytes | None:
+        self.asked += 1
+        return super().get(path, largest)
+
+    def put(self, path: str, content: bytes) -> None:
+        self.asked += 1
+        super().put(path, content)
+
+    def delete(self, path: str) -> None:
+        self.asked += 1
+        super().delete(path)
+
+
+def with_history(days: int, step: float) -> float:
+    """Compare a day behind a week of history with a day behind a year; returns the requests of such a round."""
     with tempfile.TemporaryDirectory() as text:
         root, previous, seconds = Path(text), "", []
-        place, archive = FolderPlace(root / "exchange"), Archive(root / "archive")
+        place, archive = CountingPlace(root / "exchange"), Archive(root / "archive")
         for day in range(days):
             name, data, previous = seal_day("house", day, previous, step, day % 20)
             place.put(f"house/segments/{name}", data)
+            place.asked = 0
             began = time.perf_counter()
             collect(place, "house", archive, datetime.fromtimestamp(START + (day + 1) * DAY, UTC))
             seconds.append(time.perf_counter() - began)
@@ -140,11 +183,12 @@ def with_history(days: int, step: float) -> None:
         receipt = len(json.dumps(json.loads(next((root / "exchange" / "house" / "receipts").iterdir()).read_text())))
         shutil.rmtree(root / "exchange")
     print(f"behind {days} days of history             {year / week:8.2f} times the time behind a week "
-          f"(ledger {ledger / 1e3:.0f} kB, receipt {receipt} bytes)")  # fmt: skip
+          f"(ledger {ledger / 1e3:.0f} kB, receipt {receipt} bytes, {place.asked} requests)")  # fmt: skip
+    return float(place.asked)
 
 
-def weekly_diagnosis(days: int) -> None:
-    """Diagnose one virtual greenhouse as the fleet does, and project what that costs for many."""
+def weekly_diagnosis(days: int) -> tuple[float, float]:
+    """Diagnose one virtual greenhouse as the fleet does; returns seconds of processor and MB."""
     with tempfile.TemporaryDirectory() as text:
         root = Path(text)
         site = root / "house.yaml"
@@ -165,8 +209,7 @@ def weekly_diagnosis(days: int) -> None:
         assert outcome.ending is Ending.DONE, outcome.note
     print(f"a diagnosis of {days} days               {outcome.processor:8.0f} s of processor, "
           f"{outcome.megabytes:.0f} MB (verdict {outcome.result['verdict']})")  # fmt: skip
-    cores = 100_000 * outcome.processor / (7 * DAY)
-    print(f"100,000 sites, each once a week       {cores:8.0f} cores of this machine kept busy, by these seconds")
+    return outcome.processor, outcome.megabytes
 
 
 def main() -> None:
@@ -174,14 +217,17 @@ def main() -> None:
     parser.add_argument("--sites", type=int, default=1000)
     parser.add_argument("--seconds", type=float, default=60.0, help="between two rows of the log (default 60)")
     parser.add_argument("--history", type=int, default=365, help="days")
-    parser.add_argument(
-        "--diagnose", type=int, default=28, help="days of log to diagnose (default 28; 0 leaves it out)"
-    )
+    parser.add_argument("--diagnose", type=int, default=28, help="days of log to diagnose (default 28)")
+    parser.add_argument("--project", type=int, default=100_000, help="sites of the projection (default 100000)")
+    parser.add_argument("--cores", type=int, default=32, help="of the cluster (default 32)")
+    parser.add_argument("--memory", type=float, default=128.0, help="of the cluster, GB (default 128)")
+    parser.add_argument("--price", type=float, default=0.05, help="EUR a core and hour, assumed (default 0.05)")
     options = parser.parse_args()
-    collect_fleet(options.sites, options.seconds)
-    with_history(options.history, 600.0)
-    if options.diagnose:
-        weekly_diagnosis(options.diagnose)
+    found = collect_fleet(options.sites, options.seconds)
+    requests = with_history(options.history, 600.0)
+    diagnosing, megabytes = weekly_diagnosis(options.diagnose)
+    one = Costs(found.collecting, found.looking, requests, diagnosing, megabytes, found.showing, found.row)
+    print("\n".join(report(one, Cluster(options.cores, options.memory, options.price), options.project)))
 
 
 if __name__ == "__main__":

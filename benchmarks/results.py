@@ -159,7 +159,7 @@ RESULTS = {
     "fleet": Result(
         "What a fleet costs",
         ("benchmarks.fleet",),
-        "A day of each of a thousand sites collected, a year of history behind one, and a weekly diagnosis.",
+        "A thousand sites, a day each; a year behind one; a weekly diagnosis; and what 100,000 would cost by these.",
         "0 to 19; of the diagnosed log 1",
         long=True,
     ),
