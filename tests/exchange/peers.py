@@ -41,12 +41,12 @@ class Sftp:
 
 
 @contextlib.contextmanager
-def sftp_server(folder: Path) -> Iterator[Sftp]:
-    """Run sshd for the present user, with a key of its own, serving SFTP and nothing else."""
+def sftp_server(folder: Path, port: int = 0) -> Iterator[Sftp]:
+    """Run sshd for this user, with a key of its own, serving SFTP and nothing else; port 0 takes a free one."""
     sshd = needs.program("sshd", INSTALL)
     needs.program("sftp", INSTALL)
     folder.mkdir(parents=True)
-    port = free_port()
+    port = port or free_port()
     for name in ("host", "client"):
         subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", str(folder / name)], check=True)
     shutil.copy(folder / "client.pub", folder / "authorized_keys")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import subprocess
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
@@ -104,6 +106,59 @@ def test_a_server_with_another_key_is_refused_on_both_sides(sftp: Sftp, tmp_path
         open_at_gateway(sftp.url, **keys).entries("x")
     with pytest.raises(ExchangeError, match="not the pinned one"):
         open_at_trainer(sftp.url, **keys)
+
+
+def test_a_server_that_comes_back_with_another_key_is_refused_from_then_on(tmp_path: Path) -> None:
+    with sftp_server(tmp_path / "one") as first:
+        keys: dict[str, Any] = {"known_hosts": str(first.known_hosts), "identity": str(first.identity)}
+        gateway = open_at_gateway(first.url, **keys)
+        gateway.put("a/b", b"what was sent before")
+        assert [one.name for one in gateway.entries("a")] == ["b"]
+    with sftp_server(tmp_path / "two", first.port):
+        with pytest.raises(ExchangeError, match="not the pinned one"):
+            gateway.entries("a")
+        with pytest.raises(ExchangeError, match="not the pinned one"):
+            gateway.put("a/c", b"never sent")
+        with pytest.raises(ExchangeError, match="not the pinned one"):
+            open_at_trainer(first.url, **keys)
+
+
+class SlowDown(BaseHTTPRequestHandler):
+    """An S3 that has too much to do."""
+
+    def answer(self) -> None:
+        content = b"<Error><Code>SlowDown</Code><Message>Please reduce your request rate.</Message></Error>"
+        self.send_response(503)
+        self.send_header("Content-Length", str(len(content)))
+        self.end_headers()
+        self.wfile.write(b"" if self.command == "HEAD" else content)
+
+    do_GET = do_PUT = do_HEAD = do_DELETE = do_POST = answer  # noqa: N815  (the names that the library asks for)
+
+    def log_message(self, *_: object) -> None:
+        pass
+
+
+def test_a_service_that_asks_for_less_is_away_for_now_and_nothing_is_taken_for_absent(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
+        monkeypatch.setenv(name, "testing")
+    monkeypatch.setenv("AWS_DEFAULT_REGION", "us-east-1")
+    monkeypatch.setenv("AWS_MAX_ATTEMPTS", "2")
+    server = ThreadingHTTPServer(("127.0.0.1", 0), SlowDown)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    place = open_at_trainer(f"s3://igrow/exchange?endpoint=http://127.0.0.1:{server.server_address[1]}")
+    asked: list[Callable[[], object]] = [
+        lambda: place.entries("a"),
+        lambda: place.get("a/b", 10),
+        lambda: place.put("a/b", b"x"),
+        lambda: place.delete("a/b"),
+    ]
+    for ask in asked:
+        with pytest.raises(ExchangeError):
+            ask()
+    server.shutdown()
 
 
 def test_a_server_whose_key_is_not_known_is_refused_on_both_sides(sftp: Sftp, tmp_path: Path) -> None:
