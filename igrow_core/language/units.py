@@ -43,6 +43,8 @@ US: Mapping[str, Shown] = {
     "degC": Shown("°F", 1.8, 32.0),
     "K": Shown("°F", 1.8),
     "m s-1": Shown("mph", 3600.0 / 1609.344),
+    "MJ": Shown("BTU", 1e6 / 1055.05585262),
+    "g": Shown("oz", 1.0 / 28.349523125),
     "m2": Shown("ft²", 1.0 / 0.3048**2),
     "kg m-2": Shown("lb/ft²", 0.3048**2 / 0.45359237),
     "kg m-2 h-1": Shown("lb/(ft² h)", 0.3048**2 / 0.45359237),

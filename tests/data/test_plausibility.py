@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from benchmarks.plausibility import SPOILS, Clean, Spoil, false_alarms, real_logs
+from igrow.core import sun
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry, to_grid
 from igrow.core.yaml_schema import parse
 from igrow.trainer.data import prepare_log
 from igrow.trainer.data.export import read
+from igrow.trainer.data.grid import own_step
 from igrow.trainer.data.mapping import ExportMapping
 from igrow.trainer.data.plausibility import find_faults
 from igrow.trainer.data.plausibility.sums import running_sum
@@ -57,6 +59,21 @@ def test_a_sum_of_radiation_names_its_unit(clean: Clean) -> None:
     assert "by its size in J cm-2" in fault.sentence
     assert fault.remedy is not None
     assert (fault.remedy.amount, fault.remedy.scale) == ("day", 1e4)
+
+
+def test_in_dull_weeks_the_units_are_still_named_and_none_is_put_in_unasked(clean: Clean) -> None:
+    """A fortnight without a clear sky may be W m-2 as well as J cm-2 an hour."""
+    table, site = to_grid(clean.telemetry, 900), SITE
+    sky = sun.extraterrestrial_radiation(table.time, site.latitude, site.longitude)
+    dull = table.with_columns({"global_radiation": 0.25 * sky})
+    (fault,) = find_faults(dull, site)
+    assert fault.kind == "radiation_unit"
+    assert fault.remedy is None
+    assert "J cm-2 an hour" in fault.mend
+    assert "--accept radiation_unit" in fault.mend
+    step = own_step(table.time)
+    (fault,) = find_faults(table.with_columns({"global_radiation": 0.25 * sky * step / 1e4}), site)
+    assert f"J cm-2 a row ({step / 60:g} min)" in fault.mend
 
 
 def test_wall_time_read_as_utc_names_the_zone_of_the_site(clean: Clean) -> None:

@@ -134,6 +134,9 @@ def test_a_sensor_that_reads_too_much_saves_heat_since_the_greenhouse_is_colder(
         "It may be 0.5 to 1.5 times as much (90 % interval).",
     ]
     nothing = Worth(heat=0.0, co2=0.0, lamp_light=0.0, money=0.0, spread=None)
+    american = sentences.costs(off, saved, 100.0, speak("en", units="us"))
+    assert american[0] == "It saves 320 BTU of heat per ft² and week (0.093 kWh)."
+    assert american[2].startswith("In money, by the prices of the site: 0.0028 EUR saved per ft² and week, 3 EUR for")
     assert sentences.costs(off, nothing, 100.0, speak("en"))[0].startswith("It takes no heat and no CO2 worth counting")
 
 

@@ -37,8 +37,11 @@ LEAST_LENGTH = 0.6
 """Of the mean vector of the radiation's hours, over that of the sun's, below which it is no daylight."""
 DARKEST, BRIGHTEST = 0.38, 1.12
 """Clearness that a clear sky exceeds, and never exceeds."""
+DULLEST, DULL_DAYS = 0.12, 35
+"""Clearness that a dull fortnight reaches at least, and days within which some sky was clear."""
 CLEAR = 0.8
 """Usual clearness of a clear sky."""
+_DULL = "or these weeks were dull, which `--accept radiation_unit` passes"
 _WINDOW = 12
 """Days on either side of a change of clocks."""
 _ZONES = ("Europe/Amsterdam", "America/New_York", "Australia/Sydney", "America/Santiago")
@@ -228,6 +231,14 @@ def _unit(telemetry: Telemetry, site: Site) -> DataFault | None:
     }
     part = "never more than" if clearness < DARKEST else "up to"
     seen = f"global_radiation is {part} {clearness:.2g} of what comes from the sun, where a clear sky lets 0.8 through"
+    # In dull weeks no sky was clear: then a unit may make less of it than that, and W m-2 may have been so little.
+    dull = clearness < DARKEST and len(np.unique(telemetry.time.astype("datetime64[D]"))) < DULL_DAYS
+    if not possible:
+        possible = {
+            name: remedy
+            for name, remedy in (smaller if clearness < DARKEST else larger).items()
+            if DULLEST <= clearness * remedy.scale / (step if remedy.amount == "interval" else 1.0) <= 0.55 * CLEAR
+        }
     if not possible:
         return DataFault(
             "radiation_unit", "global_radiation", seen, "it is not in W m-2: give its scale in the mapping"
@@ -235,8 +246,11 @@ def _unit(telemetry: Telemetry, site: Site) -> DataFault | None:
     mend = " or ".join(
         f"in {name}, then {{amount: {remedy.amount}, scale: {remedy.scale:.6g}}}" for name, remedy in possible.items()
     )
+    mend = f"it is {mend} in the mapping"
+    if dull and clearness >= DULLEST:
+        return DataFault("radiation_unit", "global_radiation", seen, "; ".join((mend, _DULL)))
     only = next(iter(possible.values())) if len(possible) == 1 else None
-    return DataFault("radiation_unit", "global_radiation", seen, f"it is {mend} in the mapping", only)
+    return DataFault("radiation_unit", "global_radiation", seen, mend, only)
 
 
 def _summed(telemetry: Telemetry, site: Site, kind: Literal["day", "total"]) -> DataFault:
