@@ -256,6 +256,8 @@ class Daemon:
             self.configuration = configuration
             self._configuration_problem = ""
             self._control = self._begin(before)
+            if self.services.planning is not None:
+                self.services.planning.site = configuration.site
             if self._control.plc is not before.plc:
                 await before.plc.close()
             self._journal.event("reloaded", path=str(configuration.path))

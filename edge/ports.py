@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
+from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 from igrow.edge.image import Value
 from igrow.edge.records import AlarmRecord, WriteRecord
@@ -125,6 +126,9 @@ class Plan:
 
 class PlanningService(Protocol):
     """Planning in a process of its own: a plan that hangs, crashes or grows costs the cycle nothing."""
+
+    site: Site
+    """For which the next plan is made; a reload may change it."""
 
     def request(self, prepare: Callable[[], PlanRequest | None]) -> None:
         """Start to make a plan; when one is being made already, do nothing. Never blocks.

@@ -30,7 +30,8 @@ class PlanningProcess:
         planner: str = "igrow.edge.planning.make_plan:make_plan",
     ) -> None:
         """`planner` names the function (site, request) -> Plan that is called; it may take so many `seconds`."""
-        self._site = site
+        self.site = site
+        """For which the next plan is made; a reload may change it."""
         self._graphs = graphs
         self._seconds = seconds
         self._planner = planner
@@ -75,7 +76,7 @@ class PlanningProcess:
         try:
             request = prepare()
             if request is not None:
-                self._latest = self._graphs.call(self._planner, self._site, request, seconds=self._seconds)
+                self._latest = self._graphs.call(self._planner, self.site, request, seconds=self._seconds)
         except (IgrowError, OSError) as error:
             if self._closed:
                 return

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from igrow.core.site import Site
 from igrow.edge.daemon import Daemon
 from igrow.edge.image import Quality
 from igrow.edge.planning import GraphProcess, PlanningProcess
@@ -325,6 +326,54 @@ async def test_a_reload_takes_a_good_configuration_and_keeps_the_last_good_one(t
         assert plant.shows("heating_setpoint") == 20.0
         assert "99: 5 to 35 degC" in daemon._configuration_problem
         assert "changed_by_hand" not in kinds(tmp_path)
+    await plant.down()
+
+
+class SlowPlanner:
+    """Makes a plan for as long as it is told to."""
+
+    health = ""
+
+    def __init__(self, site: Site) -> None:
+        self.site = site
+        self.asked: list[Site] = []
+        self.busy = False
+
+    def request(self, prepare) -> None:
+        self.asked.append(self.site)
+        self.busy = True
+
+    def latest(self) -> None:
+        return None
+
+    async def wait(self, timeout: float) -> None:  # noqa: ASYNC109 - as the real one's
+        return None
+
+    def close(self) -> None:
+        self.busy = False
+
+
+async def test_a_reload_while_a_plan_is_made_holds_nothing_up_and_the_next_plan_is_for_the_new_site(tmp_path):
+    port = free_port()
+    path = write_files(tmp_path, port, clock="system", interval="1 s")
+    plant = Plant(tmp_path, port, pace=Realtime())
+    await plant.up()
+    async with running(path) as daemon:
+        await until(lambda: daemon.cycles >= 2)
+        planner = SlowPlanner(daemon.configuration.site)
+        plan_at_once(daemon, planner, tmp_path)
+        await until(lambda: planner.busy)
+        site = tmp_path / "site.yaml"
+        site.write_text(site.read_text().replace("high: 1000", "high: 900"))
+        daemon.reload()
+        await until(lambda: "reloaded" in kinds(tmp_path))
+        cycles = daemon.cycles
+        await until(lambda: daemon.cycles > cycles + 2)
+        assert len(planner.asked) == 1
+        assert planner.busy
+        planner.busy = False
+        await until(lambda: len(planner.asked) > 1)
+        assert [site.limits["co2_setpoint"].high for site in planner.asked[:2]] == [1000.0, 900.0]
     await plant.down()
 
 

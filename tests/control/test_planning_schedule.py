@@ -11,6 +11,7 @@ from zoneinfo import ZoneInfo
 import numpy as np
 import pytest
 
+from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 from igrow.edge.image import Image, Quality, Value
 from igrow.edge.planning_schedule import ESSENTIAL, PlanningRules, PlanningSchedule
@@ -25,6 +26,7 @@ BUNDLE = ActiveBundle("b1", Path("/bundle"))
 
 @dataclass
 class FakePlanning:
+    site: Site = field(default_factory=lambda: Site(name="house", latitude=52.0, longitude=4.5))
     busy: bool = False
     health: str = ""
     requests: list[PlanRequest] = field(default_factory=list)
