@@ -240,7 +240,7 @@ def draw(
     for name, (colour, stroke) in strokes.items():
         gain.plot(np.arange(1, days + 1), net(name) - net("recipe"), stroke, color=COLOURS[colour], label=name)
     name_above(gain, "net profit more than by the recipe, EUR/m²")
-    gain.legend(loc="upper left")
+    gain.legend(loc="upper left", fontsize=8.5, frameon=False)
     turns = sorted(errors)
     for name, colour, stroke in (("before", "deployed", ":"), ("after", "corrected", "-")):
         for number, day in enumerate(turns):
@@ -250,7 +250,7 @@ def draw(
             error.plot([day, until], [level, level], stroke, color=COLOURS[colour], label=label)
     error.set_ylim(bottom=0.0)
     name_above(error, "error of the temperature a day ahead, K")
-    error.legend(loc="lower left")
+    error.legend(loc="lower left", fontsize=8.5, frameon=False)
     error.set_xlabel("day of the season")
     figure.savefig(path, facecolor="white")
 

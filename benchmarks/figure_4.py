@@ -75,7 +75,7 @@ def draw(path: Path, site: Site, books: Mapping[str, Mapping[str, Mapping[str, V
             net = [money(site, {key: one[:, :day] for key, one in book.items()})["net"].mean() for day in until]
             panel.plot(np.array(until), net, linestyle=strokes[number], color=f"C{number}", label=name)
         name_above(panel, f"cumulative net profit {where}, EUR/m²")
-    axes[0].legend(loc="upper left")
+    axes[0].legend(loc="upper left", fontsize=8.5, frameon=False)
     axes[-1].set_xlabel("day of the season")
     figure.savefig(path, facecolor="white")
 
