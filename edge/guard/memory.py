@@ -57,6 +57,8 @@ def _note_point(memory: PointMemory, state: PointState) -> Entry:
         "ceiling": memory.ceiling,
         "floor": memory.floor,
         "limited_until": memory.limited_until,
+        "fell_back_at": memory.fell_back_at,
+        "restarted_at": memory.restarted_at,
         "written": state.written,
         "written_at": state.written_at,
         "taken": state.taken,
@@ -75,6 +77,8 @@ def _recall_point(memory: PointMemory, entry: Entry, later: float, *, agree: boo
         return
     memory.stands, memory.answers = _number(entry, "stands"), _number(entry, "answers")
     memory.limited_until = _number(entry, "limited_until", math.inf) + later
+    # Seen, and not judged yet: by now the PLC may show no sign of it any more.
+    memory.fell_back_at, memory.restarted_at = _time(entry, "fell_back_at", later), _time(entry, "restarted_at", later)
     memory.sent, memory.late = _recall_sent(entry.get("sent"), later), _recall_sent(entry.get("late"), later)
 
 
@@ -103,6 +107,11 @@ def _number(entry: Entry, key: str, otherwise: float) -> float: ...
 def _number(entry: Entry, key: str, otherwise: float | None = None) -> float | None:
     value = entry.get(key)
     return float(value) if _is_number(value) else otherwise
+
+
+def _time(entry: Entry, key: str, later: float) -> float | None:
+    at = _number(entry, key)
+    return None if at is None else at + later
 
 
 def _is_number(value: object) -> TypeGuard[float]:

@@ -4,7 +4,7 @@ import pytest
 
 from igrow.edge.guard.heartbeat import HEARTBEAT
 from tests.control.control_fakes import FixedSource
-from tests.control.stubborn_plc import StubbornBench, make_stubborn_bench
+from tests.control.stubborn_plc import SAFE, StubbornBench, make_stubborn_bench
 from tests.control.test_starts_seen_by_halves import INSIDE, OUTSIDE, WISH, lose
 
 ZEROS = dict.fromkeys(WISH, 0.0)
@@ -125,3 +125,23 @@ async def test_a_reload_does_not_forget_what_was_seen_of_a_start():
     await bench.run(3)
     assert hands(bench) == [("heating_setpoint", 16.0)]
     assert {name: bench.plc.values[name] for name in WISH} == WISH | {"heating_setpoint": 16.0}
+
+
+@pytest.mark.parametrize("happens", ["fallback", "start"])
+async def test_a_restart_does_not_forget_what_a_plc_has_shown_and_nobody_has_judged_yet(happens):
+    """Its sign is gone with our next heartbeat, so the next process cannot see it."""
+    bench = bench_of(values={"plc_fallback": 0.0})
+    await bench.run(5)
+    end = lose(bench, *WISH)
+    if happens == "fallback":
+        bench.plc.values |= {**SAFE, "plc_fallback": 1.0}
+    else:
+        bench.plc.power_up(INSIDE)
+    await bench.run(1)
+    bench.plc.values["plc_fallback"] = 0.0
+    end()
+    bench.pass_time(5.0)
+    bench.restart()
+    await bench.run(4)
+    assert not hands(bench)
+    assert {name: bench.plc.values[name] for name in WISH} == WISH
