@@ -64,7 +64,7 @@ class Outbox:
         (folder / REPORTS).mkdir(exist_ok=True)
         self.state = self._recover(_read_state(folder / CHAIN_FILE))
         if self.state.site not in ("", site):
-            self._begin_again()
+            self.begin_again()
         earlier = [name for name in self.segments() if name.chain != self.state.chain]
         self._seal_again([name for name in earlier if self._site_of(name) != site])
         self.move(replace(self.state, site=site))
@@ -145,7 +145,7 @@ class Outbox:
         """
         if receipt.chain == self.state.chain:
             if self._is_of_others(receipt) or self._lacks(receipt):
-                self._begin_again()
+                self.begin_again()
                 return 0
             left = tuple(one for one in self.state.given_up if not all(map(receipt.holds, range(one[0], one[1] + 1))))
             self.move(replace(self.state, given_up=left))
@@ -175,7 +175,7 @@ class Outbox:
         later = range(receipt.through + 1, self.state.number + 1)
         return any(not receipt.holds(number) and number not in known for number in later)
 
-    def _begin_again(self) -> None:
+    def begin_again(self) -> None:
         """Begin another chain, of which the log is sealed from its first row on, and before it all that waits."""
         chain = ChainState(secrets.token_hex(6), sealed_at=self.state.sealed_at, site=self._site)
         old = self.segments()

@@ -15,9 +15,12 @@ from pathlib import Path
 import numpy as np
 
 from igrow.core.telemetry import concatenate
+from igrow.core.whole_files import write_whole
 from igrow.edge.exchange.outbox import ChainState, Outbox
 from igrow.edge.store.store import first_row_time, newest_sequence, read_records_after, read_telemetry
 
+NOTE = "sealed"
+"""File beside the log: the chain, and the number of its newest segment."""
 GRACE_SECONDS = 120
 """A period is sealed this long after its end, when its last batch has been committed."""
 PARTLY_SECONDS = 3600
@@ -90,6 +93,7 @@ def seal_due(outbox: Outbox, store: Path, time: float, period: int, *, partly: b
 
     Raises OSError, and StoreError where the log cannot be read.
     """
+    _compare_with_log(outbox, store)
     before = outbox.state.number
     if not outbox.state.sealed_at:
         outbox.move(replace(outbox.state, sealed_at=time))
@@ -112,6 +116,24 @@ def seal_due(outbox: Outbox, store: Path, time: float, period: int, *, partly: b
         # Nothing was measured, and what happened is all the more worth knowing.
         _seal(outbox, store, Span(int(time), int(time)), time)
     return outbox.state.number - before
+
+
+def _compare_with_log(outbox: Outbox, store: Path) -> None:
+    """Begin another chain where the log's folder knows of more than the outbox: that was restored from a backup."""
+    try:
+        chain, number = (store / NOTE).read_text(encoding="utf-8").split()
+        restored = chain == outbox.state.chain and int(number) > outbox.state.number
+    except (FileNotFoundError, ValueError):
+        return
+    if restored:
+        outbox.begin_again()
+
+
+def _note_beside_log(outbox: Outbox, store: Path) -> None:
+    note = f"{outbox.state.chain} {outbox.state.number}"
+    path = store / NOTE
+    if not path.exists() or path.read_text(encoding="utf-8") != note:
+        write_whole(path, note.encode())
 
 
 def _spans(outbox: Outbox, store: Path, time: float, period: int, partly: bool) -> Iterator[Span]:
@@ -142,3 +164,4 @@ def _seal(outbox: Outbox, store: Path, span: Span, time: float) -> None:
         sequence=records[-1].sequence if records else state.sequence,
         sealed_at=time,
     )
+    _note_beside_log(outbox, store)

@@ -90,6 +90,20 @@ def test_a_claim_that_was_cut_short_is_written_again(world: World, tmp_path: Pat
     assert "archive" in json.loads((tmp_path / "exchange" / SITE / "collector.json").read_text())
 
 
+def test_an_outbox_restored_before_anything_was_collected_seals_what_a_clock_left_behind_again(
+    world: World, tmp_path: Path
+) -> None:
+    run_days(world, 0, 2)
+    shutil.copytree(world.outbox, tmp_path / "backup")
+    world.log(START + 5000, START + 6000, 301)
+    world.seen = (START + 5000.0, START + 6000.0)
+    world.round(START + 2 * DAY + 900, place=FolderPlace(tmp_path / "elsewhere"))
+    shutil.rmtree(world.outbox)
+    shutil.copytree(tmp_path / "backup", world.outbox)
+    assert go_on(world, 2) == []
+    world.assert_complete()
+
+
 @pytest.mark.parametrize("waiting", [False, True])
 def test_a_renamed_site_sends_its_whole_log_under_the_new_name(world: World, *, waiting: bool) -> None:
     run_days(world, 0, 2)
