@@ -175,7 +175,7 @@ def judge(
             return "plain", ""
         short, setpoint = wanted - measured, say.shown(name, wanted)
         if short > 0.1 * wanted:
-            below = say.text("{away} below the setpoint of {setpoint}", away=say.number(name, short), setpoint=setpoint)
+            below = say.text("{away} below the setpoint of {setpoint}", away=say.shown(name, short), setpoint=setpoint)
             return "plain", f"▼ {below}"
         return "good", "✓ " + say.text("at or above {setpoint}", setpoint=setpoint)
     return "plain", ""
