@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from igrow.core.effects import EFFECTS
-from igrow.trainer.diagnosis import history, linear, search
+from igrow.trainer.diagnosis import amplitudes, history, linear, search
 from igrow.trainer.diagnosis.change import changed, net_gain, proven_gain
 from igrow.trainer.diagnosis.design import Design, History
 from igrow.trainer.diagnosis.drift import Drift
@@ -24,7 +24,7 @@ BARE = Drift({}, 42.0)
 
 def with_history(design: Design, deviation: float = 0.3, **own: float) -> Design:
     """The design with a history that expects nothing, give or take a deviation of every amplitude."""
-    names = history.keys(design)
+    names = amplitudes.keys(design)
     prior = Gaussian(names, np.zeros(len(names)), deviation**2 * np.eye(len(names)))
     known = History(prior, np.zeros_like(design.values[0]), (PLAIN,) * BALANCES, own, drift=BARE)
     _, solved = history.solve_jointly(replace(design, history=known))
@@ -55,7 +55,7 @@ def test_everything_is_learned_together_by_penalised_least_squares() -> None:
 
 def test_what_drifts_is_added_to_what_is_not_known() -> None:
     design = in_real_parameters(make_design(seed=2))
-    names = history.keys(design)[:-1]
+    names = amplitudes.keys(design)[:-1]
     rng = np.random.default_rng(0)
     root = rng.normal(size=(len(names),) * 2)
     known = Discrepancy(
@@ -66,7 +66,7 @@ def test_what_drifts_is_added_to_what_is_not_known() -> None:
         {},
         design.line.record.time[0],
     )
-    drift = history.drift_within(design)
+    drift = amplitudes.drift_within(design)
     now = history.drifted(known, design, Drift({}, 365.0)).covariance
     np.testing.assert_allclose(now[:-1, :-1], root @ root.T + np.diag(drift[:-1] ** 2))
     # The pattern is new in this log: its prior is that of before any log.

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from igrow.trainer.diagnosis import DEFAULT, learned_from
+from igrow.trainer.diagnosis.amplitudes import drift_within, omission, units
 from igrow.trainer.diagnosis.drift import Drift
-from igrow.trainer.diagnosis.history import change_of, drift_within, omission, units
+from igrow.trainer.diagnosis.history import change_of
 from igrow.trainer.diagnosis.sharing import pair
 from igrow.trainer.fit import FittedModel
 from igrow.trainer.fit.discrepancy import Discrepancy

@@ -8,22 +8,21 @@ what was learned and what may be expected now (`expected`).
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
 
 from igrow.core.arrays import Floats
-from igrow.core.effects import EFFECTS
 from igrow.core.simulator.hybrid.climate import ActiveEffects
 from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
 from igrow.trainer.data.splits import DaySplit, split_days
 from igrow.trainer.diagnosis import candidates, linear, noise, search, sensitivity
+from igrow.trainer.diagnosis.amplitudes import drift_within, keys, omission, rate_keys, units
 from igrow.trainer.diagnosis.candidates import WEEKDAYS
 from igrow.trainer.diagnosis.design import JOINT, Design, History, blocks_of
 from igrow.trainer.diagnosis.drift import Drift, read_drift
-from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, drift, home_drift
 from igrow.trainer.diagnosis.linear import DailyGrams, LinearModel
 from igrow.trainer.diagnosis.noise import Whitening
 from igrow.trainer.diagnosis.recalibration import averaging
@@ -151,12 +150,6 @@ def lay_out(
     )
 
 
-def keys(design: Design) -> tuple[str, ...]:
-    """Return the keys of everything that may be missing, as a discrepancy has them."""
-    parameters = (PARAMETER_PREFIX + name for name in design.block("parameter").labels)
-    return (*parameters, *design.block("effect").labels, *design.block("pattern").labels)
-
-
 def expected_misfit(known: Discrepancy, plain: Design) -> Floats:
     """Return what the model is expected to miss along a log, (b, r, intervals); what is new in the log is 0."""
     amplitudes = known.amplitudes.values
@@ -236,29 +229,6 @@ def days_between(known: Discrepancy, time: np.datetime64) -> float:
     return float((time - known.middle).astype("timedelta64[s]").astype(np.float64) / 86_400.0)
 
 
-def rate_keys(design: Design) -> tuple[str, ...]:
-    """Return the keys of everything that may be missing, as a drift has them: an effect has one at all shapes."""
-    parameters = (PARAMETER_PREFIX + name for name in design.block("parameter").labels)
-    return (*parameters, *(one.effect for one in design.candidates), *design.block("pattern").labels)
-
-
-def units(design: Design) -> Floats:
-    """Return the size of a change of rate one, (k,)."""
-    return np.concatenate([
-        drift(design.prior.values, 1.0, design.rules), _typical(design), np.ones(len(design.patterns))
-    ])  # fmt: skip
-
-
-def drift_within(design: Design) -> Floats:
-    """Return the standard deviation of the change of everything within some weeks, by physics, (k,)."""
-    rules = design.rules
-    return np.concatenate([
-        home_drift(design.prior.values, rules),
-        rules.effect_drift * _typical(design),
-        np.full(len(design.patterns), rules.pattern_drift),
-    ])  # fmt: skip
-
-
 def own_gains(design: Design) -> dict[str, float]:
     """Return the largest gain of every effect and pattern in a window of a log, when all is learned on the rest.
 
@@ -300,18 +270,3 @@ def solve_jointly(design: Design) -> tuple[Gaussian, Design]:
 
 def _columns(design: Design) -> list[int]:
     return [column for name in JOINT for column in design.block(name).columns]
-
-
-def _typical(design: Design) -> Floats:
-    return np.array([abs(EFFECTS[one.effect].amplitude.typical) for one in design.candidates])
-
-
-def omission(names: Sequence[str], rules: DecisionRules) -> Floats:
-    """Return the prior deviation of effects and patterns before any log, (k,)."""
-    effects = [EFFECTS.get(name.partition(":")[0]) for name in names]
-    return np.array(
-        [
-            rules.omission_pattern if one is None else rules.omission_effect * abs(one.amplitude.typical)
-            for one in effects
-        ]
-    )

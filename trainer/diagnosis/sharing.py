@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from igrow.trainer.data.log import Log
-from igrow.trainer.diagnosis import history
+from igrow.trainer.diagnosis import amplitudes, history
 from igrow.trainer.diagnosis.design import JOINT, Design
 from igrow.trainer.diagnosis.diagnose import log_days
 from igrow.trainer.diagnosis.drift import Drift, Pair
@@ -28,10 +28,10 @@ def learned_from(model: FittedModel, rules: DecisionRules = DEFAULT) -> Learned:
     found = learned_of(site_prior(model.site), model.posterior)
     if model.history is None:
         return found
-    amplitudes = model.history.amplitudes
-    names = tuple(name for name in amplitudes.names if not name.startswith(PARAMETER_PREFIX))
-    before = Gaussian(names, np.zeros(len(names)), np.diag(history.omission(names, rules) ** 2))
-    missing = learned_of(before, amplitudes.marginal(names))
+    found_missing = model.history.amplitudes
+    names = tuple(name for name in found_missing.names if not name.startswith(PARAMETER_PREFIX))
+    before = Gaussian(names, np.zeros(len(names)), np.diag(amplitudes.omission(names, rules) ** 2))
+    missing = learned_of(before, found_missing.marginal(names))
     return Learned({**found.shift, **missing.shift}, {**found.variance, **missing.variance})
 
 
@@ -68,11 +68,11 @@ def pair(known: Discrepancy, plain: Design, design: Design, days: float) -> Pair
     total = design.grams.of(columns, ())[design.grams.fit].sum(axis=0, dtype=np.float64)
     time = plain.line.record.time
     between = history.days_between(known, time[0] + (time[-1] - time[0]) / 2)
-    unit, none = history.units(plain), Drift({}, days)
+    unit, none = amplitudes.units(plain), Drift({}, days)
     return Pair(
-        keys=history.rate_keys(plain),
+        keys=amplitudes.rate_keys(plain),
         unit=unit * float(np.sqrt(max(between, days) / days)),
-        expected=history.drift_within(plain) / unit,
+        expected=amplitudes.drift_within(plain) / unit,
         known=history.drifted(known, plain, none).covariance - np.diag(history.change_of(known, plain, none) ** 2),
         information=total[1:, 1:],
         score=-total[1:, 0],
