@@ -52,6 +52,8 @@ def _note_point(memory: PointMemory, state: PointState) -> Entry:
         "answers": memory.answers,
         "sent": _note_sent(memory.sent),
         "late": _note_sent(memory.late),
+        "moved_at": memory.moved_at,
+        "applied_last": memory.applied_last,
         "hand": memory.hand,
         "held_until": None if memory.hand is None else memory.held_until,
         "ceiling": memory.ceiling,
@@ -80,6 +82,9 @@ def _recall_point(memory: PointMemory, entry: Entry, later: float, *, agree: boo
     # Seen, and not judged yet: by now the PLC may show no sign of it any more.
     memory.fell_back_at, memory.restarted_at = _time(entry, "fell_back_at", later), _time(entry, "restarted_at", later)
     memory.sent, memory.late = _recall_sent(entry.get("sent"), later), _recall_sent(entry.get("late"), later)
+    # A value that stopped short of our write, by a limit of the PLC's or by a hand, is left alone: after a restart too.
+    memory.moved_at = _number(entry, "moved_at", -math.inf) + later
+    memory.applied_last = _number(entry, "applied_last")
 
 
 def _note_sent(sent: Sequence[Sent]) -> list[list[object]]:

@@ -295,3 +295,16 @@ def test_a_moment_survives_the_ledger():
     assert from_json(json.loads(json.dumps(to_json(moment)))) == moment
     assert from_json({"boot": 3}) is None
     assert from_json(None) is None
+
+
+async def test_a_value_that_stopped_short_of_a_lost_write_is_left_alone_after_a_restart_too():
+    """A limit of the PLC's, or a hand: by what is read nobody can tell, and written over it would be lost."""
+    bench = make_stubborn_bench(FixedSource({"co2_setpoint": 600.0}), values={"co2_setpoint": 500.0})
+    bench.plc.ignores.add("co2_setpoint")
+    await bench.run(2)
+    bench.plc.by_hand("co2_setpoint", 537.0)
+    await bench.run(1)
+    bench.plc.ignores.clear()
+    bench.restart()
+    await bench.run(20)
+    assert bench.plc.values["co2_setpoint"] == 537.0
