@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
-from igrow.core.bundle import EffectRecord, Estimate, default_bundle_folder, read_bundle
+from igrow.core.bundle import EffectRecord, Estimate
 from igrow.trainer.diagnosis.candidates import Candidate, Pattern
 from igrow.trainer.diagnosis.correction import (
     Corrected,
@@ -26,10 +26,10 @@ from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.diagnosis.wording import discrepancy, finding
 from igrow.trainer.fit import Gaussian
-from igrow.trainer.fit.growth import crop_of
+from igrow.trainer.fit.growth import built_in_crop
 from tests.diagnosis.conftest import model_in_force
 
-CROP = crop_of(read_bundle(default_bundle_folder()))
+CROP = built_in_crop()
 DAY = np.datetime64("2020-03-14T00:00:00", "s")
 
 

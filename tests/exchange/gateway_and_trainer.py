@@ -69,6 +69,12 @@ class World:
             self.seen = None
         return status
 
+    def run_days(self, first: int, last: int) -> None:
+        """Let whole days pass, each with a round after it."""
+        for day in range(first, last):
+            self.log(START + day * DAY, START + (day + 1) * DAY)
+            self.round(START + (day + 1) * DAY + 300)
+
     def collect(self, now: float, place: Place | None = None, *, take_over: bool = False) -> Collected:
         moment = datetime.fromtimestamp(now, UTC)
         return collect(place or self.place, self.site, self.archive, moment, take_over=take_over)

@@ -24,32 +24,19 @@ TEN_YEARS = 3653 * DAY
 NOON = START + DAY // 2
 
 
-@pytest.fixture
-def world(tmp_path: Path):
-    made = World(tmp_path)
-    yield made
-    made.store.close()
-
-
-def run_days(world: World, first: int, last: int) -> None:
-    for day in range(first, last):
-        world.log(START + day * DAY, START + (day + 1) * DAY)
-        world.round(START + (day + 1) * DAY + 300)
-
-
 def test_a_clock_ten_years_ahead_for_seconds_stops_no_day_from_arriving(world: World) -> None:
     world.log(START, NOON)
     world.store.append(NOON + TEN_YEARS, {"air_temperature": Value(1.0, Quality.GOOD, 0.0)})
     world.round(NOON + TEN_YEARS)
     world.log(NOON, START + DAY)
     world.round(START + DAY + 300)
-    run_days(world, 1, 3)
+    world.run_days(1, 3)
     world.collect(START + 3 * DAY)
     world.assert_complete()
 
 
 def test_a_clock_ten_years_ahead_for_two_days_is_named_and_its_rows_are_set_aside(world: World) -> None:
-    run_days(world, 0, 1)
+    world.run_days(0, 1)
     for hour in range(48):
         time = START + TEN_YEARS + 3600 * hour
         world.store.append(time, {"air_temperature": Value(1.0, Quality.GOOD, 0.0)})
@@ -65,12 +52,12 @@ def test_a_clock_ten_years_ahead_for_two_days_is_named_and_its_rows_are_set_asid
 
 
 def test_a_clock_that_was_behind_for_some_hours_loses_nothing_that_was_logged_then(world: World) -> None:
-    run_days(world, 0, 2)
+    world.run_days(0, 2)
     behind = START - 400 * DAY
     world.log(behind, behind + 3 * 3600)
     for hour in range(3):
         world.round(behind + 3600 * hour + 1800)
-    run_days(world, 2, 4)
+    world.run_days(2, 4)
     world.collect(START + 4 * DAY)
     world.assert_complete()
 
@@ -132,7 +119,7 @@ def test_a_quantity_or_unit_that_is_not_known_is_kept_apart_and_named(world: Wor
 
 
 def test_a_new_sensor_adds_a_column_and_leaves_the_days_before_as_they_are(world: World, tmp_path: Path) -> None:
-    run_days(world, 0, 1)
+    world.run_days(0, 1)
     world.store.append(START + DAY + 60, {"air_co2": Value(700.0, Quality.GOOD, 0.0)})
     world.round(START + 2 * DAY + 300)
     world.collect(START + 2 * DAY)
@@ -232,7 +219,7 @@ def test_a_seal_that_says_what_cannot_be_is_set_aside(world: World, changed: dic
 
 
 def test_a_refused_segment_is_set_aside_receipted_and_holds_nothing_up(world: World, tmp_path: Path) -> None:
-    run_days(world, 0, 1)
+    world.run_days(0, 1)
     name, data = forged(GOOD, b"[1, 2]\n")
     world.place.put(f"{SITE}/segments/{name}", data)
     done = world.collect(START + DAY)

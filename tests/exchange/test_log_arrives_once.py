@@ -16,21 +16,8 @@ from igrow.trainer.service.collecting import collect
 from tests.exchange.gateway_and_trainer import DAY, SITE, START, World
 
 
-@pytest.fixture
-def world(tmp_path: Path):
-    made = World(tmp_path)
-    yield made
-    made.store.close()
-
-
-def run_days(world: World, first: int, last: int) -> None:
-    for day in range(first, last):
-        world.log(START + day * DAY, START + (day + 1) * DAY)
-        world.round(START + (day + 1) * DAY + 300)
-
-
 def test_each_day_is_sealed_sent_collected_receipted_and_forgotten(world: World) -> None:
-    run_days(world, 0, 3)
+    world.run_days(0, 3)
     assert len(world.waiting()) == 3
     done = world.collect(START + 3 * DAY)
     assert (done.segments, done.rows, done.notes) == (3, 432, [])
@@ -41,20 +28,20 @@ def test_each_day_is_sealed_sent_collected_receipted_and_forgotten(world: World)
 
 
 def test_a_second_delivery_changes_nothing(world: World, tmp_path: Path) -> None:
-    run_days(world, 0, 3)
+    world.run_days(0, 3)
     shutil.copytree(tmp_path / "exchange", tmp_path / "copy")
     world.collect(START + 3 * DAY)
     again = world.collect(START + 3 * DAY, FolderPlace(tmp_path / "copy"))
     assert (again.segments, again.repeated) == (0, 3)
     (tmp_path / "archive" / "ledger" / f"{SITE}.json").unlink()
     shutil.copytree(tmp_path / "copy", tmp_path / "exchange", dirs_exist_ok=True)
-    run_days(world, 3, 4)
+    world.run_days(3, 4)
     world.collect(START + 4 * DAY)
     world.assert_complete()
 
 
 def test_any_order_of_arrival_gives_the_same_archive(world: World, tmp_path: Path) -> None:
-    run_days(world, 0, 5)
+    world.run_days(0, 5)
     names = world.waiting()
     for name in (names[3], names[0], names[4], names[2], names[1]):
         place = FolderPlace(tmp_path / "one")
@@ -66,7 +53,7 @@ def test_any_order_of_arrival_gives_the_same_archive(world: World, tmp_path: Pat
 
 
 def test_missing_days_are_named_until_they_come(world: World, tmp_path: Path) -> None:
-    run_days(world, 0, 4)
+    world.run_days(0, 4)
     names = [str(SegmentName.parse(entry.name)) for entry in world.place.entries(f"{SITE}/segments")]
     held_back = tmp_path / "exchange" / SITE / "segments" / names[1]
     content = held_back.read_bytes()
@@ -78,7 +65,7 @@ def test_missing_days_are_named_until_they_come(world: World, tmp_path: Path) ->
 
 
 def test_a_cut_or_altered_segment_is_sent_again(world: World, tmp_path: Path) -> None:
-    run_days(world, 0, 2)
+    world.run_days(0, 2)
     first, second = sorted((tmp_path / "exchange" / SITE / "segments").iterdir())
     first.write_bytes(first.read_bytes()[:-100])
     second.write_bytes(second.read_bytes().replace(b"seal", b"sea1"))
@@ -102,7 +89,7 @@ def test_a_gateway_that_is_offline_for_months_keeps_its_budget_and_says_what_it_
         status = world.round(START + (day + 1) * DAY + 300, place=Away(tmp_path))
         assert status.waiting_bytes <= 20_000
         assert "no route to host" in status.problem
-    run_days(world, 40, 41)
+    world.run_days(40, 41)
     notes = world.collect(START + 41 * DAY).notes
     given_up = 41 - len(world.archived()) // 144
     assert 0 < given_up < 41
@@ -112,20 +99,20 @@ def test_a_gateway_that_is_offline_for_months_keeps_its_budget_and_says_what_it_
 
 
 def test_a_lost_outbox_state_seals_again_and_the_archive_has_nothing_twice(world: World) -> None:
-    run_days(world, 0, 2)
+    world.run_days(0, 2)
     world.collect(START + 2 * DAY)
     shutil.rmtree(world.outbox)
-    run_days(world, 2, 4)
+    world.run_days(2, 4)
     world.collect(START + 4 * DAY)
     world.assert_complete()
 
 
 def test_a_power_cut_between_segment_and_state_seals_nothing_twice(world: World) -> None:
-    run_days(world, 0, 1)
+    world.run_days(0, 1)
     before = (world.outbox / "chain.json").read_bytes()
-    run_days(world, 1, 2)
+    world.run_days(1, 2)
     (world.outbox / "chain.json").write_bytes(before)
-    run_days(world, 2, 3)
+    world.run_days(2, 3)
     waiting = [SegmentName.parse(name) for name in world.waiting()]
     assert [name and name.number for name in waiting] == [1, 2, 3]
     assert world.collect(START + 3 * DAY).notes == []
@@ -133,14 +120,14 @@ def test_a_power_cut_between_segment_and_state_seals_nothing_twice(world: World)
 
 
 def test_a_gateway_restored_from_a_backup_begins_another_chain(world: World, tmp_path: Path) -> None:
-    run_days(world, 0, 1)
+    world.run_days(0, 1)
     shutil.copytree(world.outbox, tmp_path / "backup")
-    run_days(world, 1, 3)
+    world.run_days(1, 3)
     world.collect(START + 3 * DAY)
     shutil.rmtree(world.outbox)
     shutil.copytree(tmp_path / "backup", world.outbox)
-    run_days(world, 3, 5)
-    run_days(world, 5, 6)
+    world.run_days(3, 5)
+    world.run_days(5, 6)
     world.collect(START + 6 * DAY)
     world.round(START + 6 * DAY + 600)
     world.assert_complete()
@@ -148,7 +135,7 @@ def test_a_gateway_restored_from_a_backup_begins_another_chain(world: World, tmp
 
 
 def test_a_site_reads_no_segment_that_another_has_sealed(world: World, tmp_path: Path) -> None:
-    run_days(world, 0, 1)
+    world.run_days(0, 1)
     shutil.copytree(tmp_path / "exchange" / SITE, tmp_path / "exchange" / "other")
     done = collect(world.place, "other", world.archive, datetime(2026, 6, 1, tzinfo=UTC))
     assert "sealed by site house" in done.notes[0]
@@ -158,7 +145,7 @@ def test_a_site_reads_no_segment_that_another_has_sealed(world: World, tmp_path:
 def test_duckdb_and_pandas_read_the_archive_without_us(world: World, tmp_path: Path) -> None:
     import pandas as pd
 
-    run_days(world, 0, 2)
+    world.run_days(0, 2)
     world.collect(START + 2 * DAY)
     files = f"{tmp_path}/archive/telemetry/**/*.parquet"
     found = duckdb.sql(

@@ -19,34 +19,21 @@ from tests.exchange.gateway_and_trainer import DAY, SITE, START, World
 from tests.tiny_bundle import write_tiny_bundle
 
 
-@pytest.fixture
-def world(tmp_path: Path):
-    made = World(tmp_path)
-    yield made
-    made.store.close()
-
-
-def run_days(world: World, first: int, last: int) -> None:
-    for day in range(first, last):
-        world.log(START + day * DAY, START + (day + 1) * DAY)
-        world.round(START + (day + 1) * DAY + 300)
-
-
 def go_on(world: World, first: int) -> list[str]:
     """Let four days pass with rounds and collections; returns what the last collection says."""
     notes = ["none was made"]
     for day in range(first, first + 4):
-        run_days(world, day, day + 1)
+        world.run_days(day, day + 1)
         notes = world.collect(START + (day + 1) * DAY).notes
         world.round(START + (day + 1) * DAY + 900)
     return notes
 
 
 def test_a_trainer_restored_from_an_older_backup_gets_again_what_it_has_lost(world: World, tmp_path: Path) -> None:
-    run_days(world, 0, 2)
+    world.run_days(0, 2)
     world.collect(START + 2 * DAY)
     shutil.copytree(tmp_path / "archive", tmp_path / "backup")
-    run_days(world, 2, 4)
+    world.run_days(2, 4)
     world.collect(START + 4 * DAY)
     assert world.round(START + 4 * DAY + 900).waiting == 0
     shutil.rmtree(tmp_path / "archive")
@@ -56,7 +43,7 @@ def test_a_trainer_restored_from_an_older_backup_gets_again_what_it_has_lost(wor
 
 
 def test_a_trainer_that_lost_its_archive_gets_what_the_gateways_log_has(world: World, tmp_path: Path) -> None:
-    run_days(world, 0, 3)
+    world.run_days(0, 3)
     world.collect(START + 3 * DAY)
     world.round(START + 3 * DAY + 900)
     shutil.rmtree(tmp_path / "archive")
@@ -68,9 +55,9 @@ def test_a_trainer_that_lost_its_archive_gets_what_the_gateways_log_has(world: W
 
 
 def test_a_second_trainer_is_told_so_and_takes_nothing(world: World, tmp_path: Path, capsys) -> None:
-    run_days(world, 0, 1)
+    world.run_days(0, 1)
     world.collect(START + DAY)
-    run_days(world, 1, 2)
+    world.run_days(1, 2)
     arguments = ["collect", SITE, "--exchange", str(tmp_path / "exchange"), "--state", str(tmp_path / "second")]
     assert main(arguments) == 1
     assert "another archive collects it here since 2026-02-17" in capsys.readouterr().out
@@ -83,7 +70,7 @@ def test_a_second_trainer_is_told_so_and_takes_nothing(world: World, tmp_path: P
 
 
 def test_a_claim_that_was_cut_short_is_written_again(world: World, tmp_path: Path) -> None:
-    run_days(world, 0, 1)
+    world.run_days(0, 1)
     (tmp_path / "exchange" / SITE / "collector.json").write_text('{"archive": "ab')
     world.collect(START + DAY)
     world.assert_complete()
@@ -93,7 +80,7 @@ def test_a_claim_that_was_cut_short_is_written_again(world: World, tmp_path: Pat
 def test_an_outbox_restored_before_anything_was_collected_seals_what_a_clock_left_behind_again(
     world: World, tmp_path: Path
 ) -> None:
-    run_days(world, 0, 2)
+    world.run_days(0, 2)
     shutil.copytree(world.outbox, tmp_path / "backup")
     world.log(START + 5000, START + 6000, 301)
     world.seen = (START + 5000.0, START + 6000.0)
@@ -106,7 +93,7 @@ def test_an_outbox_restored_before_anything_was_collected_seals_what_a_clock_lef
 
 @pytest.mark.parametrize("waiting", [False, True])
 def test_a_renamed_site_sends_its_whole_log_under_the_new_name(world: World, *, waiting: bool) -> None:
-    run_days(world, 0, 2)
+    world.run_days(0, 2)
     if not waiting:
         world.collect(START + 2 * DAY)
         world.round(START + 2 * DAY + 900)
@@ -121,7 +108,7 @@ def test_a_renaming_that_was_cut_off_in_the_middle_loses_nothing(
 ) -> None:
     from igrow.edge.exchange.outbox import Outbox
 
-    run_days(world, 0, 3)
+    world.run_days(0, 3)
     (tmp_path / "store" / "telemetry.db").rename(tmp_path / "worn.db")  # only the outbox has these days
     world.site, seal, left = "house-north", Outbox.seal, [1]
 
@@ -142,7 +129,7 @@ def test_a_renaming_that_was_cut_off_in_the_middle_loses_nothing(
 
 
 def test_a_segment_that_the_gateways_disk_has_spoilt_is_sealed_again_from_the_log(world: World) -> None:
-    run_days(world, 0, 1)
+    world.run_days(0, 1)
     world.collect(START + DAY)
     world.log(START + DAY, START + 2 * DAY)
 
@@ -162,7 +149,7 @@ def test_a_segment_that_the_gateways_disk_has_spoilt_is_sealed_again_from_the_lo
 def test_a_receipt_that_was_cut_off_forgets_nothing_and_is_written_again(
     world: World, tmp_path: Path, content: bytes
 ) -> None:
-    run_days(world, 0, 2)
+    world.run_days(0, 2)
     world.collect(START + 2 * DAY)
     (receipt,) = (tmp_path / "exchange" / SITE / "receipts").iterdir()
     whole = receipt.read_bytes()
@@ -176,7 +163,7 @@ def test_a_receipt_that_was_cut_off_forgets_nothing_and_is_written_again(
 
 
 def test_a_receipt_for_more_than_was_sealed_is_not_believed(world: World, tmp_path: Path) -> None:
-    run_days(world, 0, 2)
+    world.run_days(0, 2)
     chain = world.waiting()[0][:12]
     receipt = {"chain": chain, "through": 999, "anchor": [0, ""], "beyond": {}}
     world.place.put(f"{SITE}/receipts/{chain}.json", json.dumps(receipt).encode())
@@ -186,7 +173,7 @@ def test_a_receipt_for_more_than_was_sealed_is_not_believed(world: World, tmp_pa
 
 
 def test_a_gap_in_a_chain_that_has_ended_is_asked_for_no_more(world: World, tmp_path: Path) -> None:
-    run_days(world, 0, 3)
+    world.run_days(0, 3)
     (tmp_path / "exchange" / SITE / "segments" / world.waiting()[1]).unlink()
     assert "segment 2 has not come yet" in world.collect(START + 3 * DAY).notes[0]
     shutil.rmtree(world.outbox)
@@ -195,7 +182,7 @@ def test_a_gap_in_a_chain_that_has_ended_is_asked_for_no_more(world: World, tmp_
 
 
 def test_a_segment_without_rows_or_records_is_collected_and_changes_nothing(world: World) -> None:
-    run_days(world, 0, 1)
+    world.run_days(0, 1)
     chain = world.waiting()[0][:12]
     end = float(START + 2 * DAY)
     digest = world.waiting()[0].split("-")[2][:64]

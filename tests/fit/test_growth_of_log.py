@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.simulator.crop import CropStages
 from igrow.core.simulator.growth import GrowthFit, prior_of
 from igrow.core.site import Crop
@@ -16,7 +15,7 @@ from igrow.trainer import prepare_log
 from igrow.trainer.data import Log
 from igrow.trainer.data.source import DailyTable
 from igrow.trainer.fit import FittedModel
-from igrow.trainer.fit.growth import counts_of, crop_of, growth_days, growth_notes, growth_of_log, growth_since
+from igrow.trainer.fit.growth import built_in_crop, counts_of, growth_days, growth_notes, growth_of_log, growth_since
 from tests.virtual_log import SITE, virtual_log
 
 DAYS, STEP = 84, 3600.0
@@ -32,7 +31,7 @@ def telemetry() -> Telemetry:
 
 @pytest.fixture(scope="module")
 def before() -> CropStages:
-    return crop_of(read_bundle(default_bundle_folder()))
+    return built_in_crop()
 
 
 def grown(telemetry: Telemetry, before: CropStages) -> np.ndarray:

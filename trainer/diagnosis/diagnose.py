@@ -11,7 +11,6 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 
 import numpy as np
 
-from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.effects import EFFECTS
 from igrow.core.errors import IgrowError
 from igrow.core.language import N_
@@ -32,7 +31,7 @@ from igrow.trainer.diagnosis.result import Diagnosis, Finding, Verdict
 from igrow.trainer.diagnosis.rounds import search_of
 from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules
 from igrow.trainer.fit.discrepancy import Discrepancy
-from igrow.trainer.fit.growth import crop_of, growth_since
+from igrow.trainer.fit.growth import built_in_crop, growth_since
 from igrow.trainer.fit.model import FittedModel
 from igrow.trainer.fit.population import Population
 
@@ -100,7 +99,7 @@ def diagnose(
     errors = _errors(stages)
     start, end = log.telemetry.time[0], log.telemetry.time[-1]
     moved = model.posterior.values, result.stages["corrected"].posterior.values
-    crop = growth_since(log, days.record, moved, model.crop or crop_of(read_bundle(default_bundle_folder())))
+    crop = growth_since(log, days.record, moved, model.crop or built_in_crop())
     runs = {name: day for name, (stage, seen) in stages.items() if (day := seen.run(stage)) is not None}
     notes = (
         *((NOT_CALIBRATED,) if knowledge.transferred else ()),

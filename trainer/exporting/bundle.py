@@ -15,7 +15,6 @@ from igrow.core.bundle import (
     FittedParameter,
     Golden,
     Manifest,
-    default_bundle_folder,
     read_bundle,
     run_graph,
     write_bundle,
@@ -37,7 +36,7 @@ from igrow.trainer.exporting.signatures import signatures
 from igrow.trainer.fit.climate import bounds, site_prior
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
-from igrow.trainer.fit.growth import CROP_FILE, crop_of
+from igrow.trainer.fit.growth import CROP_FILE, built_in_crop, crop_of
 from igrow.trainer.fit.model import FittedModel
 from igrow.trainer.training.stage_file import stages_to_bytes
 
@@ -61,7 +60,7 @@ def export(model: FittedModel, folder: Path | str, *, created: datetime | None =
         BundleError: the bundle cannot be written.
     """
     created = created or datetime.now(UTC)
-    crop = model.crop or crop_of(read_bundle(default_bundle_folder()))
+    crop = model.crop or built_in_crop()
     random = np.random.default_rng(seed)
     blocks = climate_blocks([effect.name for effect in model.effects])
     planning = plan_blocks(blocks, crop, model.training_range)

@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from igrow.core.bundle import HeldOutError, Span, default_bundle_folder, read_bundle
+from igrow.core.bundle import HeldOutError, Span
 from igrow.core.errors import IgrowError
 from igrow.core.local_time import utc_datetime
 from igrow.core.quantities import QUANTITIES
@@ -27,7 +27,7 @@ from igrow.trainer.fit.actuation import by_its_own_rules, fit_actuation, setpoin
 from igrow.trainer.fit.climate import fit_climate
 from igrow.trainer.fit.evaluation import evaluate
 from igrow.trainer.fit.gaussian import Gaussian
-from igrow.trainer.fit.growth import crop_of, growth_notes, growth_of_log
+from igrow.trainer.fit.growth import built_in_crop, growth_notes, growth_of_log
 from igrow.trainer.fit.holding import fit_holding
 from igrow.trainer.fit.model import FittedModel, training_envelope
 from igrow.trainer.fit.omission import Omission
@@ -76,7 +76,7 @@ def calibrate(
     setpoints, inferred = setpoint_columns(log.telemetry, record)
     rules = fit_actuation([(record, setpoints, by_its_own_rules(log.telemetry, record))], posterior.values)
     say("rules of the climate computer fitted")
-    stages = before.crop or crop_of(read_bundle(default_bundle_folder()))
+    stages = before.crop or built_in_crop()
     crop, growth = growth_of_log(log, record, posterior.values, stages)
     counted = growth_notes(site, stages, growth)
     for note in counted:

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow.core.bundle import Bundle, BundleError
+from igrow.core.bundle import Bundle, BundleError, default_bundle_folder, read_bundle
 from igrow.core.local_time import to_local
 from igrow.core.simulator.crop import CropStages
 from igrow.core.simulator.growth import Count, GrowthDays, GrowthFit, fit_growth, prior_of, warmth
@@ -51,6 +51,11 @@ def crop_of(bundle: Bundle) -> CropStages:
     covariance = settings.get("growth_covariance")
     known = None if covariance is None else np.array(covariance, dtype=np.float64)
     return CropStages(stages["growth"], stages["harvest"], *growth, known)
+
+
+def built_in_crop() -> CropStages:
+    """Return the stages of the bundle that came with the trainer."""
+    return crop_of(read_bundle(default_bundle_folder()))
 
 
 def growth_of_log(
