@@ -75,8 +75,13 @@ def virtual_log(
     parameters: Mapping[str, float] | None = None,
     added: Mapping[str, Floats] | None = None,
     noise: bool = True,
+    followed: Mapping[str, Floats] | None = None,
 ) -> Telemetry:
-    """Return the log of a virtual greenhouse; `added` are fluxes that the simulator does not know, (n,)."""
+    """Return the log of a virtual greenhouse.
+
+    `added` are fluxes that the simulator does not know, (n,); `followed` setpoints that the plant follows in place of
+    those that the log has, (n,).
+    """
     generator = np.random.default_rng(seed + 1)
     outside, asked = weather(days, step, seed), setpoints(days, step)
     count = len(asked["lamp_on"])
@@ -91,7 +96,9 @@ def virtual_log(
     record = site_record(blank, SITE, step)
     values = dict(parameters or nominal(SITE))
     states = records.observe(record, values, {})
-    out = closed_run(record, states, asked, [0], count - 1, values, {}, actuation.default_rules(), added)
+    out = closed_run(
+        record, states, {**asked, **(followed or {})}, [0], count - 1, values, {}, actuation.default_rules(), added
+    )
     columns = dict(outside) | asked
     for name in ("air_temperature", "air_humidity", "air_co2"):
         columns[name] = np.concatenate([begin[name][:1], out[name][:, 0]])

@@ -31,12 +31,17 @@ def disturbances(days: int, step: float, seed: int) -> dict[str, Floats]:
     }
 
 
-def greenhouse_log(seed: int, added: Mapping[str, Floats] | None = None, days: int = DAYS) -> Log:
-    """A log with disturbances, sensor noise, and whatever is added to the fluxes."""
+def greenhouse_log(
+    seed: int,
+    added: Mapping[str, Floats] | None = None,
+    days: int = DAYS,
+    followed: Mapping[str, Floats] | None = None,
+) -> Log:
+    """A log with disturbances, sensor noise, what is added to the fluxes, and setpoints that are followed instead."""
     fluxes = disturbances(days, STEP, seed)
     for channel, flux in (added or {}).items():
         fluxes[channel] = fluxes.get(channel, 0.0) + flux
-    return prepare_log(virtual_log(days, seed=seed, step=STEP, added=fluxes), SITE)
+    return prepare_log(virtual_log(days, seed=seed, step=STEP, added=fluxes, followed=followed), SITE)
 
 
 def model_in_force() -> FittedModel:

@@ -12,7 +12,7 @@ from igrow.trainer.data import Log
 from igrow.trainer.diagnosis import DEFAULT, Diagnosis, actuators, diagnose
 from igrow.trainer.diagnosis.diagnose import log_days
 from igrow.trainer.diagnosis.knowledge import knowledge_of
-from tests.diagnosis.conftest import model_in_force
+from tests.diagnosis.conftest import DAYS, STEP, greenhouse_log, model_in_force
 from tests.virtual_log import SITE
 
 
@@ -51,7 +51,7 @@ def test_the_course_of_the_rules_is_what_the_computer_did(quiet_log: Log, column
 def test_nothing_is_looked_for_where_the_log_lacks_no_actuator(quiet_log: Log) -> None:
     model = model_in_force()
     days, known = log_days(quiet_log, model), knowledge_of(model, SITE, DEFAULT)
-    done = actuators.complete(quiet_log, days, model, known, DEFAULT, np.random.default_rng(0))
+    done = actuators.complete(quiet_log, days, model, known, DEFAULT)
     assert done == actuators.Completed(days, (), None)
 
 
@@ -61,3 +61,36 @@ def test_a_log_lacks_only_what_the_site_has(quiet_log: Log) -> None:
     without = replace(SITE, greenhouse=replace(house, grow_pipe_heat_transfer=0.0, lamps=None))
     assert {"grow_pipe_temperature", "lamp_power"} <= set(site_record(bare, SITE, 900.0).missing)
     assert not {"grow_pipe_temperature", "lamp_power"} & set(site_record(bare, without, 900.0).missing)
+
+
+@pytest.fixture(scope="module")
+def dark_log() -> Log:
+    """The lamps are asked for, and their breaker is out; the envelope leaks by more than the model knows."""
+    rows = round(DAYS * 86_400 / STEP)
+    leak = np.full(rows, 0.3 * SITE.greenhouse.mean_height / 3600.0)
+    return greenhouse_log(3, {"air_exchange": leak}, followed={"lamp_on": np.zeros(rows)})
+
+
+@pytest.mark.parametrize(("log", "share"), [("quiet_log", 1.0), ("dark_log", 0.0)])
+def test_the_share_of_a_course_is_found_beside_the_parameters(
+    log: str, share: float, request: pytest.FixtureRequest
+) -> None:
+    model, seen = model_in_force(), request.getfixturevalue(log).without("lamp_power")
+    days, known = log_days(seen, model), knowledge_of(model, SITE, DEFAULT)
+    trial = actuators.with_inputs(days, actuators.courses(seen, days.record, model))
+    found = actuators.share_of_course(days, trial, known, DEFAULT)
+    assert found.value == pytest.approx(share, abs=2.0 * found.deviation)
+    assert found.deviation < 0.2
+    assert (found.log_odds >= DEFAULT.least_actuator_odds) == (share == 1.0)
+
+
+def test_an_actuator_that_stood_still_is_not_named(dark_log: Log) -> None:
+    found = diagnose(dark_log.without("lamp_power"), model_in_force())
+    assert "lamp_power" not in {one.effect for one in found.findings}
+
+
+@pytest.mark.parametrize(("value", "deviation", "odds"), [(1.0, 0.5, 2.0), (0.5, 0.1, 0.0), (0.0, 0.5, -2.0)])
+def test_odds_compare_what_the_rules_say_with_standing_still(value: float, deviation: float, odds: float) -> None:
+    share = actuators.Share(value, deviation)
+    exact = 0.5 * (value / deviation) ** 2 - 0.5 * ((value - 1.0) / deviation) ** 2
+    assert share.log_odds == pytest.approx(odds) == pytest.approx(exact)

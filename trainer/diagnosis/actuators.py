@@ -1,9 +1,11 @@
 """Actuators that a log lacks: each a candidate of its own, at the course that the climate computer's rules gave it.
 
 Where a greenhouse has lamps, pipes or screens and the log does not tell what they did, a calibrated actuation stage
-does: it knows what the computer would have done with these setpoints in this climate. An actuator is the cause where
-its course takes its share off the squared error of unseen days, beyond what recalibration does without it; the search
-for other causes then goes on with it.
+does: it knows what the computer would have done with these setpoints in this climate. How much of that course the
+errors ask for is fitted beside the parameters, under what is known of these: without its pipes a greenhouse is
+predicted cold, and a recalibration that makes up for them bends walls and leaks far from where the calibration left
+them. An actuator is named where it is far likelier to have followed the rules than to have stood still; the search for
+other causes then goes on with it.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ from igrow.core.simulator import actuation
 from igrow.core.simulator.hybrid import climate, measurement, record
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.data.log import Log
-from igrow.trainer.diagnosis import freerun, sensitivity
+from igrow.trainer.diagnosis import freerun, linear, sensitivity
 from igrow.trainer.diagnosis.correction import LogDays, Stage
 from igrow.trainer.diagnosis.estimate import normal_quantile
 from igrow.trainer.diagnosis.knowledge import Knowledge, activate
@@ -26,11 +28,29 @@ from igrow.trainer.diagnosis.result import Interval
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.fit.actuation import setpoint_columns
 from igrow.trainer.fit.model import FittedModel
-from igrow.trainer.fit.scales import ERROR_SCALES
+from igrow.trainer.fit.scales import CORRELATION_TIME, ERROR_SCALES
 from igrow.trainer.fit.solver import DivergenceError
 
 REPLACEABLE = (*actuation.POSITIONS, "lamp_power")
 """Actuators that move the balances; without a dose the CO2 of a log tells nothing."""
+
+
+@dataclass(frozen=True)
+class Share:
+    """Of a course that the errors ask for: one is what the rules say, none is an actuator that stood still."""
+
+    value: float
+    deviation: float
+
+    @property
+    def log_odds(self) -> float:
+        """Of having followed the rules against having stood still."""
+        return (self.value - 0.5) / self.deviation**2
+
+    def interval(self, rules: DecisionRules) -> Interval:
+        """Return it with its interval."""
+        reach = normal_quantile(rules) * self.deviation
+        return Interval(self.value, self.value - reach, self.value + reach, "1")
 
 
 @dataclass(frozen=True)
@@ -42,8 +62,8 @@ class Replaced:
     """Of the course that the rules give it: one is what the computer would have done."""
     skill: float
     """Share of the squared error on unseen days that it removes beyond recalibration."""
-    p_value: float
-    """Bootstrap probability that it removes none."""
+    stood_still: float
+    """Probability of that against having followed the rules."""
     effect_to_noise: float
 
 
@@ -58,25 +78,29 @@ class Completed:
     """Fitted to the log as it is; None where nothing was found."""
 
 
-def complete(
-    log: Log, days: LogDays, model: FittedModel, knowledge: Knowledge, rules: DecisionRules, rng: np.random.Generator
-) -> Completed:
+def complete(log: Log, days: LogDays, model: FittedModel, knowledge: Knowledge, rules: DecisionRules) -> Completed:
     """Return a log with the courses of those actuators that it lacks and that explain its errors, the best first."""
     tried = {name: course for name, course in courses(log, days.record, model).items() if _moves(course)}
     plain: Stage | None = None
     found: list[Replaced] = []
     current = days
     while tried:
-        name = min(tried, key=lambda name: _loss(_with(current, {name: tried[name]}), knowledge))
+        name = min(tried, key=lambda name: _loss(with_inputs(current, {name: tried[name]}), knowledge))
         course = tried.pop(name)
-        trial = _with(current, {name: course})
+        trial = with_inputs(current, {name: course})
         if _loss(trial, knowledge) >= _loss(current, knowledge):
             break
-        before = Stage(current.fit(knowledge.prior, knowledge.terms), knowledge.terms)
-        plain = plain or before
-        judged = _judged(name, current, trial, before, knowledge, rules, rng)
+        try:
+            share = share_of_course(current, trial, knowledge, rules)
+            if share.log_odds < rules.least_actuator_odds:
+                continue
+            before = Stage(current.fit(knowledge.prior, knowledge.terms), knowledge.terms)
+            judged = _judged(name, current, trial, before, share, knowledge, rules)
+        except DivergenceError:
+            continue
         if judged is None:
             continue
+        plain = plain or before
         found.append(judged)
         current = trial
     return Completed(current, tuple(found), plain if found else None)
@@ -113,7 +137,7 @@ def _moves(course: Floats) -> bool:
     return bool(np.isfinite(course).all() and np.ptp(course) > 0.0)
 
 
-def _with(days: LogDays, inputs: Mapping[str, Floats]) -> LogDays:
+def with_inputs(days: LogDays, inputs: Mapping[str, Floats]) -> LogDays:
     """Return the log with actuators in the place of those that it lacks."""
     seen = days.record
     missing = tuple(name for name in seen.missing if name not in inputs)
@@ -135,48 +159,45 @@ def _loss(days: LogDays, knowledge: Knowledge) -> float:
     return float(np.sum(np.abs(_errors(days, knowledge.posterior.values, knowledge))))
 
 
+def share_of_course(days: LogDays, trial: LogDays, knowledge: Knowledge, rules: DecisionRules) -> Share:
+    """Return the share of a course that is fitted beside the parameters, about those of the calibration.
+
+    Args:
+        days: the log without the course.
+        trial: the log with it.
+        knowledge: of the greenhouse; its prior of the parameters counts.
+        rules: how much wider than the scatter of days the deviation is.
+
+    Raises:
+        DivergenceError: the model runs out of all bounds on one of the two.
+    """
+    prior, values = knowledge.prior, knowledge.posterior.values
+    scale = np.array([ERROR_SCALES[name] for name in measurement.PREDICTED])[:, None, None]
+    counted = days.runs.weight & trial.runs.weight
+    bare, dressed = (
+        sensitivity.linearise(one.record, one.runs, values, activate(one.record, knowledge.terms))
+        for one in (days, trial)
+    )
+    slopes = sensitivity.parameter_sensitivities(dressed, prior.names, prior.standard_deviation)
+    columns = np.concatenate([bare.errors[None], slopes, (dressed.errors - bare.errors)[None]])
+    weighted = np.where(counted, columns / scale, 0.0) * np.sqrt(days.record.step / CORRELATION_TIME)
+    grams = linear.DailyGrams(linear.daily_products(weighted, days.runs.day, days.split.days), days.split.fit)
+    moved = prior.mean - np.array([values[name] for name in prior.names])
+    base = tuple(range(1, len(slopes) + 1))
+    course = linear.Term(len(slopes) + 1)
+    fitted = linear.fit(grams, linear.LinearModel(base, prior.precision, moved, (course,)))
+    deviation = rules.deviation_inflation * linear.deviation_by_day(grams, fitted)
+    return Share(float(fitted.amplitudes[-1]), deviation)
+
+
 def _judged(
-    name: str,
-    days: LogDays,
-    trial: LogDays,
-    before: Stage,
-    knowledge: Knowledge,
-    rules: DecisionRules,
-    rng: np.random.Generator,
+    name: str, days: LogDays, trial: LogDays, before: Stage, share: Share, knowledge: Knowledge, rules: DecisionRules
 ) -> Replaced | None:
-    """Return the actuator where it stands on unseen days, None where it does not."""
-    try:
-        after = Stage(trial.fit(knowledge.prior, knowledge.terms), knowledge.terms)
-    except DivergenceError:
+    """Return the actuator with what it does on unseen days, None where there are none; may raise DivergenceError."""
+    after = Stage(trial.fit(knowledge.prior, knowledge.terms), knowledge.terms)
+    old, new, bare = days.run(before), trial.run(after), days.run(after)
+    if old is None or new is None or bare is None:
         return None
-    old, new = days.run(before), trial.run(after)
-    if old is None or new is None:
-        return None
-    skill = freerun.skill(old, new)
-    # A few held-out days say how much, all others whether: both models had as many parameters to fit to them.
-    falls = _falls(_errors(days, before.posterior.values, knowledge), _errors(trial, after.posterior.values, knowledge))
-    draws = falls[rng.integers(0, len(falls), size=(rules.bootstrap_draws, len(falls)))].mean(axis=1)
-    p_value = float((1.0 + np.sum(draws <= 0.0)) / (1.0 + len(draws)))
-    share = _share(days, trial, after, knowledge, rules)
-    if skill < rules.clear_skill or p_value > rules.largest_actuator_p or share.low <= 0.0:
-        return None
-    bare = days.run(after)
-    moved = 0.0 if bare is None else freerun.effect_to_noise(bare, new)
-    return Replaced(name, share, skill, p_value, moved)
-
-
-def _falls(before: Floats, after: Floats) -> Floats:
-    """Return the fall of the squared error of every day run, (r,)."""
-    falls: Floats = np.sum(before**2 - after**2, axis=(0, 2))
-    return falls
-
-
-def _share(days: LogDays, trial: LogDays, stage: Stage, knowledge: Knowledge, rules: DecisionRules) -> Interval:
-    """Return the share of a course that explains most, by least squares, with the scatter of days as its error."""
-    without = _errors(days, stage.posterior.values, knowledge)
-    moved = without - _errors(trial, stage.posterior.values, knowledge)
-    score, curvature = (np.sum(moved * part, axis=(0, 2)) for part in (without, moved))
-    value = float(score.sum() / max(curvature.sum(), 1e-12))
-    scatter = float(np.sqrt(np.sum((score - value * curvature) ** 2)) / max(curvature.sum(), 1e-12))
-    reach = normal_quantile(rules) * rules.deviation_inflation * scatter
-    return Interval(value, value - reach, value + reach, "1")
+    stood_still = float(1.0 / (1.0 + np.exp(share.log_odds)))
+    moved = freerun.effect_to_noise(bare, new)
+    return Replaced(name, share.interval(rules), freerun.skill(old, new), stood_still, moved)

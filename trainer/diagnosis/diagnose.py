@@ -84,7 +84,7 @@ def diagnose(
     say("completing the log")
     knowledge = knowledge_of(model, site, rules)
     logged, rng = log_days(log, model), np.random.default_rng(seed)
-    completed = complete(log, logged, model, knowledge, rules, rng)
+    completed = complete(log, logged, model, knowledge, rules)
     days, opened = completed.days, under_open_vents(logged.record, rules)
     off = opened is not None and opened.is_offset(rules)
     hidden = frozenset(without) | (frozenset({"co2_drift"}) if off else frozenset())

@@ -55,7 +55,7 @@ def estimate(found: Round, rng: np.random.Generator) -> Estimated | None:
     design, null, hypothesis = found.design, found.null, found.cause.hypothesis
     gain = found.named.solution.gain - null.solution.gain
     (amplitude,) = found.named.amplitudes.tolist()
-    reach = _reach(design.rules) * _deviation(design, found.named)
+    reach = _reach(design.rules) * linear.deviation_by_day(design.grams, found.named)
     onset = _onset(design, null, hypothesis)
     shape = _shape(design, null, hypothesis)
     return Estimated(
@@ -131,18 +131,6 @@ def _shift(design: Design, null: Fit, named: Fit) -> dict[str, float]:
     count = len(design.block("parameter"))
     change = named.solution.coefficients[:count] - null.solution.coefficients[:count]
     return dict(zip(design.prior.names, change.tolist(), strict=True))
-
-
-def _deviation(design: Design, fit: Fit) -> float:
-    """Return the standard deviation of the last term's amplitude, from the scatter of its day scores if that is larger.
-
-    The sandwich estimator (White 1982, Econometrica 50, 1-25) over days.
-    """
-    days = np.flatnonzero(design.grams.fit)
-    coefficients = np.concatenate([[1.0], fit.solution.coefficients])
-    influence = fit.products[days][:, 1:, :] @ coefficients @ fit.solution.inverse[-1]
-    scatter = float(np.sqrt(np.sum((influence - influence.mean()) ** 2) * len(days) / max(len(days) - 1, 1)))
-    return max(float(fit.deviations[-1]), scatter)
 
 
 def _shape(design: Design, null: Fit, hypothesis: Hypothesis) -> dict[str, float]:

@@ -166,3 +166,15 @@ def fit(grams: DailyGrams, model: LinearModel) -> Fit:
     total[0, :] += pull
     total[:, 0] += pull
     return Fit(model, solve(total, precision), products)
+
+
+def deviation_by_day(grams: DailyGrams, fitted: Fit) -> float:
+    """Return the standard deviation of the last term's amplitude, from the scatter of its day scores if that is larger.
+
+    The sandwich estimator (White 1982, Econometrica 50, 1-25) over days.
+    """
+    days = np.flatnonzero(grams.fit)
+    coefficients = np.concatenate([[1.0], fitted.solution.coefficients])
+    influence = fitted.products[days][:, 1:, :] @ coefficients @ fitted.solution.inverse[-1]
+    scatter = float(np.sqrt(np.sum((influence - influence.mean()) ** 2) * len(days) / max(len(days) - 1, 1)))
+    return max(float(fitted.deviations[-1]), scatter)

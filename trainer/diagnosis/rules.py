@@ -129,7 +129,9 @@ class DecisionRules:
     further_skill: float = _chosen(0.03, "share that a second or third cause must remove")
     further_bootstrap_p: float = _chosen(0.2, "largest bootstrap p-value of a second or third cause")
     further_gain_share: float = _chosen(0.2, "gain of a second or third cause over that of those before it")
-    largest_actuator_p: float = _chosen(0.05, "bootstrap probability that it removes none")
+    least_actuator_odds: float = _chosen(
+        3.0, "log odds that an actuator did what the rules say and did not stand still"
+    )
 
     # What a CO2 sensor must read under open vents.
     wide_open: float = _chosen(100.0, "sum of both vents in % from which on the air is as good as the outdoor air")

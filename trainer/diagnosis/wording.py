@@ -66,19 +66,23 @@ def finding(one: Estimated) -> Finding:
 def actuator(one: Replaced) -> Finding:
     """Return the finding of an actuator that the log lacks."""
     name = one.actuator.replace("_", " ")
-    share = f"{100.0 * one.share.value:.0f} % of" if abs(one.share.value - 1.0) > UNLIKE_RULE else ""
+    share = f"{100.0 * one.share.value:.0f} % of " if abs(one.share.value - 1.0) > UNLIKE_RULE else ""
+    told = (
+        f"removes {100.0 * one.skill:.0f} % of the squared error on unseen days"
+        if one.skill > 0.0
+        else "is what the errors ask for, though unseen days are predicted no better with it"
+    )
     return Finding(
         one.actuator,
         "actuator",
         MOVED_BY_SCREENS if one.actuator.endswith("screen") else MOVED_BY.get(one.actuator, ("heat", "vapour", "co2")),
         {"share": one.share},
         None,
-        one.p_value,
+        one.stood_still,
         (one.actuator,),
         (one.actuator,),
         f"log the {name}",
-        f"The log lacks the {name}; {share + ' ' if share else ''}the course that the climate computer's rules give it "
-        f"removes {100.0 * one.skill:.0f} % of the squared error on unseen days.",
+        f"The log lacks the {name}; {share}the course that the climate computer's rules give it {told}.",
         one.effect_to_noise,
     )
 
