@@ -139,13 +139,28 @@ class Spoil:
 
 SPOILS: Mapping[str, Spoil] = {
     "air temperature in degF": Spoil(scaled("air_temperature", 1.8, 32.0), ("fahrenheit",), ("air_temperature",)),
+    "outdoor temperature in degF": Spoil(
+        scaled("outdoor_temperature", 1.8, 32.0), ("fahrenheit",), ("outdoor_temperature",)
+    ),
+    "sky temperature in degF": Spoil(scaled("sky_temperature", 1.8, 32.0), ("fahrenheit",), ("sky_temperature",)),
+    "pipe temperature in degF": Spoil(
+        scaled("rail_pipe_temperature", 1.8, 32.0), ("fahrenheit",), ("rail_pipe_temperature",)
+    ),
     "air temperature in kelvin": Spoil(scaled("air_temperature", 1.0, 273.15), ("kelvin",), ("air_temperature",)),
     "humidity 0 to 1": Spoil(scaled("air_humidity", 0.01), ("fraction",), ("air_humidity",)),
+    "humidity outside 0 to 1": Spoil(scaled("outdoor_humidity", 0.01), ("fraction",), ("outdoor_humidity",)),
+    "CO2 outside in mg m-3": Spoil(scaled("outdoor_co2", 1.0 / 0.546), ("milligrams",), ("outdoor_co2",)),
+    "dosing in kg ha-1 h-1": Spoil(scaled("co2_dosing", 1e4), ("dose",), ("co2_dosing",)),
+    "screen 0 to 1": Spoil(scaled("energy_screen", 0.01), ("fraction",), ("energy_screen",)),
+    "vents 0 to 1": Spoil(scaled("vent_lee", 0.01), ("fraction",), ("vent_lee",)),
     "CO2 in %": Spoil(scaled("air_co2", 1e-4), ("percent",), ("air_co2",)),
     "radiation in J cm-2 a row": Spoil(scaled("global_radiation", 0.03), ("radiation_unit",), ("global_radiation",)),
     "radiation in klux": Spoil(scaled("global_radiation", 0.115), ("radiation_unit",), ("global_radiation",)),
     "radiation as PAR": Spoil(scaled("global_radiation", 2.05), ("radiation_unit",), ("global_radiation",)),
     "radiation as a sum of the day": Spoil(summed, ("radiation_sum",), ("global_radiation",)),
+    "radiation in J cm-2 an hour": Spoil(scaled("global_radiation", 0.36), ("radiation_unit",), ("global_radiation",)),
+    "wind in mph": Spoil(scaled("wind_speed", 1.0 / 0.44704), ("kilometres_per_hour",), ("wind_speed",)),
+    "wind in knots": Spoil(scaled("wind_speed", 1.0 / 0.514444), ("kilometres_per_hour",), ("wind_speed",)),
     "wind in km/h": Spoil(scaled("wind_speed", 3.6), ("kilometres_per_hour",), ("wind_speed",)),
     "energy screen the other way round": Spoil(
         scaled("energy_screen", -1.0, 100.0), ("screen_reversed",), ("energy_screen",)

@@ -122,6 +122,33 @@ def test_a_unit_that_the_user_gives_is_not_taken_for_another(tmp_path: Path, log
     np.testing.assert_allclose(read_log(tmp_path / "export.csv").telemetry["outdoor_temperature"], raw, atol=0.01)
 
 
+@pytest.mark.parametrize("outside", ["outdoor_temperature", "Outside Temp"])
+def test_of_one_column_in_degf_the_others_are_no_less_themselves(
+    tmp_path: Path, log: Telemetry, capsys, outside: str
+) -> None:
+    """Its place tells the one; what is 20 in a greenhouse is never degF, and no wind is in mph for its sake."""
+    names = ("time", "air_temperature", "air_humidity", "air_co2", outside, "global_radiation", "wind_speed")
+    frame = written(log, names, "%Y-%m-%d %H:%M:%S+00:00", "UTC")
+    frame[outside] = degrees_fahrenheit(frame[outside] + 8.0)
+    frame.to_csv(tmp_path / "export.csv", index=False)
+    assert imported(tmp_path) == 0
+    assert "so it is in degF" in capsys.readouterr().out
+    assert_reads_as(tmp_path, log.with_columns({"outdoor_temperature": log["outdoor_temperature"] + 8.0}))
+
+
+def test_wind_that_is_no_metres_a_second_may_be_told_in_mph(tmp_path: Path, log: Telemetry, capsys) -> None:
+    stormy = log.with_columns({"wind_speed": log["wind_speed"] * 1.8})
+    frame = written(
+        stormy, ("Time", "Air temp (C)", "RH (%)", "CO2", "Outside temp (C)", "Radiation (W/m2)", "Wind speed")
+    )
+    frame["Wind speed"] /= 0.44704
+    frame.to_csv(tmp_path / "export.csv", index=False)
+    assert imported(tmp_path) == 0
+    assert "taken for km/h (--unit wind_speed=mph or knots says otherwise)" in capsys.readouterr().out
+    assert imported(tmp_path, "--force", "--unit", "wind_speed=mph") == 0
+    assert_reads_as(tmp_path, stormy)
+
+
 def test_units_behind_the_numbers_count(tmp_path: Path, log: Telemetry) -> None:
     names = ("Time", "Greenhouse temp", "Greenhouse RH", "CO2", "Outside temp", "Solar radiation", "Wind speed")
     frame = _american(log, names)

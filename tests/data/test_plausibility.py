@@ -17,6 +17,7 @@ from igrow.trainer.data.export import read
 from igrow.trainer.data.grid import own_step
 from igrow.trainer.data.mapping import ExportMapping
 from igrow.trainer.data.plausibility import find_faults
+from igrow.trainer.data.plausibility.relations import units_by_relation
 from igrow.trainer.data.plausibility.sums import running_sum
 from igrow.trainer.data.rows import merge
 from tests.virtual_log import virtual_log
@@ -26,7 +27,10 @@ SITE = Site(name="virtual", latitude=52.0, longitude=4.5, time_zone="Europe/Amst
 
 @pytest.fixture(scope="module")
 def clean() -> Clean:
-    return Clean("virtual", SITE, virtual_log(20, seed=5))
+    """Weeks of wind, with vents that open: of vents that never pass 30 % nobody knows what 0.3 means."""
+    table = virtual_log(20, seed=5)
+    more = {"wind_speed": table["wind_speed"] * 1.6, "vent_lee": table["vent_lee"] * 8.0}
+    return Clean("virtual", SITE, table.with_columns(more))
 
 
 def test_a_clean_log_passes_at_every_pace(clean: Clean) -> None:
@@ -44,7 +48,21 @@ def test_a_fault_is_named_as_what_it_is_with_its_mend(clean: Clean, name: str) -
 
 
 @pytest.mark.parametrize(
-    "name", ["air temperature in degF", "air temperature in kelvin", "humidity 0 to 1", "CO2 in %", "wind in km/h"]
+    "name",
+    [
+        "air temperature in degF",
+        "outdoor temperature in degF",
+        "sky temperature in degF",
+        "pipe temperature in degF",
+        "air temperature in kelvin",
+        "humidity 0 to 1",
+        "humidity outside 0 to 1",
+        "CO2 in %",
+        "CO2 outside in mg m-3",
+        "screen 0 to 1",
+        "vents 0 to 1",
+        "wind in km/h",
+    ],
 )
 def test_a_certain_remedy_gives_the_log_back(clean: Clean, name: str) -> None:
     spoilt = SPOILS[name].spoilt(clean)
@@ -52,6 +70,36 @@ def test_a_certain_remedy_gives_the_log_back(clean: Clean, name: str) -> None:
     assert fault.remedy is not None
     mended = spoilt[fault.quantity] * fault.remedy.scale + fault.remedy.offset
     np.testing.assert_allclose(mended, clean.telemetry[fault.quantity], rtol=1e-6, atol=1e-6)
+
+
+def test_warm_weather_is_no_fahrenheit_where_it_is_warm(clean: Clean) -> None:
+    """41 degC outside at noon and 33 in the median is a July in Riyadh, and no February in the Netherlands."""
+    table = clean.telemetry
+    hot = table.with_columns({"outdoor_temperature": table["outdoor_temperature"] + 26.0})
+    summer = Telemetry(hot.time + np.timedelta64(150, "D"), hot.columns)
+    assert [fault.quantity for fault in units_by_relation(hot, SITE)] == ["outdoor_temperature"]
+    assert units_by_relation(summer, Site(name="riyadh", latitude=24.7, longitude=46.7)) == []
+
+
+def test_the_weather_in_the_place_of_the_air_is_no_fahrenheit(clean: Clean) -> None:
+    exchanged = SPOILS["inside and outside exchanged"].spoilt(clean)
+    assert "fahrenheit" not in {fault.kind for fault in find_faults(exchanged, SITE)}
+
+
+def test_grams_a_cubic_metre_outside_are_no_per_cent(clean: Clean) -> None:
+    table = clean.telemetry
+    warmth = table["outdoor_temperature"]
+    grams = np.asarray(0.8 * 5.0 * np.exp(0.065 * warmth), dtype=np.float64)
+    (fault,) = find_faults(table.with_columns({"outdoor_humidity": grams}), SITE)
+    assert (fault.kind, fault.quantity) == ("absolute_humidity", "outdoor_humidity")
+    desert = 30.0 - warmth
+    assert find_faults(table.with_columns({"outdoor_humidity": desert}), SITE) == ()
+
+
+def test_lamps_that_only_burn_or_not_are_no_power(clean: Clean) -> None:
+    burning = clean.telemetry.with_columns({"lamp_power": np.where(clean.telemetry["lamp_power"] > 1.0, 1.0, 0.0)})
+    (fault,) = find_faults(burning, SITE)
+    assert (fault.kind, fault.quantity) == ("fraction", "lamp_power")
 
 
 def test_a_sum_of_radiation_names_its_unit(clean: Clean) -> None:

@@ -12,7 +12,7 @@ from igrow.core.site import Site
 from igrow.trainer.data import export
 from igrow.trainer.data.fault import DataFault
 from igrow.trainer.data.importing.proposal import Proposal
-from igrow.trainer.data.importing.told_units import like_the_others
+from igrow.trainer.data.importing.told_units import BY_SIZE, like_the_others
 from igrow.trainer.data.importing.zone import fixed
 from igrow.trainer.data.mapping import ColumnMapping, ExportMapping
 from igrow.trainer.data.plausibility import find_faults
@@ -48,7 +48,7 @@ def check(proposal: Proposal, site: Site | None) -> Checked:
         merged = export.read_tables(proposal.tables, mapping)
         faults = (*merged.faults, *find_faults(merged.telemetry, site))
         better = _on_another_clock(proposal, mapping, faults, site, mended) or _remedied(
-            mapping, faults, proposal.units, mended
+            mapping, faults, proposal, mended
         )
         if better is None:
             break
@@ -100,18 +100,24 @@ def _candidates(site: Site, merged: Merged) -> list[str]:
 
 
 def _remedied(
-    mapping: ExportMapping, faults: Sequence[DataFault], units: Mapping[str, str], mended: list[str]
+    mapping: ExportMapping, faults: Sequence[DataFault], proposal: Proposal, mended: list[str]
 ) -> ExportMapping | None:
-    """Return the mapping with every certain remedy in it, or None where there is none."""
+    """Return the mapping with every certain remedy in it, or None where there is none.
+
+    What the user said of a unit stays.
+    """
+    units, faults = proposal.units, [fault for fault in faults if fault.quantity not in proposal.given]
     columns: Mapping[str, ColumnMapping] = mapping.columns
     changed = dict(columns)
-    american = next((fault for fault in faults if fault.kind == "fahrenheit" and not units.get(fault.quantity)), None)
+    fahrenheit = {fault.quantity for fault in faults if fault.kind == "fahrenheit" and not units.get(fault.quantity)}
+    american = next((name for name in BY_SIZE if name in fahrenheit), None)
     if american is not None:
-        faulty = {fault.quantity: "told" for fault in faults if fault.kind != "kilometres_per_hour"}
-        changed, _, notes = like_the_others(changed, {**units, **faulty}, american.quantity)
+        faulty = {one.quantity: "told" for one in faults if one.kind not in ("kilometres_per_hour", "fahrenheit")}
+        changed, _, notes = like_the_others(changed, {**units, **faulty}, american)
         mended += notes
+    like_the_air = {name for name, rule in changed.items() if rule != columns[name]}
     for fault in faults:
-        if fault.kind == "kilometres_per_hour" and american is not None and not units.get(fault.quantity):
+        if fault.quantity in like_the_air:
             continue
         if fault.kind == "swapped_columns":
             one, other = fault.quantity.split(", ")
@@ -127,5 +133,6 @@ def _remedied(
             )
         else:
             continue
-        mended.append(fault.sentence)
+        choice = " (--unit wind_speed=mph or knots says otherwise)" if fault.kind == "kilometres_per_hour" else ""
+        mended.append(fault.sentence + choice)
     return replace(mapping, columns=changed) if changed != dict(columns) else None

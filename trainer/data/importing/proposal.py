@@ -41,6 +41,8 @@ class Proposal:
     """Of the file and of further ones."""
     units: Mapping[str, str]
     """Quantity -> the unit that its column is taken to be in; empty where nothing tells it."""
+    given: frozenset[str]
+    """Quantities whose unit the user gave."""
     unused: tuple[str, ...]
     notes: tuple[str, ...]
     questions: tuple[Question, ...]
@@ -137,7 +139,17 @@ def propose(
     )
     read = {one for rule in mapped.values() for one in (rule.column, *rule.add)}
     unused = tuple(name for name in labels if name not in read and name not in only)
-    return Proposal(path, layout, mapping, tuple(tables), units, unused, tuple(draft.notes), tuple(draft.questions))
+    return Proposal(
+        path,
+        layout,
+        mapping,
+        tuple(tables),
+        units,
+        frozenset(answers.units),
+        unused,
+        tuple(draft.notes),
+        tuple(draft.questions),
+    )
 
 
 def _unit_line(

@@ -16,6 +16,8 @@ from igrow.trainer.data.vocabulary import Unit
 
 _AMERICAN = {"temperature": "degF", "speed": "mph"}
 """By dimension, what goes with degrees Fahrenheit."""
+BY_SIZE = ("air_temperature", "heating_setpoint", "rail_pipe_temperature", "grow_pipe_temperature")
+"""Temperatures of the greenhouse, whose own size tells degF: what is 20 there is never degF, whatever stands beside."""
 
 
 def unit_of_cells(quantity: str, behind: str) -> Unit | None:
@@ -31,7 +33,7 @@ def like_the_others(
     Args:
         rules: of the quantities, by name.
         units: quantity -> its unit; empty where nothing tells it.
-        certain: a temperature that is in degF by its size; None: what the units tell counts.
+        certain: a temperature of the greenhouse that is in degF by its size; None: what the units tell counts.
 
     Returns:
         The rules and units, changed, and what was changed in sentences.
@@ -42,7 +44,7 @@ def like_the_others(
     for name, rule in rules.items():
         american = _AMERICAN.get(names.dimension(name))
         untouched = replace(rule, column="", add=()) == ColumnMapping("")
-        if witness is None or american is None or units.get(name) or name == certain or not untouched:
+        if witness is None or american is None or units.get(name) or name in BY_SIZE or not untouched:
             continue
         unit = names.unit_called(name, american)
         changed[name] = replace(rule, scale=unit.scale, offset=unit.offset)

@@ -10,6 +10,7 @@ from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data.fault import DataFault
 from igrow.trainer.data.plausibility import columns, order, sums, sunlight, units
+from igrow.trainer.data.plausibility.relations import units_by_relation
 
 
 def find_faults(telemetry: Telemetry, site: Site | None = None) -> tuple[DataFault, ...]:
@@ -26,7 +27,9 @@ def find_faults(telemetry: Telemetry, site: Site | None = None) -> tuple[DataFau
     if shuffled:
         return shuffled
     wrong = units.wrong_units(telemetry)
-    swapped = columns.swapped(telemetry, site, {fault.quantity for fault in wrong})
+    by_size = {fault.quantity for fault in wrong}
+    swapped = columns.swapped(telemetry, site, by_size)
+    wrong += [fault for fault in units_by_relation(telemetry, site) if fault.quantity not in by_size]
     taken = {name for fault in swapped for name in fault.quantity.split(", ")}
     found = [*swapped, *(fault for fault in wrong if fault.quantity not in taken), *sums.summed_rates(telemetry)]
     if site is not None:

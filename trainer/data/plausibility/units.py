@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from igrow.core.quantities import QUANTITIES
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data.fault import DataFault, Remedy
 
@@ -22,7 +23,8 @@ HOTTEST_MEDIAN = 42.0
 """degC: no greenhouse and no place on earth has a higher median."""
 LEAST_VALUES = 24
 
-_FAHRENHEIT = Remedy(5.0 / 9.0, -160.0 / 9.0)
+RELATIVE_IN_PER_CENT = "take the column of relative humidity in %, not g m-3 or kPa"
+FAHRENHEIT = Remedy(5.0 / 9.0, -160.0 / 9.0)
 _KELVIN = Remedy(1.0, -273.15)
 
 
@@ -35,6 +37,8 @@ def wrong_units(telemetry: Telemetry) -> list[DataFault]:
         POSITIONS: _position,
         CARBON: _carbon_dioxide,
         ("wind_speed",): _wind,
+        ("co2_dosing",): _dose,
+        ("lamp_power",): _power,
         ("lamp_on", "irrigation_on", "rain"): _switch,
     }
     found = []
@@ -48,7 +52,8 @@ def wrong_units(telemetry: Telemetry) -> list[DataFault]:
     return found
 
 
-def _changed(name: str, remedy: Remedy) -> str:
+def changed(name: str, remedy: Remedy) -> str:
+    """Return the mend of a column of which scale and offset alone are wrong."""
     return f"in the mapping: {name}: {{column: ..., scale: {remedy.scale:.7g}, offset: {remedy.offset:.7g}}}"
 
 
@@ -56,14 +61,14 @@ def _temperature(name: str, values: Floats) -> DataFault | None:
     low, middle, high = (float(one) for one in np.quantile(values, (0.05, 0.5, 0.95)))
     seen = f"{name} has a median of {middle:.4g}"
     if low > 233.0 and high < 333.0 and high - low < 70.0:
-        return DataFault("kelvin", name, f"{seen}, so it is in kelvin", _changed(name, _KELVIN), _KELVIN)
+        return DataFault("kelvin", name, f"{seen}, so it is in kelvin", changed(name, _KELVIN), _KELVIN)
     if middle <= HOTTEST_MEDIAN:
         return None
     if high < 140.0:
-        return DataFault("fahrenheit", name, f"{seen}, so it is in degF", _changed(name, _FAHRENHEIT), _FAHRENHEIT)
+        return DataFault("fahrenheit", name, f"{seen}, so it is in degF", changed(name, FAHRENHEIT), FAHRENHEIT)
     if high < 600.0:
         tenths = Remedy(0.1)
-        return DataFault("tenths", name, f"{seen}, so it is in tenths of degC", _changed(name, tenths), tenths)
+        return DataFault("tenths", name, f"{seen}, so it is in tenths of degC", changed(name, tenths), tenths)
     return DataFault("no_temperature", name, f"{seen} and is no temperature", "name its column anew (--column)")
 
 
@@ -74,12 +79,12 @@ def _pipe(name: str, values: Floats) -> DataFault | None:
     low, high = (float(one) for one in np.quantile(warm, (0.02, 0.98)))
     if low > 270.0 and high < 383.0:
         return DataFault(
-            "kelvin", name, f"{name} lies above {low:.0f}, so it is in kelvin", _changed(name, _KELVIN), _KELVIN
+            "kelvin", name, f"{name} lies above {low:.0f}, so it is in kelvin", changed(name, _KELVIN), _KELVIN
         )
     # A pipe at rest is as warm as its greenhouse: never below 50 in degF, hardly above 40 in degC.
     if low > 48.0 and 100.0 < high < 240.0:
         seen = f"{name} lies between {low:.0f} and {high:.0f}, so it is in degF"
-        return DataFault("fahrenheit", name, seen, _changed(name, _FAHRENHEIT), _FAHRENHEIT)
+        return DataFault("fahrenheit", name, seen, changed(name, FAHRENHEIT), FAHRENHEIT)
     return None
 
 
@@ -88,10 +93,10 @@ def _humidity(name: str, values: Floats) -> DataFault | None:
     if high <= 1.05 and middle > 0.1:
         percent = Remedy(100.0)
         seen = f"{name} lies between 0 and 1 (median {middle:.2f}), so it is a fraction"
-        return DataFault("fraction", name, seen, _changed(name, percent), percent)
+        return DataFault("fraction", name, seen, changed(name, percent), percent)
     if name == "air_humidity" and middle < 25.0 and high < 45.0:
         seen = f"{name} has a median of {middle:.3g} and hardly exceeds {high:.3g}: no greenhouse is so dry"
-        return DataFault("absolute_humidity", name, seen, "take the column of relative humidity in %, not g m-3 or kPa")
+        return DataFault("absolute_humidity", name, seen, RELATIVE_IN_PER_CENT)
     return None
 
 
@@ -102,7 +107,7 @@ def _position(name: str, values: Floats) -> DataFault | None:
     if 0.3 < top <= 1.001 and (len(between) >= 15 or (values > 0.9).mean() > 0.05):
         percent = Remedy(100.0)
         seen = f"{name} never exceeds {top:.2g}, so it is a fraction"
-        return DataFault("fraction", name, seen, _changed(name, percent), percent)
+        return DataFault("fraction", name, seen, changed(name, percent), percent)
     return None
 
 
@@ -111,7 +116,7 @@ def _carbon_dioxide(name: str, values: Floats) -> DataFault | None:
     if 0.02 < middle < 0.6:
         parts = Remedy(10_000.0)
         return DataFault(
-            "percent", name, f"{name} has a median of {middle:.3g}, so it is in %", _changed(name, parts), parts
+            "percent", name, f"{name} has a median of {middle:.3g}, so it is in %", changed(name, parts), parts
         )
     return None
 
@@ -120,8 +125,38 @@ def _wind(name: str, values: Floats) -> DataFault | None:
     middle, high = (float(one) for one in np.quantile(values, (0.5, 0.99)))
     if middle > 14.0 or high > 27.0:
         metres = Remedy(1.0 / 3.6)
-        seen = f"{name} has a median of {middle:.3g} and a highest of {high:.3g}, so it is in km/h (or mph)"
-        return DataFault("kilometres_per_hour", name, seen, _changed(name, metres), metres)
+        seen = f"{name} has a median of {middle:.3g} and a highest of {high:.3g}, so it is no m s-1; taken for km/h"
+        mend = f"{changed(name, metres)}; scale: 0.44704 for mph, 0.514444 for knots"
+        return DataFault("kilometres_per_hour", name, seen, mend, metres)
+    return None
+
+
+def _dose(name: str, values: Floats) -> DataFault | None:
+    """Judge the rate while something is dosed; hardly anybody doses less than 10 or more than 400 kg ha-1 h-1."""
+    dosed = values[values > 0.0]
+    if len(dosed) < LEAST_VALUES or float(np.median(dosed)) <= QUANTITIES[name].high:
+        return None
+    middle = float(np.median(dosed))
+    possible = {
+        unit: scale
+        for unit, scale in (("kg ha-1 h-1", 1e-4), ("g m-2 h-1", 1e-3))
+        if 10.0 <= middle * scale * 1e4 <= 400.0
+    }
+    seen = f"{name} has a median of {middle:.3g} while it doses, more than any greenhouse in kg m-2 h-1"
+    if not possible:
+        return DataFault("dose", name, seen, "give its scale in the mapping")
+    mend = " or ".join(
+        f"in {unit}, then {{amount: {Remedy().amount}, scale: {scale:g}}}" for unit, scale in possible.items()
+    )
+    only = Remedy(next(iter(possible.values()))) if len(possible) == 1 else None
+    return DataFault("dose", name, seen, f"it is {mend} in the mapping", only)
+
+
+def _power(name: str, values: Floats) -> DataFault | None:
+    top = float(values.max())
+    if 0.0 < top <= 1.001:
+        seen = f"{name} never exceeds {top:.2g}, so it tells whether lamps burn, not their W m-2"
+        return DataFault("fraction", name, seen, "take it as lamp_on, or give the lamps' W m-2 as its scale")
     return None
 
 
@@ -129,5 +164,5 @@ def _switch(name: str, values: Floats) -> DataFault | None:
     top = float(values.max())
     if 1.5 < top <= 100.5 and (values > 1.5).mean() > 0.01:
         share = Remedy(0.01)
-        return DataFault("percent", name, f"{name} reaches {top:.3g}, so it is in %", _changed(name, share), share)
+        return DataFault("percent", name, f"{name} reaches {top:.3g}, so it is in %", changed(name, share), share)
     return None
