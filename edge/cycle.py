@@ -35,11 +35,20 @@ from igrow.edge.journal import Journal
 from igrow.edge.sensors import ImageBuilder, RawReading
 from igrow.edge.setpoint_statuses import setpoint_statuses
 from igrow.edge.sources import Decision, Source, decide
-from igrow.edge.stopping import LOOK_SECONDS, STOP_SECONDS, StopReport, furthest_first, write_at_once
+from igrow.edge.stopping import (
+    LOOK_SECONDS,
+    STOP_SECONDS,
+    StopReport,
+    furthest_first,
+    look_after,
+    write_at_once,
+)
 
 MANUAL = "plc_manual"
 ASKED_AT_STOP = (MANUAL, "plc_fallback", HEARTBEAT)
 """What has to be known beside the setpoints themselves before a stop moves them."""
+MOST_WITHHELD = 2
+"""Beats in a row that wait for a reading of their register; a PLC waits for more than three."""
 
 
 class ControlCycle:
@@ -85,6 +94,7 @@ class ControlCycle:
         """Points to be read in the next cycle although they are not due, since they wait to be written."""
         self._reading: asyncio.Future[Mapping[str, RawReading]] | None = None
         self._seen = self._giving_way = False
+        self._withheld = 0
         self.unknown_until = -math.inf
         """Monotonic seconds until which it is not known what hands have set before a restart; all is left alone."""
 
@@ -144,10 +154,11 @@ class ControlCycle:
         if not self._seen:
             return StopReport(seen=False)
         outcomes = await self._stop_by(image, until)
+        unshown = await look_after(self._plc, self._writer, self._rules.points, outcomes, until)
         held = () if self._manual else tuple(sorted(self.readback.held(image.monotonic)))
         settled = {*held, *(outcome.write.point for outcome in outcomes)}
         unseen = [name for name in self._setpoints if image.value_of(name).age > 0.0 and name not in settled]
-        return StopReport.after(outcomes, by_hand=held, unseen=unseen, manual=self._manual)
+        return StopReport.after(outcomes, by_hand=held, unseen=unseen, unshown=unshown, manual=self._manual)
 
     async def _stop_by(self, image: Image, until: float) -> list[WriteOutcome]:
         """Write the guard's verdict on a stop, also to units that were silent lately."""
@@ -191,8 +202,8 @@ class ControlCycle:
         beat = image.value_of(HEARTBEAT)
         cleared = beat.value is not None and beat.age <= 0.0 and self._writer.beats.was_cleared(beat.value)
         findings = self.readback.observe(image, restarted=cleared, patient=patient)
-        if beat.age > 0.0 and self.readback.tell_a_start(findings):
-            self._writer.beats.is_cleared()
+        if self.readback.tell_a_start(findings):
+            self._writer.beats.meant_a_start(seen=beat.age <= 0.0)
         self._journal.findings(findings, self._respect_hand)
         moved, stood = moved_and_stood(findings, briefly=LONGEST_RAMP)
         self.state = go_on(begin_again(self.state, moved), stood)
@@ -289,12 +300,24 @@ class ControlCycle:
     async def _beat(self, image: Image) -> None:
         """Tell the PLC that a cycle was completed: the unit that hears it was part of the cycle."""
         error = None
-        if image.reaches(HEARTBEAT) and not self._giving_way:
+        if image.reaches(HEARTBEAT) and not self._giving_way and not self._register_is_to_be_read(image):
             error = await self._writer.heartbeat()
-            if error is None:
+            read_now = image.value_of(HEARTBEAT).age <= 0.0
+            if error is None and not (read_now and self._writer.beats.unheard):
                 self.readback.beat(image.monotonic)
-        self._journal.alarm("second gateway", self._writer.beats.problem)
+        self._journal.alarm("heartbeat register", self._writer.beats.problem)
         self._journal.alarm("heartbeat", "" if error is None else f"the heartbeat could not be written: {error}")
+
+    def _register_is_to_be_read(self, image: Image) -> bool:
+        """Tell whether a beat would wipe out what the register says of its PLC, which has just been interrupted.
+
+        It is waited for in two cycles, so that the heart beats on where the register cannot be read any more.
+        """
+        beat = image.value_of(HEARTBEAT)
+        interrupted = any(HEARTBEAT in points for points in image.interrupted.values())
+        unread = interrupted and self._writer.beats.kept and beat.quality is not Quality.MISSING and beat.age > 0.0
+        self._withheld = self._withheld + 1 if unread else 0
+        return 0 < self._withheld <= MOST_WITHHELD
 
     def _log(self, image: Image, decision: Decision, verdict: Verdict) -> None:
         if decision.source != self._source:

@@ -1,7 +1,8 @@
 """The stop: the safe setpoints within seconds, first those that stand elsewhere, and the truth about the rest.
 
 A slow PLC answers one request at a time. So nothing is asked any more once the setpoints were looked at; the writes
-leave together, each as soon as its line is free, and what was not confirmed is written again while there is time.
+leave together, each as soon as its line is free, and what was not confirmed is written again while there is time. What
+then still stands elsewhere, since the PLC takes it later or not at all, is written once more, and named.
 """
 
 from __future__ import annotations
@@ -10,14 +11,23 @@ import asyncio
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from igrow.core.quantities import with_unit
 from igrow.edge.bus.errors import BusError, RefusedError, UnitBusyError, UnknownPointError, ValueDoesNotFitError
-from igrow.edge.guard import GuardedWriter, Write, WriteOutcome
+from igrow.edge.cycle_result import ReadablePlc
+from igrow.edge.guard import GuardedWriter, PointRule, Write, WriteOutcome
+from igrow.edge.guard.answers import takes
 
 STOP_SECONDS = 10.0
 """Longest time that the safe setpoints may take on the way out."""
 LOOK_SECONDS = 3.8
 """How much of that the look at the setpoints may take: a hand may have been there since the last cycle. Three answers
 of a PLC that needs 1.2 s for each; four writes then fit in behind it."""
+LOOKS_AFTER = 3
+"""How often it is looked whether what was written stands there."""
+BETWEEN_LOOKS = 1.0
+"""Seconds for a PLC that takes what is written in its next scan."""
+SPARE_SECONDS = 0.5
+"""What the looks leave of the time of the stop."""
 ROUNDS = 3
 """How often a write is sent at the most that nobody has confirmed."""
 BETWEEN_ROUNDS = 0.3
@@ -46,10 +56,17 @@ class StopReport:
     """By point: why its safe value was not written, or not confirmed."""
     unseen: tuple[str, ...] = ()
     """The points that stood at their safe value when they were last seen, and could not be looked at now."""
+    unshown: Mapping[str, float] = field(default_factory=dict)
+    """By point: what the PLC shows although it has confirmed the safe value."""
 
     @staticmethod
     def after(
-        outcomes: Sequence[WriteOutcome], *, by_hand: Sequence[str], unseen: Sequence[str], manual: bool
+        outcomes: Sequence[WriteOutcome],
+        *,
+        by_hand: Sequence[str],
+        unseen: Sequence[str],
+        unshown: Mapping[str, float],
+        manual: bool,
     ) -> StopReport:
         """Return the report on what became of the writes of a stop."""
         return StopReport(
@@ -57,6 +74,7 @@ class StopReport:
             manual=manual,
             by_hand=tuple(by_hand),
             unseen=tuple(unseen),
+            unshown=unshown,
             written={o.write.point: o.write.value for o in outcomes if o.error is None},
             failed={o.write.point: str(o.error) for o in outcomes if o.error is not None},
         )
@@ -70,6 +88,8 @@ class StopReport:
         notes = f", but for {', '.join(self.by_hand)}, which a hand has set" if self.by_hand else ""
         if self.unseen:
             notes += f"; {', '.join(self.unseen)} stood there already when last seen, and cannot be looked at now"
+        for name, shown in self.unshown.items():
+            notes += f"; {name} was taken, but the PLC still shows {with_unit(name, shown)}"
         if not self.failed:
             return f"the safe setpoints were written{notes}"
         begin = (
@@ -104,6 +124,38 @@ async def write_at_once(writer: GuardedWriter, writes: Sequence[Write], seconds:
         outcomes |= await _one_round(writer, pending, until - loop.time(), seconds)
         pending = [write for write in pending if _worth_another_try(outcomes[write.point])]
     return [outcomes[write.point] for write in writes if write.point in outcomes]
+
+
+async def look_after(
+    plc: ReadablePlc,
+    writer: GuardedWriter,
+    rules: Mapping[str, PointRule],
+    outcomes: Sequence[WriteOutcome],
+    until: float,
+) -> dict[str, float]:
+    """Return what the PLC shows elsewhere than where it confirmed a write, after one more try.
+
+    `until` is when the stop has to be over, on the loop's clock. What cannot be read is left out.
+    """
+    loop, unshown = asyncio.get_running_loop(), dict[str, float]()
+    asked = {outcome.write.point: outcome.write for outcome in outcomes if outcome.error is None}
+    until -= SPARE_SECONDS
+    for attempt in range(LOOKS_AFTER):
+        if attempt:
+            await asyncio.sleep(max(0.0, min(BETWEEN_LOOKS, until - loop.time())))
+            await write_at_once(writer, [asked[name] for name in unshown], until - loop.time())
+        try:
+            async with asyncio.timeout_at(until):
+                readings = await plc.read(sorted(asked))
+        except TimeoutError:
+            break
+        shown = {name: reading.value for name, reading in readings.items() if reading.value is not None}
+        right = {name for name, value in shown.items() if takes(rules[name], asked[name].value, value)}
+        asked = {name: write for name, write in asked.items() if name not in right}
+        unshown = {name: value for name, value in {**unshown, **shown}.items() if name not in right}
+        if not asked:
+            break
+    return unshown
 
 
 async def _one_round(

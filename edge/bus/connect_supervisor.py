@@ -34,8 +34,8 @@ class ConnectSupervisor:
     """Opens the line, waits until it is lost, opens it again.
 
     The wait between attempts doubles from `first_wait` to `longest_wait`; a line that held for `settled` seconds
-    is opened again at once, one that broke sooner counts as a failed attempt, so that a server which accepts
-    and hangs up is not stormed.
+    or on which a unit answered, is opened again at once; one that broke sooner counts as a failed attempt, so that a
+    server which accepts and hangs up is not stormed.
     """
 
     def __init__(
@@ -57,6 +57,7 @@ class ConnectSupervisor:
         self._lost = asyncio.Event()
         self._attempt_over = asyncio.Event()
         self._hurried = asyncio.Event()
+        self._served = False
         self._task: asyncio.Task[None] | None = None
         self.connects = 0
         """How often the line came up."""
@@ -68,7 +69,12 @@ class ConnectSupervisor:
 
     def lost(self) -> None:
         """Hear from the line that it is gone."""
+        self._attempt_over.clear()
         self._lost.set()
+
+    def served(self) -> None:
+        """Hear that a unit has answered on the line."""
+        self._served = True
 
     def hurry(self) -> None:
         """Do not wait for the next attempt to connect, this once."""
@@ -104,7 +110,7 @@ class ConnectSupervisor:
                     complained = str(error)
                 wait = min(max(2 * wait, self._first_wait), self._longest_wait)
             else:
-                since = self._monotonic()
+                since, self._served = self._monotonic(), False
                 self.connects += 1
                 _log.info("bus %s: connected", self._name)
                 complained = ""
@@ -112,10 +118,13 @@ class ConnectSupervisor:
                 await self._lost.wait()
                 held = self._monotonic() - since
                 _log.warning("bus %s: the line was lost after %.0f s", self._name, held)
-                held_long = held >= self._settled
-                wait = 0.0 if held_long else min(max(2 * wait, self._first_wait), self._longest_wait)
-            self._attempt_over.set()
+                wait = (
+                    0.0
+                    if held >= self._settled or self._served
+                    else min(max(2 * wait, self._first_wait), self._longest_wait)
+                )
             if wait > 0:
+                self._attempt_over.set()
                 with contextlib.suppress(TimeoutError):
                     await asyncio.wait_for(self._hurried.wait(), wait)
                 self._hurried.clear()

@@ -163,6 +163,7 @@ class ModbusBus:
         return result
 
     def _answered(self, device_id: int) -> None:
+        self._supervisor.served()
         self.health.answered(device_id)
         self._silences = 0
 

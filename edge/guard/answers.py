@@ -36,6 +36,11 @@ def rounds(rule: PointRule, written: float, shown: float) -> bool:
     )
 
 
+def takes(rule: PointRule, written: float, shown: float) -> bool:
+    """Tell whether `shown` is the value that was written, as this register or this device holds it."""
+    return matches(rule, shown, written) or rounds(rule, written, shown)
+
+
 def on_the_way(rule: PointRule, before: float, written: float, shown: float) -> bool:
     """Tell whether `shown` lies between what stood before and what was written: a ramp, or a limit of the device."""
     if matches(rule, shown, before):

@@ -19,7 +19,7 @@ import math
 from collections.abc import Collection, Iterator, Mapping
 
 from igrow.core.quantities import with_unit
-from igrow.edge.guard.answers import matches
+from igrow.edge.guard.answers import matches, on_the_way
 from igrow.edge.guard.causes import FALLBACK, Causes
 from igrow.edge.guard.evidence import Questions, disturbed
 from igrow.edge.guard.findings import Finding, Hand, Outcome, Problem
@@ -161,6 +161,13 @@ class Readback:
         findings.extend(self._ended(now))
         return findings
 
+    def _passes(self, name: str, shown: float) -> bool:
+        """Tell whether a point may only pass its safe value, on its way to what was written."""
+        memory = self.points[name]
+        if not memory.sent or memory.stands is None:
+            return False
+        return on_the_way(self._rules[name], memory.stands, memory.sent[-1].value, shown)
+
     def _decided(self, looks: Mapping[str, Look]) -> dict[str, Look]:
         """Return the looks at setpoints; what the PLC moves by itself is no question."""
         return {name: look for name, look in looks.items() if self._rules[name].decided}
@@ -232,6 +239,8 @@ class Readback:
             else:
                 outcome = Outcome.BY_HAND
                 memory.hand, memory.held_until = look.shown, image.monotonic + self._respect_hand
+            coming = memory.sent if outcome is Outcome.FALLBACK and self._passes(name, look.shown) else []
             memory.found(look.shown)
+            memory.sent = coming
             memory.problem = Problem(text) if text else None
             yield Finding(name, outcome, expected, look.shown, source, text, look.since)

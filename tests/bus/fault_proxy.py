@@ -100,6 +100,8 @@ class FaultProxy:
         """Seconds that each answer takes, one after the other."""
         self.refuses_truly = False
         """A write that is answered with an exception was not done; else the exception takes the place of its echo."""
+        self.most_requests: int | None = None
+        """It hangs up when it has answered so many on one connection."""
         self.storm = 0
         """How many of the next connections are hung up on at once."""
         self.old_answers: list[Frame] = []
@@ -145,6 +147,7 @@ class _Front(asyncio.Protocol):
     def __init__(self, proxy: FaultProxy) -> None:
         self.proxy = proxy
         self.received = b""
+        self.answers = 0
         self.pending: list[Fault] = []
         self.back: asyncio.Transport | None = None
         self.unsent = b""
@@ -216,6 +219,9 @@ class _Front(asyncio.Protocol):
             transport = self.proxy.newest  # a converter hands what the line says to whoever is connected
         if not transport.is_closing():
             transport.write(data)
+        self.answers += 1
+        if self.answers == self.proxy.most_requests:
+            self.transport.close()
 
     def answer(self, frame: Frame) -> None:
         fault = self.pending.pop(0) if self.pending else Fault.NONE

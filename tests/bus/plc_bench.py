@@ -98,6 +98,11 @@ class RecordingUnit(DeviceMemory):
                 if name in self.makes:
                     self.set_value(name, self.makes[name](value))
 
+    def beaten_at(self) -> float | None:
+        """Return when the heartbeat last changed; None before it ever did."""
+        beats = self.received.get("heartbeat")
+        return beats[-1][0] if beats else None
+
 
 class LoopClock(SystemClock):
     """The simulated loop's time, with a date that may be wrong by `ahead` seconds."""
@@ -182,10 +187,11 @@ async def make_plc_bench(
     timeout: float = TIMEOUT,  # noqa: ASYNC109 - the bus'
     respect_hand: float = 0.0,
     store: MemoryStore | None = None,
+    unit: type[RecordingUnit] = RecordingUnit,
 ) -> PlcBench:
     """Put it together; the buses are being connected when this returns."""
     points = register_map(two_buses=two_buses)
-    units = {name: RecordingUnit(points, name) for name in points.devices}
+    units = {name: unit(points, name) for name in points.devices}
     clock = LoopClock()
     proxies, settings, servers = {}, {}, []
     for number, name in enumerate(("first", "second") if two_buses else ("first",)):

@@ -7,11 +7,12 @@ import asyncio
 import pytest
 
 from igrow.edge.guard import Write
-from igrow.edge.stopping import STOP_SECONDS, furthest_first
+from igrow.edge.stopping import STOP_SECONDS, StopReport, furthest_first
 from igrow.edge.virtual_plc.memory import AnswerWithExceptionError
 from tests.bus.fault_proxy import Fault
 from tests.bus.plc_bench import INTERVAL, RULES, SAFE, PlcBench, make_plc_bench
 from tests.bus.simulated_loop import run
+from tests.bus.temperaments import MoodyUnit
 from tests.control.control_fakes import FixedSource
 
 WISHES = {"heating_setpoint": 21.0, "co2_setpoint": 700.0, "lamp_on": 1.0, "irrigation_on": 0.5}
@@ -179,3 +180,35 @@ def test_the_ledger_holds_what_the_stop_wrote_and_what_it_could_not() -> None:
         assert rows["lamp_on"].reason == ""
 
     run(main())
+
+
+def moody(**temper: object) -> tuple[StopReport, float, dict[str, float | None]]:
+    async def main() -> tuple[StopReport, float, dict[str, float | None]]:
+        bench = await controlled(unit=MoodyUnit)
+        unit = bench.units["plc"]
+        for name, value in temper.items():
+            setattr(unit, name, value)
+        if "deaf_for" in temper:
+            await bench.plc.write("heating_setpoint", 20.0)
+        report, took = await bench.stop()
+        return report, took, standing(bench)
+
+    return run(main())
+
+
+def test_a_plc_that_takes_what_is_written_later_is_said_to() -> None:
+    report, took, _ = moody(takes_at=3600.0)
+    assert report.unshown == {"heating_setpoint": 21.0, "co2_setpoint": 700.0}
+    assert "heating_setpoint was taken, but the PLC still shows 21 degC" in report.words()
+    assert took < STOP_SECONDS
+
+
+def test_a_plc_on_its_way_to_the_safe_setpoint_is_said_to_be() -> None:
+    report, _, _ = moody(ramps={"heating_setpoint": 0.1})
+    assert set(report.unshown) == {"heating_setpoint"}
+
+
+def test_a_write_that_a_plc_has_confirmed_and_lost_is_sent_once_more() -> None:
+    report, _, stands = moody(deaf_for={"heating_setpoint": 1.0})
+    assert stands == SAFE
+    assert report.unshown == {}

@@ -11,6 +11,7 @@ import pytest
 from igrow.edge.bus.errors import BusError
 from igrow.edge.bus.modbus_bus import ModbusBus
 from igrow.edge.bus.protocol import Priority, ReadRequest
+from igrow.edge.image import Quality
 from igrow.edge.registers.model import BusSettings, Function, Transport
 from igrow.edge.virtual_plc.memory import AnswerWithExceptionError
 from igrow.edge.virtual_plc.modbus_server import answer
@@ -137,5 +138,59 @@ def test_a_device_with_manners_of_its_own_costs_no_more_than_the_timeout_and_is_
         await asyncio.sleep(700.0)
         assert await bus.read(request, Priority.CONTROL) == (4, 4)
         await bus.close()
+
+    run(played())
+
+
+@pytest.mark.parametrize("rtu", [False, True])
+def test_a_device_that_hangs_up_after_each_answer_is_read_and_beaten_in_every_cycle(rtu: bool) -> None:
+    async def played() -> None:
+        bench = await make_plc_bench([FixedSource(dict(WISH))], rtu=rtu, respect_hand=600.0)
+        bench.proxies["first"].most_requests = 1
+        for _ in range(10):
+            await bench.cycle.run()
+            await asyncio.sleep(INTERVAL)
+        beats = len(bench.received("heartbeat"))
+        for _ in range(10):
+            result = await bench.cycle.run()
+            assert all(value.age < INTERVAL for value in result.image.values.values())
+            await asyncio.sleep(INTERVAL)
+        assert len(bench.received("heartbeat")) == beats + 10
+        assert {name: bench.stands(name) for name in WISH} == WISH
+        await bench.close()
+
+    run(played())
+
+
+def test_what_words_in_another_order_show_is_neither_believed_nor_a_hand() -> None:
+    """New firmware has turned the order of a number's words: most of its numbers read as no value."""
+
+    async def played() -> None:
+        bench = await make_plc_bench([FixedSource(dict(WISH))], respect_hand=600.0)
+        for _ in range(5):
+            await bench.cycle.run()
+            await asyncio.sleep(INTERVAL)
+        unit = bench.units["plc"]
+        usual = unit.read
+
+        def turned(function: Function, address: int, count: int) -> list[int]:
+            words = usual(function, address, count)
+            if (function, address) == (Function.HOLDING, 0):
+                words[:4] = [words[1], words[0], words[3], words[2]]
+            return words
+
+        unit.read = turned
+        for _ in range(20):
+            result = await bench.cycle.run()
+            await asyncio.sleep(INTERVAL)
+        assert result.image.value_of("heating_setpoint").quality is Quality.MISSING
+        assert "changed_by_hand" not in bench.store.kinds()
+        unit.read = usual
+        for _ in range(20):
+            await bench.cycle.run()
+            await asyncio.sleep(INTERVAL)
+        assert "changed_by_hand" not in bench.store.kinds()
+        assert {name: bench.stands(name) for name in WISH} == WISH
+        await bench.close()
 
     run(played())

@@ -296,6 +296,18 @@ async def test_a_plc_that_ramps_is_no_hand_and_its_ramp_is_left_alone():
     assert not bench.store.alarms
 
 
+async def test_a_ramp_that_passes_the_safe_value_after_a_silence_is_no_hand_behind_it():
+    source = FixedSource(dict(WISH) | {"heating_setpoint": 15.5})
+    bench = make_stubborn_bench(source)
+    await bench.run(5)
+    bench.plc.ramps["heating_setpoint"] = 0.25
+    bench.pass_time(300.0)
+    source.setpoints["heating_setpoint"] = 21.0
+    await bench.run(30)
+    assert not bench.events("changed_by_hand")
+    assert bench.plc.values["heating_setpoint"] == 21.0
+
+
 async def test_a_hand_in_the_middle_of_a_ramp_of_the_plc_is_a_hand():
     bench = bench_of()
     bench.plc.ramps["heating_setpoint"] = 1.0 / 120.0

@@ -34,11 +34,11 @@ async def test_two_gateways_on_one_plc_are_told_and_do_not_fight():
         await theirs.run(1)
         written.append(len(ours.plc.written("heating_setpoint")) + len(theirs.plc.written("heating_setpoint")))
     # Where both happen to count the same number, one of them cannot tell.
-    told = [gateway.alarms.get("second gateway", "") for gateway in (ours, theirs)]
+    told = [gateway.alarms.get("heartbeat register", "") for gateway in (ours, theirs)]
     assert any("another gateway" in text for text in told)
     assert written[-1] == written[9]
     await ours.run(3)
-    assert "second gateway" not in ours.alarms
+    assert "heartbeat register" not in ours.alarms
 
 
 async def test_a_plc_that_never_keeps_the_heartbeat_is_no_second_gateway():
