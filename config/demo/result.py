@@ -118,7 +118,7 @@ def obtained(site: Site, log: Telemetry, days: NDArray[np.int64]) -> NDArray[np.
         "co2": log["co2_dosing"],
         "net_growth": np.gradient(log["net_growth"]) * 12.0,
         "fruit_fresh_weight": np.gradient(log["fruit_fresh_weight"]) * 12.0,
-    } | {name: log[name] for name in PREDICTED}
+    } | {name: log[name] for name in (*PREDICTED, "leaf_area_index")}
     worth = []
     for day in days:
         rows = slice(day * DAY, (day + 1) * DAY)

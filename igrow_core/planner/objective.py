@@ -62,6 +62,8 @@ class Outcome:
     """kg m-2 of dry matter."""
     fruit_fresh_weight: Values
     """kg m-2 harvested."""
+    leaf_area_index: Values
+    """m2 m-2 of the leaves that grew it."""
     outside: Values
     """How far the hour lies outside the training data, in widths of its range; 0 inside."""
 

@@ -25,7 +25,7 @@ from igrow.core.telemetry import Telemetry
 
 Values = NDArray[np.float64]
 _TOTALS = {"heat": ("boiler_in", 1e-6), "electricity": ("electricity", 1 / 3.6e6), "co2": ("co2_dosed", 1.0)}
-_STATES = ("air_temperature", "air_humidity", "air_co2")
+_STATES = ("air_temperature", "air_humidity", "air_co2", "leaf_area_index")
 _CUMULATIVE = ("net_growth", "fruit_fresh_weight")
 
 

@@ -130,6 +130,7 @@ class BundleSimulator:
             co2=member(out["resources"][2]),
             net_growth=member(np.diff(net_growth, axis=-1, prepend=before)),
             fruit_fresh_weight=member(np.repeat(picked / 24.0, 24, axis=-1)),
+            leaf_area_index=member(out["growth_out"][GROWTH.index("leaf_area_index")]),
             outside=member(out["outside"]),
         )
 

@@ -89,7 +89,7 @@ def test_the_crop_keeps_its_books() -> None:
     """What it holds and has given grows by what it takes up less what it respires."""
     crop = like(tomato.mature_crop(PLANT, 1.0), 3)
     supply = np.full((3, 48), 1.2e-3) * np.array([[0.5], [1.0], [1.5]])
-    after = live(PLANT, crop, supply, np.full((3, 48), 19.0))
+    after = live(PLANT, crop, supply, np.full((3, 48), 19.0), np.full((3, 48), 3.0))
     grown = after.net_growth - crop.net_growth
     np.testing.assert_allclose(tomato.stored_carbohydrate(after) - tomato.stored_carbohydrate(crop), grown, rtol=1e-9)
     assert (np.diff(grown) > 0).all()
@@ -104,8 +104,32 @@ def test_a_reference_crop_grows_as_the_simulator_says() -> None:
     air = np.full((1, 24), 19.0)
     for _ in range(6):
         before = crop.net_growth
-        crop = tomato.deleaf(np, PLANT, live(PLANT, crop, supplied(PLANT, net, air), air))
+        crop = tomato.deleaf(np, PLANT, live(PLANT, crop, supplied(PLANT, net, air), air, np.full((1, 24), 3.0)))
     assert float((crop.net_growth - before)[0]) == pytest.approx(24 * 0.45e-3, rel=0.25)
+
+
+def test_a_crop_takes_up_what_as_many_leaves_took_up() -> None:
+    """Of a simulator with a leaf area of 3.5 a crop of 3.5 has all, and a crop of 2 as much less as it shades less."""
+    supply, air = np.full((1, 3), 1.2e-3), np.full((1, 3), 19.0)
+
+    def taken_up(own: float) -> float:
+        crop = like(tomato.mature_crop(PLANT, 1.0, own), 1)
+        respired = tomato.rates(np, PLANT, crop, 19.0).respiration * 3 * 3600.0
+        after = live(PLANT, crop, supply, air, np.full((1, 3), 3.5))
+        return float((after.net_growth - crop.net_growth + respired)[0] / tomato.assimilation_share(np, crop)[0])
+
+    assert taken_up(3.5) == pytest.approx(supply.sum(), rel=1e-9)
+    shading = (1.0 - np.exp(-0.7 * 2.0)) / (1.0 - np.exp(-0.7 * 3.5))
+    assert taken_up(2.0) == pytest.approx(shading * supply.sum(), rel=1e-9)
+
+
+def test_growth_that_more_leaves_made_is_worth_less_to_a_crop(season: Season) -> None:
+    strategy, crop = Strategy(DAYS, 1), tomato.mature_crop(PLANT, 1.0)
+    grown = [
+        float(run_season(one, strategy, genes_of(strategy), crop).crop.net_growth[0] - crop.net_growth)
+        for one in (replace(season, simulator=ToySimulator(leaf_area=area)) for area in (3.0, 3.5))
+    ]
+    assert 0.93 * grown[0] < grown[1] < 0.99 * grown[0]
 
 
 def test_only_fruit_that_was_ripe_is_paid(season: Season) -> None:

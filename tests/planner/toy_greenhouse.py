@@ -14,9 +14,12 @@ from igrow.core.site import Site
 class ToySimulator:
     """Heat rises with the heating setpoint, growth with light and CO2; `members` doubt the lamps' worth."""
 
-    def __init__(self, members: tuple[float, ...] = (1.0,), known_lamp_hours: float = 1e9) -> None:
+    def __init__(
+        self, members: tuple[float, ...] = (1.0,), known_lamp_hours: float = 1e9, leaf_area: float = 3.0
+    ) -> None:
         self.members = members
         self.known_lamp_hours = known_lamp_hours
+        self.leaf_area = leaf_area
         self.calls = 0
 
     def simulate(self, initial: Any, weather: np.ndarray, setpoints: np.ndarray, start: np.datetime64) -> Outcome:
@@ -40,6 +43,7 @@ class ToySimulator:
             co2=spread(2e-5 * np.maximum(co2 - 400.0, 0.0)),
             net_growth=growth,
             fruit_fresh_weight=spread(np.zeros(1)),
+            leaf_area_index=spread(np.full(1, self.leaf_area)),
             outside=spread(beyond),
         )
 

@@ -90,8 +90,11 @@ def run_season(season: Season, strategy: Strategy, genes: NDArray[np.float32], c
         crops.append(plants)
         start = season.start + first * DAY
         outcome = _typical_day(season, strategy, genes, first + repeats // 2, start, weather)
-        supply = np.broadcast_to(supplied(p, believed(outcome), outcome.air_temperature[0]), (count, 24))
-        warm = np.broadcast_to(outcome.air_temperature[0], (count, 24))
+        gross = supplied(p, believed(outcome), outcome.air_temperature[0])
+        supply, warm, leaves = (
+            np.broadcast_to(one, (count, 24))
+            for one in (gross, outcome.air_temperature[0], outcome.leaf_area_index[0])
+        )
         time = start + np.arange(24) * np.timedelta64(3600, "s")
         heat, electricity, co2 = (
             np.tile(getattr(outcome, name)[0], (1, repeats)) for name in ("heat", "electricity", "co2")
@@ -107,7 +110,7 @@ def run_season(season: Season, strategy: Strategy, genes: NDArray[np.float32], c
         penalty = penalty + repeats * OUTSIDE_PENALTY * outcome.outside[0].sum(axis=-1) / 24.0
         for day in range(first, first + repeats):
             before = fresh(p, plants)
-            plants = live(p, plants, supply, warm)
+            plants = live(p, plants, supply, warm, leaves)
             if (day + season.first_day) % max(int(p.deleafing_interval), 1) == 0:
                 plants = tomato.deleaf(np, p, plants)
             picked = fresh(p, plants) - before

@@ -23,7 +23,7 @@ INTERCEPTION = 0.7
 """Extinction of light in the canopy, 1."""
 ITERATIONS = 5
 REFERENCE_LEAF_AREA = 3.0
-"""Leaf area index at which a simulator's assimilation is given."""
+"""Leaf area index of the crop whose maintenance a simulator's growth has paid."""
 
 
 def supplied(p: GreenhouseParameters, net_growth: Values, air_temperature: Values) -> Values:
@@ -44,29 +44,23 @@ def supplied(p: GreenhouseParameters, net_growth: Values, air_temperature: Value
     return np.asarray(np.maximum((1.0 + GROWTH_COST) * (net_growth + maintenance), 0.0))
 
 
-def live(
-    p: GreenhouseParameters,
-    crop: Crop,
-    supply: Values,
-    air_temperature: Values,
-    leaf_area: float = REFERENCE_LEAF_AREA,
-) -> Crop:
-    """Return the crops (B,) after hours with a supply and an air temperature of (B, H).
+def live(p: GreenhouseParameters, crop: Crop, supply: Values, air_temperature: Values, leaf_area: Values) -> Crop:
+    """Return the crops (B,) after hours with a supply, an air temperature and a leaf area index of (B, H) each.
 
-    `leaf_area` is the leaf area index at which a simulator gave the supply.
+    The leaves are those with which a simulator gave the supply: a crop of more takes up more light than they did.
     """
+    full = supply / intercepted(leaf_area)
     hours = supply.shape[1]
     for first in range(0, hours, HOURS):
         step = slice(first, min(first + HOURS, hours))
         seconds = 3600.0 * (step.stop - step.start)
-        fed, warm = supply[:, step].sum(axis=1), air_temperature[:, step].mean(axis=1)
-        crop = _step(p, crop, fed / intercepted(leaf_area), warm, seconds)
+        crop = _step(p, crop, full[:, step].sum(axis=1), air_temperature[:, step].mean(axis=1), seconds)
     return crop
 
 
-def intercepted(leaf_area: Values | float) -> Values:
+def intercepted(leaf_area: Values) -> Values:
     """Return which part of the light a canopy of a leaf area index takes, 0 to 1."""
-    return np.asarray(1.0 - np.exp(-INTERCEPTION * np.asarray(leaf_area)))
+    return np.asarray(1.0 - np.exp(-INTERCEPTION * leaf_area))
 
 
 def _step(p: GreenhouseParameters, crop: Crop, full: Values, temperature: Values, seconds: float) -> Crop:

@@ -20,7 +20,6 @@ from igrow.core.greenhouse.described import parameters_of
 from igrow.core.greenhouse.parameters import GreenhouseParameters
 from igrow.core.greenhouse.tomato import STAGES, Crop
 from igrow.core.planner.season.course import DAY, Season, run_season
-from igrow.core.planner.season.crop import REFERENCE_LEAF_AREA
 from igrow.core.planner.season.strategy import Strategy
 from igrow.core.planner.season.worth import CropWorth, MarginalValues, marginal_values
 from igrow.core.planner.template import Setpoints, Template
@@ -123,7 +122,7 @@ class SeasonPlan:
         values = MarginalValues(
             *(getattr(one, name) * (1.0 - share) + getattr(other, name) * share for name in ("buffer", "leaf", "fruit"))
         )
-        return CropWorth(site, plant, crop, values, present.get("leaf_area_index", REFERENCE_LEAF_AREA))
+        return CropWorth(site, plant, crop, values)
 
     def to_json(self) -> str:
         """Return it as text."""

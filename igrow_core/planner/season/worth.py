@@ -17,7 +17,7 @@ from igrow.core.greenhouse.parameters import GreenhouseParameters
 from igrow.core.greenhouse.tomato import STAGES, Crop
 from igrow.core.planner.objective import DISBELIEF, Outcome
 from igrow.core.planner.season.course import Season, run_season
-from igrow.core.planner.season.crop import REFERENCE_LEAF_AREA, fresh, like, live, supplied
+from igrow.core.planner.season.crop import fresh, like, live, supplied
 from igrow.core.planner.season.strategy import Strategy
 from igrow.core.site import Site
 
@@ -63,17 +63,15 @@ class CropWorth:
     crop: Crop
     """As it stands when the horizon begins."""
     values: MarginalValues
-    leaf_area: float = REFERENCE_LEAF_AREA
-    """Leaf area index with which the simulator runs."""
 
     def income(self, outcome: Outcome, time: NDArray[np.datetime64]) -> Values:
         """Return EUR m-2 over the horizon, (M, B)."""
         members, count, hours = outcome.net_growth.shape
         grown = outcome.net_growth * np.clip(1.0 - DISBELIEF * outcome.outside, 0.0, 1.0)
         flat = (members * count, hours)
-        air = outcome.air_temperature.reshape(flat)
+        air, leaves = outcome.air_temperature.reshape(flat), outcome.leaf_area_index.reshape(flat)
         before = like(self.crop, members * count)
-        after = live(self.plant, before, supplied(self.plant, grown.reshape(flat), air), air, self.leaf_area)
+        after = live(self.plant, before, supplied(self.plant, grown.reshape(flat), air), air, leaves)
         price = product_price(self.site.prices, local_days(time, self.site.time_zone), self.site.crop.brix).mean()
         gained = (
             price * (fresh(self.plant, after) - fresh(self.plant, before))
