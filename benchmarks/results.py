@@ -102,6 +102,14 @@ RESULTS = {
         "greenhouses and weather 700",
         long=True,
     ),
+    "season-causes": Result(
+        "Why a season brings less than was expected",
+        ("benchmarks.season_causes",),
+        "The strategy of today's prices in greenhouses that were not looked at: each as the mean of its kind, with its "
+        "own parameters, and with its undeclared effects.",
+        "greenhouses and weather 700, greenhouses 20 to 39",
+        long=True,
+    ),
     "season-ranks": Result(
         "Whether the simulator ranks strategies as a greenhouse does",
         ("benchmarks.seasons", "rank"),

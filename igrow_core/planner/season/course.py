@@ -92,8 +92,7 @@ def run_season(season: Season, strategy: Strategy, genes: NDArray[np.float32], c
         outcome = _typical_day(season, strategy, genes, first + repeats // 2, start, weather)
         gross = supplied(p, believed(outcome), outcome.air_temperature[0])
         supply, warm, leaves = (
-            np.broadcast_to(one, (count, 24))
-            for one in (gross, outcome.air_temperature[0], outcome.leaf_area_index[0])
+            np.broadcast_to(one, (count, 24)) for one in (gross, outcome.air_temperature[0], outcome.leaf_area_index[0])
         )
         time = start + np.arange(24) * np.timedelta64(3600, "s")
         heat, electricity, co2 = (
