@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from igrow.core.bundle import BUILT_IN, read_bundle
+from igrow.core.bundle import BUILT_IN, default_bundle_folder, read_bundle
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import ACTUATORS
 from igrow.core.simulator.hybrid.nominal import nominal
@@ -17,6 +17,7 @@ from igrow.core.telemetry import Telemetry, write_csv
 from igrow.trainer import calibrate, diagnosis, export, prepare_log, read_model
 from igrow.trainer.cli import main
 from igrow.trainer.fit import FittedModel
+from igrow.trainer.fit.model import training_envelope, united
 from tests.virtual_log import SITE, disturbances, virtual_log
 
 DAYS, STEP = 30, 900.0
@@ -183,6 +184,18 @@ def test_what_is_known_before_narrows_what_is_known_after(model: FittedModel, sh
 
 
 @pytest.mark.usefixtures("quick")
+def test_plans_are_not_held_to_what_the_weeks_of_a_log_happened_to_hold(short: Telemetry, clean: FittedModel) -> None:
+    built_in = read_bundle(default_bundle_folder()).manifest.training_range
+    own = training_envelope({name: short[name] for name in ("air_temperature", "air_co2")})
+    assert built_in["air_co2"][1] > own["air_co2"][1] + 50.0, "the log's weeks saw less CO2 than plans may ask for"
+    for name in own:
+        low, high = clean.training_range[name]
+        # The working grid takes the edge off a log's extremes.
+        assert low <= min(built_in[name][0], own[name][0] + 2.0)
+        assert high >= max(built_in[name][1], own[name][1] - 20.0)
+    assert united({"a": (0.0, 1.0)}, {}, {"a": (0.5, 2.0), "b": (1.0, 3.0)}) == {"a": (0.0, 2.0), "b": (1.0, 3.0)}
+
+
 def test_a_log_of_less_than_four_weeks_is_fitted_without_errors_on_unseen_days(short: Telemetry) -> None:
     told: list[str] = []
     model = calibrate(prepare_log(short, SITE), progress=told.append)

@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from igrow.core.bundle import HeldOutError, Span
+from igrow.core.bundle import HeldOutError, Span, default_bundle_folder, read_bundle
 from igrow.core.errors import IgrowError
 from igrow.core.local_time import utc_datetime
 from igrow.core.quantities import QUANTITIES
@@ -29,7 +29,7 @@ from igrow.trainer.fit.evaluation import evaluate
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.growth import built_in_crop, growth_notes, growth_of_log
 from igrow.trainer.fit.holding import fit_holding
-from igrow.trainer.fit.model import FittedModel, training_envelope
+from igrow.trainer.fit.model import FittedModel, training_envelope, united
 from igrow.trainer.fit.omission import Omission
 from igrow.trainer.fit.population import Population
 
@@ -96,7 +96,13 @@ def calibrate(
         crop=crop,
         season=before.season if before.site.name == site.name else None,
         training_span=Span(utc_datetime(record.time[0]), utc_datetime(record.time[-1])),
-        training_range=training_envelope({**record.measured, **record.inputs, **setpoints}),
+        # The balances are physics, and the doubt of what few weeks say of them is the posterior's. Bounds of these weeks
+        # alone would hold each plan to the recipe under which they passed.
+        training_range=united(
+            training_envelope({**record.measured, **record.inputs, **setpoints}),
+            before.training_range,
+            read_bundle(default_bundle_folder()).manifest.training_range,
+        ),
         errors=held_out_errors(record, before.posterior, say),
         notes=(*_notes(record, inferred), *counted),
     )

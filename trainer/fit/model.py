@@ -60,6 +60,7 @@ class FittedModel:
     """What the season leaves to the days; None where it was not planned."""
     training_span: Span | None = None
     training_range: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """By quantity, beyond which plans are believed less: what its log held, and what the virtual seasons did."""
     errors: tuple[HeldOutError, ...] = ()
     """On days that no fit saw."""
     notes: tuple[str, ...] = ()
@@ -218,6 +219,16 @@ class FittedModel:
         if path is not None:
             figure.savefig(path)
         return figure
+
+
+def united(*ranges: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+    """Return the range of each quantity that holds all that are given of it."""
+    found: dict[str, tuple[float, float]] = {}
+    for one in ranges:
+        for name, (low, high) in one.items():
+            before = found.get(name, (low, high))
+            found[name] = min(low, before[0]), max(high, before[1])
+    return found
 
 
 def training_envelope(columns: Mapping[str, Floats]) -> dict[str, tuple[float, float]]:
