@@ -1,6 +1,6 @@
 """Algorithm 1 with and without its lower level, in greenhouses that lack something the simulator does not know.
 
-    python -m benchmarks.algorithm_1 [--days 35] [--houses 3] [--generations 5] [--every 14] [--figure FILE]
+    python -m benchmarks.algorithm_1 [--days 35] [--houses 3] [--first 0] [--generations 5] [--every 14] [--figure FILE]
 
 Mechanistic greenhouses, each with other parameters (8 %), disturbances, sensor noise, and two undeclared effects: one
 stands, one begins a week later. After four weeks under the recipe the upper level plans every day (K1)
@@ -166,10 +166,12 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--days", type=int, default=35)
     parser.add_argument("--houses", type=int, default=3)
+    parser.add_argument("--first", type=int, default=0, help="number of the first greenhouse")
     parser.add_argument("--generations", type=int, default=5, help="of each day's search")
     parser.add_argument("--every", type=int, default=14, help="days between two runs of the lower level (K2)")
     parser.add_argument("--figure", type=Path, help="SVG to write")
     given = parser.parse_args()
+    numbers = list(range(given.first, given.first + given.houses))
     site, kinds = described("today", given.days), ways_of(given.days)
     season = season_of(site, given.days)
     crop = tomato.mature_crop(season.plant, 1.0)
@@ -189,7 +191,7 @@ def main() -> int:
             renewed.houses = LoggedHouses(days, numbers)
             return renewed.houses
 
-        books, _ = lead(site, given.days, ways, {name: list(range(given.houses)) for name in ways}, stood)
+        books, _ = lead(site, given.days, ways, dict.fromkeys(ways, numbers), stood)
         errors = climate_errors(renewed, list(ways).index("lower level") * given.houses, given.days, given.every)
     brought(f"{given.days} days", {name: (money(site, book), book) for name, book in books.items()})
     print(f"\n{'expected / obtained':22s}" + "".join(f"{name:>12s}" for name in JUDGED))
