@@ -96,8 +96,8 @@ def calibrate(
         crop=crop,
         season=before.season if before.site.name == site.name else None,
         training_span=Span(utc_datetime(record.time[0]), utc_datetime(record.time[-1])),
-        # The balances are physics, and the doubt of what few weeks say of them is the posterior's. Bounds of these weeks
-        # alone would hold each plan to the recipe under which they passed.
+        # The balances are physics, and what few weeks leave open of them is in the posterior's spread. The bounds of
+        # these weeks alone would hold each plan to the recipe under which they passed.
         training_range=united(
             training_envelope({**record.measured, **record.inputs, **setpoints}),
             before.training_range,
