@@ -52,7 +52,7 @@ class SimulatedHouses(Houses):
             }
         p, before = self._parameters, fresh(self._parameters, self._crop)
         supply = supplied(p, believed(outcome), outcome.air_temperature[0])
-        self._crop = live(p, self._crop, supply, outcome.air_temperature[0])
+        self._crop = live(p, self._crop, supply, outcome.air_temperature[0], outcome.leaf_area_index[0])
         if (int((begin - START) // DAY) + BEFORE) % max(int(p.deleafing_interval), 1) == 0:
             self._crop = tomato.deleaf(np, p, self._crop)
         picked = (fresh(p, self._crop) - before) / 24.0
