@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from igrow.core.arrays import Floats
-from igrow.core.effects import EFFECTS
 from igrow.trainer.diagnosis import linear, noise, search
 from igrow.trainer.diagnosis.candidates import Pattern
 from igrow.trainer.diagnosis.design import Design
@@ -175,9 +174,10 @@ def _suffices(design: Design, contender: Contender) -> bool:
 
 def is_within_bounds(design: Design, contender: Contender) -> bool:
     """Tell whether a cause lies within its bounds, or about at one."""
-    bounds, beyond = EFFECTS[contender.hypothesis.effect].amplitude, design.rules.beyond_bound
+    one, beyond = contender.hypothesis, design.rules.beyond_bound
+    low, high = design.amplitude_bounds(one.effect, one.term.onset)
     (amplitude,) = contender.profile.amplitudes
-    return beyond * bounds.low <= amplitude <= beyond * bounds.high and (bounds.low < 0.0 or amplitude > 0.0)
+    return beyond * low <= amplitude <= beyond * high and (low < 0.0 or amplitude > 0.0)
 
 
 def _round(design: Design, null: Profile, cause: Contender | None, patterns: tuple[Hypothesis, ...]) -> Round:

@@ -21,10 +21,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from igrow.core.arrays import Floats, Integers, Mask
+from igrow.core.effects import EFFECTS
 from igrow.core.simulator.hybrid.climate import ActiveEffects
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.data.splits import DaySplit
-from igrow.trainer.diagnosis import candidates, linear, noise, sensitivity
+from igrow.trainer.diagnosis import candidates, linear, noise, possible_air, sensitivity
 from igrow.trainer.diagnosis.candidates import Candidate, Pattern
 from igrow.trainer.diagnosis.drift import Drift
 from igrow.trainer.diagnosis.knowledge import drift
@@ -163,6 +164,11 @@ class Design:
         """Runs on days for fitting, (r, 1)."""
         runs: Mask = self.split.fit[self.line.runs.day][:, None]
         return runs
+
+    def amplitude_bounds(self, effect: str, onset: int | None) -> tuple[float, float]:
+        """Return the least and the largest amplitude of an effect that begins on a day (None: always)."""
+        acts = None if onset is None else self.split.day >= onset
+        return possible_air.amplitude_bounds(EFFECTS[effect], self.line.record, acts)
 
     def fit_noise(self, errors: Floats, start: Whitening | None = None) -> Whitening:
         """Fit the noise that a model leaves on the fit days: its scale alone where its colour is known.

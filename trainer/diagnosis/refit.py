@@ -16,7 +16,7 @@ from scipy.linalg import block_diag
 
 from igrow.core.arrays import Floats, Mask
 from igrow.core.effects import EFFECTS
-from igrow.trainer.diagnosis import sensitivity
+from igrow.trainer.diagnosis import possible_air, sensitivity
 from igrow.trainer.diagnosis.design import NULL, Design
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, activate, clipped
 from igrow.trainer.diagnosis.linear import Fit
@@ -196,8 +196,10 @@ def _unknowns(design: Design, terms: Sequence[ActiveTerm], before: Sequence[Acti
     knobs = []
     for index, term in enumerate(terms):
         definition = EFFECTS[term.effect]
-        size = definition.amplitude
-        knobs.append(Knob(index, size.name, size.low, size.high, _LEAST_SCALE * abs(size.typical), False))
+        size, record = definition.amplitude, design.line.record
+        acts = None if term.onset is None else record.time >= term.onset
+        reach = possible_air.amplitude_bounds(definition, record, acts)
+        knobs.append(Knob(index, size.name, *reach, _LEAST_SCALE * abs(size.typical), False))
         for one in definition.shapes:
             knobs.append(
                 Knob(index, one.name, one.low, one.high, design.rules.nonlinear_spread * (one.high - one.low), True)

@@ -67,7 +67,8 @@ def scan(
         chosen: columns to score, (c,).
         ageing: for each column, the one to subtract per day before its beginning, or None.
         onsets: days of beginning; None is always.
-        bounds: smallest and largest amplitude of each column, (c, 2).
+        bounds: smallest and largest amplitude of each column, (c, 2), or at each beginning, (o, c, 2); what is beyond
+            counts as much as is within, but for what must not turn round (smallest amplitude 0).
         rng: for the flips.
         flips: how many.
     """
@@ -111,8 +112,9 @@ def scan(
         spread[place] = np.sqrt(np.sum(centred[:, place] ** 2, axis=0))
     usable = curvature > _EXPLAINED * np.maximum(own.sum(axis=0), 1e-300)
     amplitude = -score / np.maximum(curvature, 1e-300)
-    allowed = usable & (amplitude >= bounds[:, 0]) & np.where(bounds[:, 0] >= 0.0, amplitude > 0.0, True)
-    bounded = np.clip(amplitude, bounds[:, 0], bounds[:, 1])
+    low, high = bounds[..., 0], bounds[..., 1]
+    allowed = usable & np.where(low >= 0.0, (amplitude > 0.0) & (amplitude >= low), low < high)
+    bounded = np.clip(amplitude, low, high)
     gain = np.where(allowed, -bounded * score - 0.5 * bounded**2 * curvature, 0.0)
     spread = np.maximum(spread, 1e-12)
     statistic = np.where(usable, np.abs(score) / spread, 0.0)
@@ -184,7 +186,12 @@ def score_candidates(
         shift if candidate.ages else None
         for shift, candidate in zip(design.block("ageing").columns, design.candidates, strict=True)
     ]
-    bounds = np.array([(one.definition.amplitude.low, one.definition.amplitude.high) for one in design.candidates])
+    known = {
+        (effect, onset): design.amplitude_bounds(effect, onset)
+        for effect in dict.fromkeys(one.effect for one in design.candidates)
+        for onset in onsets
+    }
+    bounds = np.array([[known[one.effect, onset] for one in design.candidates] for onset in onsets])
     columns, rules = design.block("effect").columns, design.rules
     scanned = scan(design.grams, current, columns, ageing, onsets, bounds, rng, rules.flips)
     return _best(scanned, design.candidates, ageing, [one.effect for one in design.candidates], design.onset_price)
