@@ -159,6 +159,18 @@ def test_units_behind_the_numbers_count(tmp_path: Path, log: Telemetry) -> None:
     assert_reads_as(tmp_path, log)
 
 
+def test_units_in_a_column_of_their_own_count(tmp_path: Path, log: Telemetry) -> None:
+    """A reading a row: air in degF and wind in m s-1, as the column says."""
+    frame = written(log, ("Time", "Air temp", "RH", "CO2", "Outside temp", "Radiation", "Wind speed"))
+    for column in ("Air temp", "Outside temp"):
+        frame[column] = degrees_fahrenheit(frame[column])
+    long = frame.melt(id_vars="Time", var_name="sensor").sort_values("Time", kind="stable")
+    units = dict(zip(frame.columns[1:], ("°F", "%", "ppm", "°F", "W/m2", "m/s"), strict=True))
+    long.assign(unit=long["sensor"].map(units)).to_csv(tmp_path / "export.csv", index=False)
+    assert imported(tmp_path) == 0
+    assert_reads_as(tmp_path, log)
+
+
 @pytest.mark.parametrize(
     ("name", "factor"),
     [
@@ -262,6 +274,56 @@ def test_the_year_behind_a_dash_is_no_offset_from_utc(tmp_path: Path, log: Telem
     frame.to_csv(tmp_path / "export.csv", index=False)
     assert imported(tmp_path) == 0
     assert_reads_as(tmp_path, autumn)
+
+
+def moved(log: Telemetry, day: str) -> Telemetry:
+    """The log in days of another season, with a sun that fits them."""
+    time = log.time + np.timedelta64((np.datetime64(day) - np.datetime64("2020-02-01")).astype(int), "D")
+    return Telemetry(time, {**log.columns, "global_radiation": 0.6 * sun.extraterrestrial_radiation(time, 52.0, 4.5)})
+
+
+@pytest.mark.parametrize(
+    ("zone", "day", "site", "names"),
+    [
+        ("Etc/GMT+5", "2020-03-05", "America/New_York", {"EST"}),
+        ("Europe/Amsterdam", "2020-03-22", "Europe/Amsterdam", {"CET", "CEST"}),
+        ("Europe/London", "2020-10-18", "Europe/London", {"GMT", "BST"}),
+        ("America/Chicago", "2020-10-25", "America/Chicago", {"CST", "CDT"}),
+        ("Asia/Shanghai", "2020-03-05", "Asia/Shanghai", {"CST"}),
+        ("America/Los_Angeles", "2020-03-05", "Europe/Amsterdam", {"PST", "PDT"}),
+    ],
+)
+@pytest.mark.parametrize("form", ["%Y-%m-%d %H:%M {}", "%d.%m.%Y %H:%M ({})", "%A, %B %d, %Y %I:%M %p {}"])
+def test_each_time_may_tell_its_zone(
+    tmp_path: Path, log: Telemetry, capsys, zone: str, day: str, site: str, names: set[str], form: str
+) -> None:
+    """EST is five hours behind UTC in summer too, whatever the clocks of the site do."""
+    table = moved(log, day)
+    frame = written(table, PLAIN)
+    local = pd.DatetimeIndex(table.time).tz_localize("UTC").tz_convert(zone)
+    called = ["EST" if zone.startswith("Etc") else str(moment.tzname()) for moment in local]
+    assert set(called) == names
+    frame["Time"] = [moment.strftime(form.format(name)) for moment, name in zip(local, called, strict=True)]
+    frame.to_csv(tmp_path / "export.csv", index=False)
+    status = imported(tmp_path, zone=site)
+    told = capsys.readouterr()
+    if names == {"PST", "PDT"} and site == "Europe/Amsterdam":
+        assert status == 2
+        assert "in which time zone are its times? (America/Los_Angeles, Asia/Manila)" in told.out
+        assert imported(tmp_path, "--time-zone", zone, zone=site) == 0
+    else:
+        assert status == 0
+        assert f"each time tells its zone: {', '.join(sorted(names))}" in told.out
+    read = read_log(tmp_path / "export.csv").telemetry
+    np.testing.assert_array_equal(read.time, table.time)
+    np.testing.assert_allclose(read["air_co2"], table["air_co2"], atol=0.01)
+
+
+@pytest.mark.parametrize("form", ["%a %d/%m/%Y %H:%M", "%Y%m%d%H%M", "%Y-%m-%dT%H:%M+01:00[Europe/Amsterdam]"])
+def test_times_of_other_programs_are_read(tmp_path: Path, log: Telemetry, form: str) -> None:
+    written(log, PLAIN, form).to_csv(tmp_path / "export.csv", index=False)
+    assert imported(tmp_path) == 0
+    assert_reads_as(tmp_path, log)
 
 
 def test_vents_and_screens_that_are_open_or_closed(tmp_path: Path, log: Telemetry) -> None:

@@ -16,8 +16,9 @@ from igrow.trainer.data.cells import Cells, read_cells
 from igrow.trainer.data.mapping import ColumnMapping, ExportMapping, TimeColumn
 from igrow.trainer.data.number_texts import number
 from igrow.trainer.data.rows import Merged, merge
-from igrow.trainer.data.timestamps import parser, to_utc
-from igrow.trainer.data.vocabulary import folded, words_of
+from igrow.trainer.data.timestamps import ZONE, to_utc, wall_parser
+from igrow.trainer.data.vocabulary import folded, words_of, zones_called
+from igrow.trainer.data.zone_abbreviations import split
 
 MOST_UNREADABLE = 0.02
 """Share of rows whose time cannot be read up to which they are no readings; beyond it the form is wrong."""
@@ -154,8 +155,8 @@ def readings(table: ExportTable, time: TimeColumn) -> tuple[ExportTable, tuple[s
 
 def _unreadable(table: ExportTable, time: TimeColumn, known: Container[int]) -> list[int]:
     """Return the rows beside those known whose time cannot be read, where they are few."""
-    read, wrong = parser(time.format), []
-    for row, text in enumerate(_written(table, time)):
+    read, wrong = wall_parser(time.format), []
+    for row, text in enumerate(written_times(table, time)):
         if text and row not in known:
             try:
                 read(text)
@@ -166,7 +167,7 @@ def _unreadable(table: ExportTable, time: TimeColumn, known: Container[int]) -> 
     return wrong
 
 
-def _written(table: ExportTable, time: TimeColumn) -> Sequence[str]:
+def written_times(table: ExportTable, time: TimeColumn) -> Sequence[str]:
     """Return the texts of the times, day and hour together."""
     days = table[time.column]
     if time.time_of_day is None:
@@ -185,13 +186,15 @@ def _held(texts: Sequence[str]) -> list[str]:
 def times(table: ExportTable, mapping: ExportMapping) -> Times:
     """Return the UTC times of an export's rows; raises IgrowError with the line of the first that cannot be read."""
     rule = mapping.time
-    texts = _written(table, rule)
+    texts = written_times(table, rule)
     empty = np.array([not text for text in texts], dtype=bool)
     written = [text for text in texts if text]
     found, wrong = to_utc(written, rule.format, rule.time_zone)
     if wrong is not None:
         line = table.lines[int(np.flatnonzero(~empty)[wrong])]
-        raise IgrowError(f"{table.path}:{line}: {written[wrong]!r} is no time of the form {rule.format}")
+        zones = zones_called(split(written[wrong])[1]) if rule.format.endswith(ZONE) else ()
+        why = f": which zone is meant, {' or '.join(zones)}? (`time_zone`)" if zones else ""
+        raise IgrowError(f"{table.path}:{line}: {written[wrong]!r} is no time of the form {rule.format}{why}")
     result = np.full(len(texts), np.datetime64("NaT"), dtype="datetime64[s]")
     result[~empty] = found
     return result

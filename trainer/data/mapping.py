@@ -41,9 +41,12 @@ class TimeColumn:
         default=None, help="column of the time of day, where the first has the date alone"
     )
     format: str = setting(
-        default="ISO 8601", help="ISO 8601, excel (days since 1899-12-30), unix, unix ms, or as strptime has it"
+        default="ISO 8601",
+        help="ISO 8601, excel (days since 1899-12-30), unix, unix ms, or as strptime has it; %Z at the end: EST, CET",
     )
-    time_zone: str = setting(default="UTC", help="IANA name of the zone of times without one")
+    time_zone: str = setting(
+        default="UTC", help="IANA name of the zone of times without one, and of abbreviations that several zones have"
+    )
 
     def __post_init__(self) -> None:
         try:

@@ -1,6 +1,7 @@
 """Times as they are written, to UTC: ISO 8601 in all its forms, Excel's days, seconds since 1970, and strptime formats.
 
-Names of months are read in the languages of `vocabulary.yaml`, whatever the language of the machine.
+Names of months and of days of the week are read in the languages of `vocabulary.yaml`, whatever the language of the
+machine; ``%Z`` at the end of a format is an abbreviation of a zone, such as EST.
 """
 
 from __future__ import annotations
@@ -13,24 +14,63 @@ import numpy as np
 
 from igrow.core.local_time import from_local
 from igrow.core.telemetry import Times
-from igrow.trainer.data.vocabulary import folded, month_names
+from igrow.trainer.data.vocabulary import folded, month_names, weekday_names
+from igrow.trainer.data.zone_abbreviations import ahead_of_utc, split
 
 ISO, EXCEL, UNIX, UNIX_MS = "ISO 8601", "excel", "unix", "unix ms"
 _EXCEL_EPOCH = datetime.datetime(1899, 12, 30)
 _UNIX_EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
+ZONE = "%Z"
+_WEEKDAY = re.compile(r"([^\W\d_]{2,})\.?,?\s+(?=\w)")
+_DATE = re.compile(r"\d{1,4}[-/.]\s?\d{1,2}[-/.]")
 _LETTERS = re.compile(r"[^\W\d_]+", re.UNICODE)
 
 
-def parser(form: str) -> Callable[[str], datetime.datetime]:
-    """Return the function that reads one text of a form; it raises ValueError where the text is of another one."""
+def parser(form: str, time_zone: str = "UTC") -> Callable[[str], datetime.datetime]:
+    """Return the function that reads one text of a form; it raises ValueError where the text is of another one.
+
+    Args:
+        form: `ISO 8601`, `excel`, `unix`, `unix ms`, or as strptime has it; ``%Z`` at the end is an abbreviation.
+        time_zone: IANA name; what an abbreviation of several zones stands for.
+    """
     if form == ISO:
-        return _iso
+        return lambda text: _iso(without_weekday(text))
+    if form.endswith(ZONE):
+        plain = parser(form.removesuffix(ZONE).rstrip(), time_zone)
+        return lambda text: _abbreviated(text, plain, time_zone)
     if form == EXCEL:
         return lambda text: _EXCEL_EPOCH + datetime.timedelta(seconds=round(_number(text) * 86_400))
     if form in (UNIX, UNIX_MS):
         unit = 1.0 if form == UNIX else 1e-3
         return lambda text: _UNIX_EPOCH + datetime.timedelta(seconds=round(_number(text) * unit))
-    return lambda text: _formatted(text, form)
+    return lambda text: _formatted(without_weekday(text), form)
+
+
+def wall_parser(form: str) -> Callable[[str], datetime.datetime]:
+    """Return `parser` of a form for wall times: whatever zone an abbreviation stands for."""
+    if not form.endswith(ZONE):
+        return parser(form)
+    plain = parser(form.removesuffix(ZONE).rstrip())
+    return lambda text: plain(split(text)[0])
+
+
+def without_weekday(text: str) -> str:
+    """Return a time without the day of the week before it; "mar" is a day in Madrid only where a date follows it."""
+    found = _WEEKDAY.match(text)
+    if found is None or (name := folded(found[1])) not in weekday_names():
+        return text
+    rest = text[found.end() :]
+    dated = _DATE.match(rest) or any(folded(word) in month_names() for word in _LETTERS.findall(rest))
+    return rest if dated or name not in month_names() else text
+
+
+def _abbreviated(text: str, plain: Callable[[str], datetime.datetime], time_zone: str) -> datetime.datetime:
+    written, name = split(text)
+    moment = plain(written)
+    ahead = ahead_of_utc(name, time_zone, moment.year) if name else None
+    if ahead is None:
+        raise ValueError(f"{name or 'nothing'} is no time zone")
+    return moment.replace(tzinfo=datetime.timezone(ahead))
 
 
 def to_utc(texts: Sequence[str], form: str, time_zone: str) -> tuple[Times, int | None]:
@@ -38,12 +78,12 @@ def to_utc(texts: Sequence[str], form: str, time_zone: str) -> tuple[Times, int 
 
     Args:
         texts: as written.
-        form: `ISO 8601`, `excel`, `unix`, `unix ms`, or as strptime has it.
-        time_zone: IANA name, of times that do not tell their own.
+        form: as `parser` has it.
+        time_zone: IANA name, of times that do not tell their own, and of abbreviations that several zones have.
 
     A wall time that the change of clocks skipped becomes NaT.
     """
-    read = parser(form)
+    read = parser(form, time_zone)
     local = np.empty(len(texts), dtype="datetime64[s]")
     shifts = np.zeros(len(texts), dtype="timedelta64[s]")
     aware = False
@@ -79,8 +119,8 @@ def _iso(text: str) -> datetime.datetime:
     try:
         return datetime.datetime.fromisoformat(text)
     except ValueError:
-        # What pandas writes of other zones, and a space before the offset.
-        changed = re.sub(r"\s+(?=[+-]\d\d:?\d\d$|Z$)", "", text)
+        # What pandas writes of other zones, a space before the offset, and Java's name of the zone behind it.
+        changed = re.sub(r"\s+(?=[+-]\d\d:?\d\d$|Z$)", "", re.sub(r"(?<=[\dZ])\[[\w/+-]+\]$", "", text))
         changed, late = _after_midnight(changed)
         return datetime.datetime.fromisoformat(changed) + late
 

@@ -65,6 +65,24 @@ def month_names() -> Mapping[str, str]:
 
 
 @cache
+def weekday_names() -> frozenset[str]:
+    """Return the names of the days of the week and their abbreviations, folded."""
+    return frozenset(_table()["weekdays"])
+
+
+@cache
+def zone_hours() -> Mapping[str, float]:
+    """Return the hours ahead of UTC of the abbreviations that are of one zone alone."""
+    return {name: float(hours) for name, hours in _table()["zones"]["hours"].items()}
+
+
+def zones_called(abbreviation: str) -> Sequence[str]:
+    """Return zones that share an abbreviation, as IANA names; nothing for one that is of one alone or unknown."""
+    zones: Sequence[str] = _table()["zones"]["several"].get(abbreviation, ())
+    return zones
+
+
+@cache
 def switch_words() -> Mapping[str, float]:
     """Return 1 or 0 for each word that says on or off, folded."""
     return {folded(word): float(value) for value, words in _table()["switched"].items() for word in words}

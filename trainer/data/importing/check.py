@@ -18,6 +18,7 @@ from igrow.trainer.data.mapping import ColumnMapping, ExportMapping
 from igrow.trainer.data.plausibility import find_faults
 from igrow.trainer.data.plausibility.sunlight import CLOCK, noon_is_late
 from igrow.trainer.data.rows import Merged
+from igrow.trainer.data.timestamps import ZONE
 
 _ROUNDS = 4
 """A remedy may uncover the next fault: a sum that is in another unit as well."""
@@ -61,7 +62,8 @@ def _on_another_clock(
 ) -> ExportMapping | None:
     """Return the mapping with the time zone under which the sun agrees; a zone that the user gave stays."""
     asked = any(question.about == "time_zone" for question in proposal.questions)
-    if site is None or not (asked or mapping.time.time_zone == site.time_zone):
+    told = mapping.time.format.endswith(ZONE)
+    if site is None or told or not (asked or mapping.time.time_zone == site.time_zone):
         return None
     wrong = [fault for fault in faults if fault.kind in CLOCK]
     if not wrong:

@@ -16,11 +16,12 @@ from igrow.trainer.data.importing import columns as names
 from igrow.trainer.data.importing.capacity import add_lamp_power, by_capacity
 from igrow.trainer.data.importing.folder import further_cells, joined
 from igrow.trainer.data.importing.layout import Layout, find_layout
+from igrow.trainer.data.importing.long_table import find_long, units_beside
 from igrow.trainer.data.importing.question import Answers, Question
 from igrow.trainer.data.importing.texts import ColumnTexts, column_texts
 from igrow.trainer.data.importing.time_format import TimeForm, find_time, why_none
 from igrow.trainer.data.importing.told_units import like_the_others, unit_of_cells
-from igrow.trainer.data.importing.zone import find_zone
+from igrow.trainer.data.importing.zone import find_zone, zones_asked
 from igrow.trainer.data.mapping import MISSING, ColumnMapping, ExportMapping, LongTable, TimeColumn
 from igrow.trainer.data.vocabulary import Unit
 
@@ -101,7 +102,9 @@ def propose(
         raise IgrowError(f"{path}: {why_none(dict(table.columns))}")
     time = _ordered(time, answers, draft)
     table, _ = readings(table, TimeColumn(time.column, time.time_of_day, time.form))
-    long = _long(table, time, layout)
+    long = find_long(table, (time.column, time.time_of_day), layout.decimal)
+    if long is not None:
+        unit_line = units_beside(table, long)
     only: dict[str, str] = {}
     if long is None:
         only = _rows_of_one(table, time, answers, draft)
@@ -118,15 +121,16 @@ def propose(
     assigned = names.assign(matches, compartment, answers.columns)
     mapped, units = _mapped(body, assigned, site, answers, draft)
     zone, why = find_zone(time, table, site, answers.time_zone)
+    shared = zones_asked(time, table) if zone is None else ()
     if zone is None:
-        choices = ("Europe/Amsterdam", "UTC")
+        choices = shared or ("Europe/Amsterdam", "UTC")
         question = "in which time zone are its times?"
-        draft.questions.append(Question("time_zone", question, choices, "--time-zone Europe/Amsterdam", blocks=True))
+        draft.questions.append(Question("time_zone", question, choices, f"--time-zone {choices[0]}", blocks=True))
     if why:
         draft.notes.append(why)
     mapping = ExportMapping(
         columns=mapped,
-        time=TimeColumn(time.column, time.time_of_day, time.form, zone or "UTC"),
+        time=TimeColumn(time.column, time.time_of_day, time.form, zone or next(iter(shared), "UTC")),
         delimiter=layout.delimiter,
         decimal=layout.decimal,
         missing=(*MISSING, *_marks(body, mapped)),
@@ -176,24 +180,6 @@ def _ordered(time: TimeForm, answers: Answers, draft: _Draft) -> TimeForm:
         text = "does the day or the month come first in its dates?"
         draft.questions.append(Question("date_order", text, orders, "--date-order dmy", blocks=True))
     return time
-
-
-def _long(table: ExportTable, time: TimeForm, layout: Layout) -> LongTable | None:
-    """Return the columns of name and value of an export with one reading a row."""
-    others = [name for name in table.columns if name not in (time.column, time.time_of_day)]
-    if len(others) > 6:
-        return None
-    for name in others:
-        labels = set(table[name])
-        if not 2 <= len(labels) <= 500 or len(labels) > 0.5 * len(table.lines):
-            continue
-        told = {match.quantity for match in names.find_matches(labels, {})}
-        value = next(
-            (one for one in others if one != name and column_texts(table[one], layout.decimal).numeric > 0.8), None
-        )
-        if len(told) >= 2 and value is not None and column_texts(table[name], layout.decimal).numeric < 0.2:
-            return LongTable(name, value)
-    return None
 
 
 def _rows_of_one(table: ExportTable, time: TimeForm, answers: Answers, draft: _Draft) -> dict[str, str]:

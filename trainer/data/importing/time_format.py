@@ -11,7 +11,8 @@ from itertools import pairwise
 import numpy as np
 
 from igrow.trainer.data import vocabulary
-from igrow.trainer.data.timestamps import EXCEL, ISO, UNIX, UNIX_MS, parser
+from igrow.trainer.data.timestamps import EXCEL, ISO, UNIX, UNIX_MS, ZONE, parser, wall_parser, without_weekday
+from igrow.trainer.data.zone_abbreviations import split
 
 _SAMPLE = 1500
 _LEAST_READ = 0.98
@@ -21,6 +22,8 @@ _DATE = re.compile(
     r"(\d{1,4}[-/.年]\s?\d{1,2}[-/.月]\s?\d{1,4}日?|\d{8}|\d{1,2}[-\s.]+[^\W\d_]{3,}\.?[-\s]+\d{2,4}|"
     r"[^\W\d_]{3,}\.?\s+\d{1,2},?\s+\d{4})(\D.*)?"
 )
+_COMPACT = re.compile(r"(19|20)\d\d(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])([01]\d|2[0-4])[0-5]\d([0-5]\d)?")
+"""Year to minute or second without a sign between them."""
 _TOKEN = re.compile(r"\d+|[^\W\d_]+|[^\w]+|_")
 
 
@@ -37,6 +40,9 @@ class TimeForm:
 
 def looks_like_time(text: str) -> bool:
     """Tell whether a cell may be a date, or a date and a time."""
+    text = without_weekday(text.strip())
+    if _COMPACT.fullmatch(text):
+        return True
     if _DATE.fullmatch(text.strip()) and not re.fullmatch(r"\d{8}", text.strip()):
         return True
     if re.fullmatch(r"\d{8}", text) and not 1900 <= int(text[:4]) <= 2100:
@@ -123,6 +129,11 @@ def _is_hour(name: str, texts: Sequence[str]) -> bool:
 
 def _forms(texts: Sequence[str]) -> list[str]:
     """Return the forms that read (nearly) all texts."""
+    if split(texts[0])[1]:
+        return [f"{form} {ZONE}" for form in _forms([split(text)[0] for text in texts])]
+    if all(_COMPACT.fullmatch(text) for text in texts[:50]):
+        forms = ["%Y%m%d%H%M" if len(texts[0]) == 12 else "%Y%m%d%H%M%S"]
+        return [form for form in forms if _reads(texts, form)]
     if all(re.fullmatch(r"\d+([.,]\d+)?", text) for text in texts[:50]) and not all(
         len(text) == 8 for text in texts[:50]
     ):
@@ -157,7 +168,7 @@ def _reads(texts: Sequence[str], form: str) -> bool:
 
 def _written_forms(texts: Sequence[str]) -> list[str]:
     """Return the strptime forms that the first text may have, by the order of day, month and year."""
-    tokens = _TOKEN.findall(texts[0])
+    tokens = _TOKEN.findall(without_weekday(texts[0]))
     numbers = [position for position, token in enumerate(tokens) if token.isdigit()]
     months = [p for p, token in enumerate(tokens) if vocabulary.folded(token) in vocabulary.month_names()]
     if numbers and len(tokens[numbers[0]]) == 8:
@@ -205,7 +216,7 @@ def _clock_after(tokens: Sequence[str], start: int, form: str) -> str | None:
 
 def _midnight(texts: Sequence[str], form: str) -> bool:
     """Tell whether all texts are dates without a time of day."""
-    read = parser(form)
+    read = wall_parser(form)
     try:
         return all(read(text).time() == datetime.time() for text in texts[:200])
     except ValueError:
@@ -217,14 +228,16 @@ def _best(column: str, clock: str | None, forms: Sequence[str], texts: Sequence[
     evenness = {form: _evenness(texts, form) for form in forms}
     best = max(evenness.values())
     # Nobody writes a year before the day: what is ISO 8601 is meant so, even where another form is a little more even.
-    ranked = sorted(forms, key=lambda form: (form != ISO or evenness[ISO] < best - 0.01, -evenness[form]))
+    ranked = sorted(
+        forms, key=lambda form: (not (form.startswith(ISO) and evenness[form] >= best - 0.01), -evenness[form])
+    )
     rivals = tuple(form for form in ranked[1:] if evenness[form] > evenness[ranked[0]] - 0.01)
-    return TimeForm(column, clock, ranked[0], rivals if ranked[0] != ISO else ())
+    return TimeForm(column, clock, ranked[0], rivals if not ranked[0].startswith(ISO) else ())
 
 
 def _evenness(texts: Sequence[str], form: str) -> float:
     """Return the share of steps between rows that are the usual one."""
-    read = parser(form)
+    read = wall_parser(form)
     seconds = []
     for text in texts[:_SAMPLE]:
         try:

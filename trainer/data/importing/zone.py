@@ -5,11 +5,15 @@ from __future__ import annotations
 import re
 
 from igrow.core.site import Site
-from igrow.trainer.data.export import ExportTable
+from igrow.trainer.data import vocabulary
+from igrow.trainer.data.export import ExportTable, written_times
 from igrow.trainer.data.importing.time_format import TimeForm
+from igrow.trainer.data.mapping import TimeColumn
+from igrow.trainer.data.timestamps import ZONE, wall_parser
+from igrow.trainer.data.zone_abbreviations import ahead_of_utc, split
 
 _OFFSET = re.compile(r"(?:GMT|UTC)\s*([+-])\s*(\d{1,2})(?::?(\d{2}))?")
-_WITH_OFFSET = re.compile(r"(\dT|:)\S*\s*(Z|[+-]\d\d:?\d\d)$")
+_WITH_OFFSET = re.compile(r"(\dT|:)\S*\s*(Z|[+-]\d\d:?\d\d)(\[[\w/+-]+\])?$")
 """A time of day with its offset: the year of 18-10-2020 is none."""
 _NAMED = re.compile(r"\b(UTC|GMT|CET|CEST)\b")
 
@@ -25,6 +29,8 @@ def find_zone(time: TimeForm, table: ExportTable, site: Site | None, given: str 
     """
     if given is not None:
         return given, ""
+    if time.form.endswith(ZONE):
+        return _abbreviated(time, table, site)
     told = _zone_in(" ".join((time.column, time.time_of_day or "")))
     if told is not None:
         return told, f"the column's name says that times are {told}"
@@ -34,6 +40,25 @@ def find_zone(time: TimeForm, table: ExportTable, site: Site | None, given: str 
     if site is not None and site.time_zone != "UTC":
         return site.time_zone, f"times are taken for wall times of {site.time_zone}, the site's zone"
     return None, ""
+
+
+def _abbreviated(time: TimeForm, table: ExportTable, site: Site | None) -> tuple[str | None, str]:
+    """Return the zone by which the abbreviations behind times are read; None where they are of several zones."""
+    texts = written_times(table, TimeColumn(time.column, time.time_of_day, time.form))
+    found = {name: split(text)[0] for text in texts if (name := split(text)[1])}
+    year = min((wall_parser(time.form)(f"{text} UTC").year for text in found.values()), default=2000)
+    zones = dict.fromkeys((site.time_zone if site is not None else "UTC", "UTC"))
+    for zone in zones:
+        if all(ahead_of_utc(name, zone, year) is not None for name in found):
+            return zone, f"each time tells its zone: {', '.join(sorted(found))}"
+    return None, ""
+
+
+def zones_asked(time: TimeForm, table: ExportTable) -> tuple[str, ...]:
+    """Return the zones that the abbreviations behind times may mean, where they are of several."""
+    texts = written_times(table, TimeColumn(time.column, time.time_of_day, time.form))
+    names = dict.fromkeys(split(text)[1] for text in texts)
+    return tuple(dict.fromkeys(zone for name in names for zone in vocabulary.zones_called(name)))
 
 
 def _zone_in(text: str) -> str | None:
