@@ -69,7 +69,7 @@ def messages() -> list[str]:
         for _, _, message, _, _ in extract_from_dir(folder, _METHODS, keywords=_KEYWORDS)
     ]
     for effect in EFFECTS.values():
-        found += [effect.title, effect.sentence, effect.separating_test]
+        found += [effect.title, effect.sentence, effect.separating_test, *filter(None, [effect.opposite])]
     return list(dict.fromkeys([*found, *sentences()]))
 
 

@@ -106,6 +106,8 @@ class Effect:
     sentence: str
     """For the grower; `{value}` and `{unit}` stand for the amplitude."""
     source: str
+    opposite: str = ""
+    """The same of a negative amplitude, with its size; empty where there is none."""
     memory: Memory | None = None
     measured: tuple[str, ...] = ()
     """The quantities whose measurement a sensor effect falsifies."""
@@ -121,6 +123,10 @@ class Effect:
     def shapes(self) -> tuple[Parameter, ...]:
         """The parameters that give the effect its form."""
         return self.parameters[1:]
+
+    def told(self, amplitude: float) -> tuple[str, float]:
+        """Return the sentence for an amplitude, and the size that stands in it."""
+        return (self.opposite, -amplitude) if amplitude < 0.0 and self.opposite else (self.sentence, amplitude)
 
     def values(self, **given: Array) -> dict[str, Array]:
         """Return all parameter values: those given, else the typical ones.

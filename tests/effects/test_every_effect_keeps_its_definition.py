@@ -156,3 +156,13 @@ def test_a_memory_rests_where_it_starts_under_drivers_that_stand_still(name: str
     drivers, values = read_hour(effect), effect.values()
     start = effect.memory.start(np, drivers, values)
     assert effect.memory.advance(np, start, drivers, values, 300.0) == pytest.approx(start)
+
+
+@pytest.mark.parametrize("effect", EFFECTS.values(), ids=list(EFFECTS))
+def test_an_effect_of_either_sign_has_a_sentence_for_both(effect: Effect) -> None:
+    assert bool(effect.opposite) == (effect.amplitude.low < 0.0)
+    for amplitude in (-2.0, 2.0):
+        sentence, size = effect.told(amplitude)
+        assert size == (abs(amplitude) if effect.opposite else amplitude)
+        assert sentence == (effect.opposite if effect.opposite and amplitude < 0.0 else effect.sentence)
+        assert "{value}" not in sentence.format(value=size, unit=effect.amplitude.unit)

@@ -90,7 +90,8 @@ def actuator(one: Replaced) -> Finding:
 def sentence(one: Estimated) -> str:
     """Return the grower's sentence, with the beginning where there is one."""
     effect = EFFECTS[one.effect]
-    text = effect.sentence.format(value=plain(one.amplitude.value), unit=written(effect.amplitude.unit))
+    said, amount = effect.told(one.amplitude.value)
+    text = said.format(value=plain(amount), unit=written(effect.amplitude.unit))
     if one.onset is not None:
         # A day begins at solar midnight, which may be before midnight in UTC: its noon tells the date.
         time = (one.onset.time + np.timedelta64(12, "h")).astype("datetime64[D]").item()

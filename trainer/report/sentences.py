@@ -101,8 +101,9 @@ def cause(finding: Finding, language: Language) -> str:
         return language.text(text, quantity=language.name(finding.effect))
     effect = EFFECTS[finding.effect]
     size = finding.parameters[effect.amplitude.name]
-    value = language.number(language.shown(size.unit).of(size.value))
-    told = language.text(effect.sentence, value=value, unit=language.unit(size.unit))
+    sentence, amount = effect.told(size.value)
+    value = language.number(language.shown(size.unit).of(amount))
+    told = language.text(sentence, value=value, unit=language.unit(size.unit))
     if finding.onset is not None:
         return language.text("Since {day}: {told}.", day=language.day(finding.onset.time), told=told)
     return language.text("{told}.", told=f"{told[0].upper()}{told[1:]}")
@@ -112,7 +113,8 @@ def omission(one: Omission, language: Language, *, completed: bool) -> list[str]
     """Return what a model lacked from its first day, what weeks that no fit saw say of it, and what became of it."""
     effect = EFFECTS[one.effect.name]
     size = one.effect.parameters[effect.amplitude.name]
-    told = language.text(effect.sentence, value=language.number(size.value), unit=language.unit(size.unit))
+    sentence, amount = effect.told(size.value)
+    told = language.text(sentence, value=language.number(amount), unit=language.unit(size.unit))
     lines = [language.text("The log of the calibration says what the model lacks: {told}.", told=told)]
     for error in one.errors:
         if error.horizon == "24_h":

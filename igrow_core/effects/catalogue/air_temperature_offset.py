@@ -24,6 +24,7 @@ EFFECT = Effect(
     separating_test="hold a calibrated hand sensor beside it",
     title="a temperature sensor that is off",
     sentence="the temperature sensor reads {value} {unit} too much",
+    opposite="the temperature sensor reads {value} {unit} too little",
     source="sensor practice",
     measured=("air_temperature",),
 )

@@ -24,6 +24,7 @@ EFFECT = Effect(
     separating_test="shade and ventilate the sensor box for a sunny hour",
     title="a temperature sensor that the sun warms",
     sentence="the sun warms the temperature sensor: it reads {value} K too much for each 100 W/m2",
+    opposite="the temperature sensor reads too little in the sun: {value} K for each 100 W/m2",
     source="sensor practice",
     measured=("air_temperature",),
 )

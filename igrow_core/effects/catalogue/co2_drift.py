@@ -24,6 +24,7 @@ EFFECT = Effect(
     separating_test="hold a calibrated hand sensor beside it, twice, a week apart",
     title="a CO2 sensor that drifts",
     sentence="the CO2 sensor drifts: {value} ppm more each 30 days",
+    opposite="the CO2 sensor drifts: {value} ppm less each 30 days",
     source="sensor practice",
     measured=("air_co2",),
 )

@@ -24,6 +24,7 @@ EFFECT = Effect(
     separating_test="hold a calibrated hand sensor beside it",
     title="a CO2 sensor that is off",
     sentence="the CO2 sensor reads {value} ppm too much",
+    opposite="the CO2 sensor reads {value} ppm too little",
     source="sensor practice",
     measured=("air_co2",),
 )

@@ -24,5 +24,6 @@ EFFECT = Effect(
     separating_test="wash one bay and compare the light below it",
     title="a cover that loses light",
     sentence="the cover loses light: {value} of it in 100 days",
+    opposite="the cover lets more light through than it did: {value} more in 100 days",
     source="general practice: dirt and ageing of covers",
 )

@@ -24,6 +24,7 @@ EFFECT = Effect(
     separating_test="hold a calibrated hand sensor beside it, twice, a week apart",
     title="a humidity sensor that drifts",
     sentence="the humidity sensor drifts: {value} % more each 30 days",
+    opposite="the humidity sensor drifts: {value} % less each 30 days",
     source="sensor practice",
     measured=("air_humidity",),
 )

@@ -24,6 +24,7 @@ EFFECT = Effect(
     separating_test="hold a calibrated hand sensor beside it",
     title="a humidity sensor that is off",
     sentence="the humidity sensor reads {value} % too much",
+    opposite="the humidity sensor reads {value} % too little",
     source="sensor practice",
     measured=("air_humidity",),
 )

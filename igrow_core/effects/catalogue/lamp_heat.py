@@ -33,6 +33,7 @@ EFFECT = Effect(
     separating_test="flash the lamps off schedule for an hour at night",
     title="lamps that heat the air more or less than thought",
     sentence="the lamps heat the air differently than expected: {value} of their power more",
+    opposite="the lamps heat the air less than expected: {value} of their power less",
     source="Katzin et al. (2020), Biosystems Engineering 194: energy balance of lamps",
     resembles=("lamp_heat_share",),
 )

@@ -38,5 +38,6 @@ EFFECT = Effect(
     separating_test="compare the day before and after deleafing",
     title="transpiration that follows the leaf area more",
     sentence="transpiration follows the leaf area more than expected ({value})",
+    opposite="transpiration follows the leaf area less than expected ({value})",
     source="Stanghellini (1987), thesis Wageningen: transpiration per leaf area",
 )

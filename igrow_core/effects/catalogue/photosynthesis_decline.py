@@ -24,5 +24,6 @@ EFFECT = Effect(
     separating_test="measure the photosynthesis of a leaf",
     title="a crop that assimilates less from week to week",
     sentence="the crop assimilates less from week to week: {value} less in 100 days",
+    opposite="the crop assimilates more from week to week: {value} more in 100 days",
     source="general practice: ageing and disease of a canopy",
 )

@@ -26,6 +26,7 @@ EFFECT = Effect(
     separating_test="hold a contact thermometer to the pipe",
     title="pipe temperature sensors that are off",
     sentence="the pipe temperature sensors read {value} {unit} too much",
+    opposite="the pipe temperature sensors read {value} {unit} too little",
     source="sensor practice",
     measured=("rail_pipe_temperature", "grow_pipe_temperature"),
 )
