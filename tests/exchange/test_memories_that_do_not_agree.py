@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from datetime import date
 from pathlib import Path
 
 import pytest
@@ -52,6 +53,25 @@ def test_a_trainer_that_lost_its_archive_gets_what_the_gateways_log_has(world: W
     world.collect(START + 3 * DAY, take_over=True)
     assert go_on(world, 3) == []
     world.assert_complete()
+
+
+@pytest.mark.parametrize("kind", ["telemetry", "events"])
+def test_a_damaged_day_says_how_it_is_mended_and_comes_again(
+    world: World, tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str
+) -> None:
+    world.run_days(0, 3)
+    world.collect(START + 3 * DAY)
+    world.round(START + 3 * DAY + 900)
+    (day, *_) = sorted((tmp_path / "archive" / kind / f"site={SITE}").rglob("*.parquet"))
+    whole = day.read_bytes()
+    day.write_bytes(whole[: len(whole) // 2])
+    (note,) = world.archive.read(SITE, date(2026, 2, 16), date(2026, 2, 19)).notes
+    assert "`igrow-trainer collect SITE --again`" in note
+    assert main(["collect", SITE, "--exchange", str(tmp_path / "exchange"), "--state", str(tmp_path), "--again"]) == 0
+    assert "could not be read, and is set aside" in capsys.readouterr().out
+    assert go_on(world, 3) == []
+    world.assert_complete()
+    assert day.with_suffix(".damaged").read_bytes() == whole[: len(whole) // 2]
 
 
 def test_a_second_trainer_is_told_so_and_takes_nothing(world: World, tmp_path: Path, capsys) -> None:

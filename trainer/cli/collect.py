@@ -28,6 +28,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--forward", metavar="TARGET", help="write new days to InfluxDB or PostgreSQL too, or to a file"
     )
     parser.add_argument("--take-over", action="store_true", help="go on where another archive has collected so far")
+    parser.add_argument(
+        "--again", action="store_true", help="set damaged days aside, and ask the gateway for its whole log once more"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -36,7 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
     failed = False
     for site in arguments.site:
         try:
-            done = collect(place, site, archive, utc_now(), take_over=arguments.take_over)
+            done = collect(place, site, archive, utc_now(), take_over=arguments.take_over, again=arguments.again)
             if arguments.forward is not None:
                 forward(archive, site, arguments.forward, utc_now().date() + timedelta(days=1))
         except (IgrowError, OSError) as error:

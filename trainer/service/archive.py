@@ -154,6 +154,20 @@ class Archive:
                 notes.append(str(error))
         return found, notes
 
+    def set_damaged_aside(self, site: str) -> list[Path]:
+        """Rename the files of a site's days that cannot be read, so that the days can be collected anew.
+
+        Returns where they lie then.
+        """
+        aside = []
+        for kind in ("telemetry", "foreign", "events"):
+            for path in sorted((self.root / kind / f"site={site}").glob("month=*/*.parquet")):
+                try:
+                    _read(path)
+                except IgrowError:
+                    aside.append(path.rename(path.with_suffix(".damaged")))
+        return aside
+
     def _day(self, kind: str, site: str, day: np.datetime64) -> Path:
         text = str(day)
         return self.root / kind / f"site={site}" / f"month={text[:7]}" / f"{text}.parquet"
@@ -178,7 +192,10 @@ def _read(path: Path) -> pa.Table:
         # One file, as it is: the names of its folders are no columns of it.
         return pq.ParquetFile(path).read()
     except (OSError, pa.ArrowException) as error:
-        raise IgrowError(f"{path}: cannot be read as Parquet: {str(error).splitlines()[0]}") from None
+        raise IgrowError(
+            f"{path}: cannot be read as Parquet ({str(error).splitlines()[0]}); put it back from a backup, or let "
+            "`igrow-trainer collect SITE --again` set it aside and ask the gateway for its log once more"
+        ) from None
 
 
 def _read_telemetry(path: Path) -> Telemetry:

@@ -17,7 +17,16 @@ from pathlib import Path
 import numpy as np
 
 from igrow.core.errors import IgrowError
-from igrow.core.exchange import DamagedError, ExchangeError, Place, Segment, SegmentError, SegmentName, open_segment
+from igrow.core.exchange import (
+    DamagedError,
+    ExchangeError,
+    Place,
+    Receipt,
+    Segment,
+    SegmentError,
+    SegmentName,
+    open_segment,
+)
 from igrow.core.exchange.segment import LARGEST_SEGMENT
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.service.archive import Archive
@@ -50,9 +59,12 @@ class Collected:
     """One sentence for each thing that a person should know."""
 
 
-def collect(place: Place, site: str, archive: Archive, now: datetime, *, take_over: bool = False) -> Collected:
+def collect(
+    place: Place, site: str, archive: Archive, now: datetime, *, take_over: bool = False, again: bool = False
+) -> Collected:
     """Collect everything that site `site` left in the exchange; `take_over` where another archive has collected it.
 
+    `again` sets days that cannot be read aside first, and asks the gateway for all that its log still has.
     Raises ExchangeError where the exchange fails, and IgrowError where another run, or another trainer, collects the
     same site.
     """
@@ -60,6 +72,8 @@ def collect(place: Place, site: str, archive: Archive, now: datetime, *, take_ov
     with _alone(archive, site):
         claim(place, site, archive.root, now, take_over=take_over)
         ledger = read_ledger(archive.root, site)
+        if again:
+            _ask_again(place, archive, ledger, done)
         found = [name for entry in place.entries(f"{site}/segments") if (name := SegmentName.parse(entry.name))]
         found.sort(key=lambda name: (name.chain, name.number, name.digest))
         for begin in range(0, len(found), SAVED_EVERY):
@@ -75,6 +89,16 @@ def collect(place: Place, site: str, archive: Archive, now: datetime, *, take_ov
         done.notes += ledger.missing()
         done.newest = ledger.newest
     return done
+
+
+def _ask_again(place: Place, archive: Archive, ledger: SiteLedger, done: Collected) -> None:
+    """Take every receipt back: the gateway then seals its log from its first row on; what is here stays as it is."""
+    done.notes += [f"{path}: could not be read, and is set aside" for path in archive.set_damaged_aside(ledger.site)]
+    chains, ledger.chains = list(ledger.chains), {}
+    ledger.save()
+    for chain in chains:
+        place.put(f"{ledger.site}/receipts/{chain}.json", json.dumps(Receipt(chain).to_json()).encode())
+    done.notes.append("the gateway is asked for all that its log still has; its next rounds send it")
 
 
 def _collect_segment(
