@@ -26,6 +26,9 @@ from benchmarks.projection import Cluster, Costs, report
 from igrow.core.exchange import Entry, FolderPlace, Seal, pack_segment
 from igrow.core.quantities import QUANTITIES
 from igrow.core.telemetry import Telemetry
+from igrow.edge.exchange.service import TransferRules
+from igrow.edge.image import Quality, Value
+from igrow.edge.store import SqliteStore, StoreLimits
 from igrow.trainer.data import read_log
 from igrow.trainer.fleet.runner import run_tasks
 from igrow.trainer.fleet.tasks import Ending, Task
@@ -96,6 +99,26 @@ class Collected:
     looking: float
     showing: float
     row: float
+
+
+def on_the_gateway(step: float) -> None:
+    """Print how long a gateway's own log and its outbox reach back."""
+    with tempfile.TemporaryDirectory() as text:
+        sizes, limits = [], StoreLimits()
+        for day in range(4):
+            store, rows = SqliteStore(Path(text)), day_of_log(day, step, day)
+            for number, moment in enumerate(rows.time.astype("int64")):
+                values = {name: Value(float(rows[name][number]), Quality.GOOD, 0.0) for name in rows.columns}
+                store.append(float(moment), values)
+            store.close()
+            sizes.append((Path(text) / "telemetry.db").stat().st_size)
+    grows = (sizes[-1] - sizes[0]) / (len(sizes) - 1)
+    sent = len(seal_day("house", 0, "", step, 0)[1])
+    print(f"in the gateway's own log              {grows / 1e6:8.3f} MB a day: "
+          f"{limits.telemetry_bytes / 2**20:.0f} MB hold {limits.telemetry_bytes / grows:.0f} days")  # fmt: skip
+    budget = TransferRules().budget
+    print(f"in the outbox, while offline          {sent / 1e6:8.3f} MB a day: "
+          f"{budget / 2**20:.0f} MB hold {budget / sent:.0f} days")  # fmt: skip
 
 
 def collect_fleet(sites: int, step: float) -> Collected:
@@ -223,6 +246,7 @@ def main() -> None:
     parser.add_argument("--memory", type=float, default=128.0, help="of the cluster, GB (default 128)")
     parser.add_argument("--price", type=float, default=0.05, help="EUR a core and hour, assumed (default 0.05)")
     options = parser.parse_args()
+    on_the_gateway(options.seconds)
     found = collect_fleet(options.sites, options.seconds)
     requests = with_history(options.history, 600.0)
     diagnosing, megabytes = weekly_diagnosis(options.diagnose)

@@ -190,7 +190,7 @@ class MoodyWorld(World):
         self.unit.freeze()
         await self.run(self.random.choice([2, 8, 14, 40]))
         if self.random.random() < 0.3 and self.bench.cycle._writer.beats.kept:
-            await self.run(LATE_BEATS)
+            await self.run(LATE_BEATS + 4)
             assert "answer for a PLC" in self.bench.cycle._writer.beats.problem
         self.unit.frozen = False
         await self.run(self.until_rested())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import time
+from collections.abc import Callable
 from datetime import UTC, date, datetime
 from pathlib import Path
 
@@ -40,24 +41,39 @@ def service(tmp_path: Path, store: SqliteStore, **rules: float) -> ExchangeServi
     )  # fmt: skip
 
 
-def finish(exchange: ExchangeService, now: float) -> None:
+def wait_until(done: Callable[[], object]) -> None:
     until = time.monotonic() + PATIENCE
-    while exchange.busy and time.monotonic() < until:
-        time.sleep(0.05)
+    while not done():
+        assert time.monotonic() < until
+        time.sleep(0.02)
+
+
+def tick(exchange: ExchangeService, now: float | None) -> None:
+    """Let the service look at the time, and wait until it has: a tick itself waits for nobody."""
+    exchange.tick(now)
+    wait_until(lambda: not exchange._aside.waiting)
+
+
+def finish(exchange: ExchangeService) -> None:
+    """Wait for the end of the round that is under way."""
+
+    def over() -> bool:
         exchange._reap()
-    assert not exchange.busy
+        return not exchange.busy
+
+    wait_until(over)
 
 
 def test_a_day_that_is_over_is_sealed_and_sent_by_a_process_of_its_own(tmp_path: Path, store: SqliteStore) -> None:
     exchange = service(tmp_path, store)
-    exchange.tick(START + DAY + 300)
+    tick(exchange, START + DAY + 300)
     assert exchange.busy
-    finish(exchange, START + DAY + 300)
+    finish(exchange)
     assert exchange.health == ""
     (path,) = (tmp_path / "exchange" / "house" / "segments").iterdir()
     name = SegmentName.parse(path.name)
     assert name is not None and name.number == 1
-    exchange.tick(START + DAY + 310)
+    tick(exchange, START + DAY + 310)
     assert not exchange.busy, "nothing is due"
     exchange.close()
 
@@ -66,8 +82,8 @@ def test_without_a_true_clock_nothing_is_sealed_and_receipts_are_still_taken(
     tmp_path: Path, store: SqliteStore
 ) -> None:
     exchange = service(tmp_path, store)
-    exchange.tick(None)
-    finish(exchange, START)
+    tick(exchange, None)
+    finish(exchange)
     assert exchange.health == ""
     assert json.loads((tmp_path / "state" / "status.json").read_text())["sealed"] == 0
     exchange.close()
@@ -77,16 +93,16 @@ def test_what_a_clock_that_went_back_between_two_rounds_has_logged_arrives_too(
     tmp_path: Path, store: SqliteStore
 ) -> None:
     exchange = service(tmp_path, store)
-    exchange.tick(START + DAY + 300)
-    finish(exchange, START + DAY + 300)
+    tick(exchange, START + DAY + 300)
+    finish(exchange)
     for second in range(0, 600, 60):
         moment = START + 5000.5 + second
         store.append(moment, {"air_temperature": Value(21.0, Quality.GOOD, 0.0)})
-        exchange.tick(moment)
+        tick(exchange, moment)
     store.append(START + DAY + 900, {"air_temperature": Value(20.0, Quality.GOOD, 0.0)})
     exchange._started = float("-inf")  # as if the time of the next round had come
-    exchange.tick(START + DAY + 1200)
-    finish(exchange, START + DAY + 1200)
+    tick(exchange, START + DAY + 1200)
+    finish(exchange)
     assert exchange.health == ""
     assert exchange._seen is None
     archive = Archive(tmp_path / "archive")
@@ -98,8 +114,8 @@ def test_what_a_clock_that_went_back_between_two_rounds_has_logged_arrives_too(
 def test_a_report_is_sent_with_the_log_that_belongs_to_it(tmp_path: Path, store: SqliteStore) -> None:
     exchange = service(tmp_path, store)
     exchange.leave_report(START + DAY / 2, "a-adopted", {"verdict": "adopted"})
-    exchange.tick(START + DAY / 2)
-    finish(exchange, START + DAY / 2)
+    tick(exchange, START + DAY / 2)
+    finish(exchange)
     assert len(list((tmp_path / "exchange" / "house" / "reports").iterdir())) == 1
     assert len(list((tmp_path / "exchange" / "house" / "segments").iterdir())) == 1
     exchange.close()
@@ -115,32 +131,39 @@ def hang(tmp_path: Path) -> None:
     (source / "timestamp.json").write_text("{}")
 
 
-def test_an_exchange_that_hangs_holds_neither_a_tick_nor_the_stop_and_is_told(tmp_path: Path, store) -> None:
+def test_an_exchange_that_hangs_holds_neither_a_tick_nor_the_stop(tmp_path: Path, store: SqliteStore) -> None:
     hang(tmp_path)
-    exchange = service(tmp_path, store, deadline=2.0)
-    exchange.tick(START + DAY + 300)
+    exchange = service(tmp_path, store, deadline=PATIENCE)
+    tick(exchange, START + DAY + 300)
+    # What comes before the hang is done.
+    wait_until(lambda: list((tmp_path / "exchange" / "house").glob("segments/*.zip")))
     for _ in range(20):
-        began = time.monotonic()
-        exchange.tick(START + DAY + 300)
-        assert time.monotonic() - began < PATIENCE  # a hang, not a speed
-        time.sleep(0.01)
-    finish(exchange, START + DAY + 300)
-    assert "no end within 2 s" in exchange.health
-    assert (tmp_path / "exchange" / "house" / "segments").exists(), "what came before the hang was done"
-    exchange._started = float("-inf")
-    exchange.tick(START + 2 * DAY + 300)
+        tick(exchange, START + DAY + 300)
+        assert exchange.busy
     courier = exchange._process
     assert courier is not None
     exchange.close()
-    assert courier.poll() is not None, "a round that hangs is ended by the stop"
+    courier.wait(PATIENCE)  # a round that hangs is ended by the stop
 
 
-def test_a_stop_seals_what_there_is_of_the_day(tmp_path: Path, store: SqliteStore) -> None:
+def test_a_round_that_hangs_is_ended_and_told(tmp_path: Path, store: SqliteStore) -> None:
+    hang(tmp_path)
+    exchange = service(tmp_path, store, deadline=1.0)
+    tick(exchange, START + DAY + 300)
+    finish(exchange)
+    assert "no end within 1 s" in exchange.health
+    exchange.close()
+
+
+def test_a_stop_seals_what_there_is_of_the_day(
+    tmp_path: Path, store: SqliteStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("igrow.edge.exchange.service.CLOSING_SECONDS", PATIENCE)
     exchange = service(tmp_path, store)
-    exchange.tick(START + DAY / 2)
-    finish(exchange, START + DAY / 2)
+    tick(exchange, START + DAY / 2)
+    finish(exchange)
     assert not (tmp_path / "exchange" / "house").exists()
-    exchange.tick(START + DAY / 2 + 60)
+    tick(exchange, START + DAY / 2 + 60)
     exchange.close()
     status = json.loads((tmp_path / "state" / "status.json").read_text())
     assert status["problem"] == ""

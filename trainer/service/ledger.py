@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -17,6 +18,10 @@ from igrow.core.whole_files import sync_folder, write_whole
 
 KEPT = 100
 """Newest segments of a chain whose digests are remembered; what is older and comes again is merged again."""
+
+
+RETURNS = 3
+"""So often a chain goes on after another one, until two gateways are said to seal them."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +53,8 @@ class SiteLedger:
     """In the order in which the last segment of each came."""
     newest: datetime | None = None
     """Time of the newest row."""
+    returns: int = 0
+    """How often a chain went on, further than another one that had come after it."""
 
     def has(self, name: SegmentName) -> bool:
         """Tell whether this very segment was collected."""
@@ -62,8 +69,15 @@ class SiteLedger:
     def add(self, segment: Segment) -> list[str]:
         """Note a segment; returns a sentence for each break of its chain."""
         name, seal = segment.name, segment.seal
+        returned = self._returns(segment)
+        self.returns += returned
         chain = self._chain(name.chain)
         notes = self._breaks(chain, segment)
+        if returned and self.returns >= RETURNS:
+            notes.append(
+                f"segment {name.number} goes on with a chain that another one had followed, {self.returns} times: "
+                f"do two gateways call themselves {self.site}? Their rows are mixed here; give one of them another name"
+            )
         lost = [n for first, last in seal.given_up for n in range(first, last + 1) if not chain.receipt.holds(n)]
         if lost:
             chain.given_up.update(lost)
@@ -78,6 +92,14 @@ class SiteLedger:
             newest = datetime.fromtimestamp(int(segment.telemetry.time[-1].astype("int64")), UTC)
             self.newest = newest if self.newest is None else max(self.newest, newest)
         return notes
+
+    def _returns(self, segment: Segment) -> bool:
+        """Tell whether a chain goes on beyond the one that came last; a gateway that has begun another never does."""
+        name, last = segment.name, next(reversed(self.chains), None)
+        if last in (None, name.chain) or name.chain not in self.chains:
+            return False
+        furthest = max((link.end for link in self.chains[last].links.values()), default=math.inf)
+        return name.number > max(self.chains[name.chain].links, default=0) and segment.seal.end > furthest
 
     def add_refused(self, name: SegmentName) -> None:
         """Note a segment that cannot be used: it is not wanted again."""
@@ -109,6 +131,7 @@ class SiteLedger:
         """Write the ledger, durably; raises OSError."""
         document = {
             "site": self.site,
+            "returns": self.returns,
             "newest": None if self.newest is None else self.newest.timestamp(),
             "chains": [
                 {
@@ -147,11 +170,11 @@ def read_ledger(archive: Path, site: str) -> SiteLedger:
     empty = SiteLedger(path, site)
     try:
         document = parse_object(path.read_bytes(), str(path))
-        newest = document["newest"]
+        newest, returns = document["newest"], int(document.get("returns", 0))
         chains = {one["chain"]: _chain(one) for one in document["chains"]}
     except (IgrowError, OSError, KeyError, TypeError, ValueError, ArithmeticError):
         return empty
-    return SiteLedger(path, site, chains, None if newest is None else datetime.fromtimestamp(newest, UTC))
+    return SiteLedger(path, site, chains, None if newest is None else datetime.fromtimestamp(newest, UTC), returns)
 
 
 def _chain(one: dict[str, Any]) -> Chain:
