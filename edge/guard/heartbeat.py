@@ -15,6 +15,7 @@ HIGHEST_BEAT = 65_535
 UNSURE_BEATS = 1000
 """Beats without an answer, of which any one may stand in the register."""
 KEPT = "heartbeat_kept"
+KEEPS = "heartbeat_keeps"
 CLEARED_FOR_NOTHING = "heartbeat_cleared_for_nothing"
 STRANGE_NUMBERS = 3
 """Readings in a row with ever another number that is not ours, after which somebody else counts there."""
@@ -162,11 +163,11 @@ class BeatCount:
 
     def note(self) -> dict[str, object]:
         """Return what a restart must not forget."""
-        kept: dict[str, object] = {KEPT: True} if self.kept else {}
-        return kept | ({CLEARED_FOR_NOTHING: self._idle} if self._idle else {})
+        noted = {KEPT: self.kept, KEEPS: self._keeps, CLEARED_FOR_NOTHING: self._idle}
+        return {name: value for name, value in noted.items() if value}
 
     def recall(self, content: Mapping[str, object]) -> None:
         """Take over what the process before this one has noted."""
-        self._kept_before = self._keeps = content.get(KEPT) is True
+        self._kept_before, self._keeps = content.get(KEPT) is True, content.get(KEEPS) is True
         idle = content.get(CLEARED_FOR_NOTHING)
         self._idle = idle if isinstance(idle, int) and not isinstance(idle, bool) else 0
