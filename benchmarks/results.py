@@ -63,14 +63,14 @@ RESULTS = {
     ),
     "diagnosis-others": Result(
         "Greenhouses that nothing was learned from",
-        ("benchmarks.diagnosis", "others", "--cases", "104"),
+        ("benchmarks.diagnosis", "others", "--cases", "52"),
         "Each with a model that was calibrated on its own eight weeks before.",
         "26000 and on; greenhouses from 60000",
         long=True,
     ),
     "diagnosis-transferred": Result(
         "The same with the built-in bundle",
-        ("benchmarks.diagnosis", "transferred", "--cases", "104"),
+        ("benchmarks.diagnosis", "transferred", "--cases", "52"),
         "Of these greenhouses only the site file is known.",
         "26000 and on; greenhouses from 60000",
         long=True,
