@@ -139,15 +139,17 @@ async def test_a_log_that_cannot_be_read_delays_nobody_and_is_no_plan(planner) -
 
 async def test_a_process_that_was_stopped_takes_no_request_and_is_replaced(planner, monkeypatch) -> None:
     """A large request does not fit into the pipe, so that one who only writes would wait for ever."""
-    monkeypatch.setattr("igrow.edge.planning.graph_process.SEND_SECONDS", 2.0)
     service = planner("good")
     service.request(request)
     await service.wait(PATIENCE)
     os.kill(service._graphs.pid, signal.SIGSTOP)
     seconds = np.arange(200_000).astype("datetime64[s]")
     large = Telemetry(seconds, {"air_temperature": np.zeros(len(seconds))})
-    service.request(lambda: request(log=large))
-    await service.wait(PATIENCE)
+    # Of the stopped process alone: one that has just been started may need longer on a busy machine.
+    with monkeypatch.context() as patch:
+        patch.setattr("igrow.edge.planning.graph_process.SEND_SECONDS", 2.0)
+        service.request(lambda: request(log=large))
+        await service.wait(PATIENCE)
     assert "took too long" in service.health
     service.request(request)
     await service.wait(PATIENCE)
