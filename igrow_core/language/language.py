@@ -27,6 +27,7 @@ PART = re.compile(
     + r"))?)(?![\w/-]|[.:]\w)"
 )
 """A name of the program, or a number with what unit it has, within a line."""
+_TEMPERATURE = re.compile(r"(?<![\w.,/-])([-−]?\d+(?:[.,]\d+)?) (K|degC|°C)(?![\w/])")
 LANGUAGES = ("en", "nl", "de", "es", "zh")
 """Codes of the languages; texts are written in the first."""
 
@@ -70,6 +71,14 @@ class Language:
         if found["unit"]:
             return self.amount(float(found["number"].replace("−", "-")), found["unit"], 4)
         return found["number"].replace(".", self.locale.decimal)
+
+    def in_units(self, text: str) -> str:
+        """Return a text of ours with its temperatures in the units that people use: 2 K lower, at 20 degC."""
+
+        def shown(found: re.Match[str]) -> str:
+            return self.amount(float(found[1].replace("−", "-").replace(",", ".")), found[2].replace("°C", "degC"), 3)
+
+        return _TEMPERATURE.sub(shown, text) if self.units == "us" else text
 
     def name(self, word: str) -> str:
         """Return what people call a quantity, parameter, balance or reason of the program."""

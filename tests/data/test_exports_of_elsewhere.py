@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pandas as pd
 import pytest
 
 from igrow.core import sun
+from igrow.core.errors import IgrowError
 from igrow.core.local_time import to_local
 from igrow.core.telemetry import Telemetry, to_grid
 from igrow.trainer.cli import main
@@ -247,11 +249,37 @@ def _month_first(frame: pd.DataFrame) -> tuple[str, str]:
     return frame.assign(Time=times).to_csv(index=False), "as %b %d, %Y %I:%M %p"
 
 
+def _blocks(frame: pd.DataFrame) -> tuple[str, str]:
+    """Each day with its title and its header."""
+    days = [frame.iloc[row : row + 48].to_csv(index=False) for row in range(0, len(frame), 48)]
+    text = "".join(f"Climate report of day {number}\n{day}\n" for number, day in enumerate(days, 1))
+    return text, "no readings, set aside: line"
+
+
+def _unicode_minus(frame: pd.DataFrame) -> tuple[str, str]:
+    return frame.to_csv(index=False).replace(",-", ",\u2212"), ""
+
+
+def _marks_of_faults(frame: pd.DataFrame) -> tuple[str, str]:
+    frame = frame.astype(object)
+    frame.iloc[100, 1], frame.iloc[200, 2] = "Störung", "k.A."
+    return frame.to_csv(index=False), "taken for no reading: 'Störung', 'k.A.'"
+
+
+def _extremes(frame: pd.DataFrame) -> tuple[str, str]:
+    for column in frame.columns[1:]:
+        frame[f"max. {column}"], frame[f"{column} minimum"] = frame[column] + 5.0, frame[column] - 5.0
+    return frame[["Time", *sorted(frame.columns[1:], reverse=True)]].to_csv(index=False), "not used: "
+
+
 def _line_breaks(frame: pd.DataFrame) -> tuple[str, str]:
     return frame.rename(columns=lambda name: name.replace(" ", "\n")).to_csv(index=False), "Air temp (C)"
 
 
-@pytest.mark.parametrize("habit", [_footer, _uhr, _month_first, _line_breaks])
+@pytest.mark.parametrize(
+    "habit",
+    [_footer, _uhr, _month_first, _line_breaks, _blocks, _unicode_minus, _marks_of_faults, _extremes],
+)
 def test_an_odd_habit_is_read(
     tmp_path: Path, log: Telemetry, capsys, habit: Callable[[pd.DataFrame], tuple[str, str]]
 ) -> None:
@@ -335,6 +363,68 @@ def test_vents_and_screens_that_are_open_or_closed(tmp_path: Path, log: Telemetr
     table = read_log(tmp_path / "export.csv").telemetry
     np.testing.assert_array_equal(table["vent_lee"], np.where(log["vent_lee"] > 1.0, 100.0, 0.0))
     np.testing.assert_array_equal(table["energy_screen"], np.where(log["energy_screen"] > 50.0, 100.0, 0.0))
+
+
+@pytest.mark.parametrize("parts", [("Year", "Month", "Day", "Hour", "Minute"), ("Date", "Hour", "Minute")])
+def test_a_time_in_many_columns_is_never_read_by_some_of_them(
+    tmp_path: Path, log: Telemetry, capsys, parts: Sequence[str]
+) -> None:
+    """The hour alone would put two rows on one time, and lose half of them."""
+    frame = written(log, PLAIN).drop(columns="Time")
+    local = pd.DatetimeIndex(to_local(log.time, AMSTERDAM))
+    for position, part in enumerate(parts):
+        frame.insert(position, part, local.strftime("%Y-%m-%d") if part == "Date" else getattr(local, part.lower()))
+    frame.to_csv(tmp_path / "export.csv", index=False)
+    assert imported(tmp_path) == 2
+    told = f"its time stands in {len(parts)} columns ({', '.join(parts)}): join them in one, such as 2020-02-01 13:30"
+    assert told in capsys.readouterr().err
+
+
+def test_a_zip_archive_is_unpacked_beside_it(tmp_path: Path, log: Telemetry, capsys) -> None:
+    frame = written(log, PLAIN)
+    with zipfile.ZipFile(tmp_path / "export.zip", "w") as archive:
+        for row in range(0, len(frame), 48):
+            archive.writestr(f"days/{row // 48:02}.csv", frame.iloc[row : row + 48].to_csv(index=False))
+        archive.writestr("__MACOSX/days/._00.csv", b"\x00\x05")
+        archive.writestr("readme.txt", "Exported by the greenhouse computer.")
+    assert imported(tmp_path, "--dry-run", export="export.zip") == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["export.zip", "site.yaml"]
+    with pytest.raises(
+        IgrowError, match=r"a zip archive that is not unpacked yet \(`igrow-trainer import .*export.zip`"
+    ):
+        read_log(tmp_path / "export.zip")
+    assert imported(tmp_path, export="export.zip") == 0
+    assert f"next: igrow-trainer calibrate {tmp_path / 'export'} --site" in capsys.readouterr().out
+    assert_reads_as(tmp_path, log, export="export.zip")
+    assert_reads_as(tmp_path, log, export="export")
+    assert imported(tmp_path, export="export.zip") == 2
+    assert "export exists already" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("spoilt", ["no table", "cut off", "no archive"])
+def test_a_zip_archive_of_no_tables_is_refused_in_one_line(tmp_path: Path, capsys, spoilt: str) -> None:
+    with zipfile.ZipFile(tmp_path / "export.zip", "w") as archive:
+        archive.writestr("photo.jpg" if spoilt == "no table" else "log.csv", "x" * 9000)
+    if spoilt != "no table":
+        whole = (tmp_path / "export.zip").read_bytes()
+        (tmp_path / "export.zip").write_bytes(b"Zip" if spoilt == "no archive" else whole[: len(whole) // 2])
+    assert imported(tmp_path, export="export.zip") == 2
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert ("no table in it" in told) or ("is no whole zip archive" in told)
+
+
+def test_of_what_is_open_the_status_tells_although_a_mapping_is_written(tmp_path: Path, log: Telemetry, capsys) -> None:
+    written(log, PLAIN).drop(columns="Outside temp (C)").to_csv(tmp_path / "inside.csv", index=False)
+    weather = written(log, PLAIN)[["Time", "Outside temp (C)"]]
+    weather.to_csv(tmp_path / "weather.csv", index=False)
+    assert imported(tmp_path, export="inside.csv") == 2
+    told = capsys.readouterr().out
+    assert "open: which column is the outdoor_temperature, or in which other file does it stand?" in told
+    assert "with the answer, --force replaces it" in told
+    assert "next:" not in told
+    assert (tmp_path / "inside.mapping.yaml").is_file()
+    assert imported(tmp_path, str(tmp_path / "weather.csv"), "--force", export="inside.csv") == 0
 
 
 def test_what_is_set_aside_is_said_at_once(tmp_path: Path, log: Telemetry, capsys) -> None:

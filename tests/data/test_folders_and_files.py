@@ -52,12 +52,12 @@ def test_a_text_with_tabs_may_be_called_a_workbook(tmp_path: Path, log: Telemetr
 
 
 def test_what_is_no_table_is_named(tmp_path: Path, capsys) -> None:
-    with zipfile.ZipFile(tmp_path / "export.zip", "w") as archive:
+    with zipfile.ZipFile(tmp_path / "archive.csv", "w") as archive:
         archive.writestr("log.csv", "Time,T\n")
     (tmp_path / "export.xls").write_text("<html><table><tr><td>1</td></tr></table></html>")
     (tmp_path / "export.csv").write_bytes(b"%PDF-1.7 ...")
     for name, message in (
-        ("export.zip", "is a zip archive or a workbook: unpack it into a folder and import that"),
+        ("archive.csv", "is a zip archive or a workbook: let its name end in .zip or .xlsx"),
         ("export.xls", "is a page of HTML or XML: open it in a spreadsheet and save it as CSV or .xlsx"),
         ("export.csv", "is a PDF: a table is needed"),
     ):

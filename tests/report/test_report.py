@@ -24,7 +24,7 @@ from igrow.trainer.diagnosis import Diagnosis, plots
 from igrow.trainer.diagnosis.open_vents import OpenVents
 from igrow.trainer.diagnosis.persistence import misfits, persistence_errors
 from igrow.trainer.diagnosis.result import Interval
-from igrow.trainer.report import render_report, sentences, write_diagnosis
+from igrow.trainer.report import data_faults, render_report, sentences, write_diagnosis
 from igrow.trainer.report.page import error_rows
 from igrow.trainer.report.worth import Worth, worth
 from tests.diagnosis.conftest import greenhouse_log
@@ -184,7 +184,7 @@ def test_what_a_fault_of_the_data_saw_is_told_and_its_mend_can_be_copied() -> No
     table = greenhouse_log(1, days=8).telemetry
     table = table.with_columns({"air_temperature": table["air_temperature"] * 1.8 + 32.0})
     (fault,) = find_faults(table)
-    _, detail = sentences.fault(fault, speak("de"))
+    _, detail = data_faults.fault(fault, speak("de"))
     assert re.search(r"Lufttemperatur .*Median von \d\d,\d", detail)
     assert "air_temperature: {column: ..., scale: 0.5555556, offset: -17.77778}" in detail
     assert not re.search(r"\b(has|so it is|in the mapping)\b", detail)
@@ -232,6 +232,14 @@ def test_the_size_of_a_cause_goes_with_its_unit(leak: Diagnosis) -> None:
     finding = replace(leak.findings[0], effect="air_temperature_offset", parameters={"offset": offset}, onset=None)
     assert sentences.cause(finding, speak("en", units="us")) == "The temperature sensor reads 1.8 °F too much."
     assert sentences.cause(finding, speak("de")) == "Der Temperatursensor zeigt 1 K zu viel an."
+    sun = Interval(0.5, 0.3, 0.7, "K (100 W m-2)-1")
+    name = "air_temperature_radiation_error"
+    warmed = replace(finding, effect=name, parameters={EFFECTS[name].amplitude.name: sun})
+    assert "it reads 0.9 °F too much for each" in sentences.cause(warmed, speak("en", units="us"))
+    stored = replace(finding, effect="soil_heat_storage", confounded=("pipe_lag",))
+    assert sentences.checks(stored, speak("en", units="us"))[0].startswith("Hold the heating setpoint 3.6 °F lower")
+    assert "18 °F" in sentences.checks(stored, speak("de", units="us"))[1]
+    assert "2 K lower" in sentences.checks(stored, speak("en"))[0]
     home = replace(leak, findings=(finding,))
     assert home.log is not None
     american = replace(home, log=replace(home.log, site=replace(home.log.known_site, units="us")))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+import tempfile
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,6 +14,7 @@ from igrow.core.errors import IgrowError
 from igrow.core.site import Site, load_site
 from igrow.core.telemetry import concatenate
 from igrow.core.whole_files import write_whole
+from igrow.trainer.data.importing.archive import is_archive, unpack
 from igrow.trainer.data.importing.check import Checked, check
 from igrow.trainer.data.importing.folder import alike
 from igrow.trainer.data.importing.proposal import Proposal, propose
@@ -27,7 +29,11 @@ EXAMPLE = "igrow-trainer import export.csv --site site.yaml"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument(
-        "file", nargs="+", type=Path, metavar="FILE", help="export: CSV, text, Excel or Parquet; or a folder of such"
+        "file",
+        nargs="+",
+        type=Path,
+        metavar="FILE",
+        help="export: CSV, text, Excel or Parquet; a folder or a zip archive of such",
     )
     parser.add_argument("--site", type=Path, help="the site's YAML file: its zone and its sun tell much")
     parser.add_argument(
@@ -46,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Import; returns 0, or 2 where something is open that only the user knows.
+    """Import; returns 0, or 2 where something is open that only the user knows, whether a mapping was written or not.
 
     Raises:
         IgrowError: a file is no table of readings over time.
@@ -60,14 +66,32 @@ def run(arguments: argparse.Namespace) -> int:
         _pairs("--column", arguments.column),
         _pairs("--unit", arguments.unit),
     )
-    done = [_import(given, site, answers, arguments) for given in arguments.file]
+    with tempfile.TemporaryDirectory(prefix="igrow-import-") as temporary:
+        places = [_unpacked(given, Path(temporary), arguments) for given in arguments.file]
+        grouped = [_groups(place, site, answers, arguments) for place in places]
+        known = {name for groups in grouped for group in groups for name in group.checked.mapping.columns}
+        done = [_finish(place, groups, known, site, arguments) for place, groups in zip(places, grouped, strict=True)]
     if not all(done):
         return 2
     if not arguments.dry_run:
-        files, place = " ".join(map(str, arguments.file)), arguments.site or "site.yaml"
+        files, place = " ".join(map(str, places)), arguments.site or "site.yaml"
         print(f"\nnext: igrow-trainer calibrate {files} --site {place} --fit-weeks 4 --out bundle")
         print(f"then: igrow-trainer diagnose {files} --site {place} --bundle bundle --out diagnosis")
     return 0
+
+
+def _unpacked(given: Path, temporary: Path, arguments: argparse.Namespace) -> Path:
+    """Return the folder of an archive's tables: beside it, or a temporary one where nothing is to be written."""
+    if not is_archive(given):
+        return given
+    if arguments.dry_run:
+        return unpack(given, temporary / given.stem)
+    folder = given.with_suffix("")
+    if folder.exists() and not arguments.force:
+        raise IgrowError(f"{folder} exists already: import that, or --force to unpack {given.name} into it once more")
+    unpack(given, folder)
+    print(f"unpacked {given} into {folder}")
+    return folder
 
 
 def _pairs(option: str, texts: Sequence[str]) -> dict[str, str]:
@@ -91,8 +115,8 @@ class _Group:
     open_ones: Sequence[Question]
 
 
-def _import(given: Path, site: Site | None, answers: Answers, arguments: argparse.Namespace) -> bool:
-    """Import one file, or the layouts of a folder's files; tells whether nothing is left open."""
+def _groups(given: Path, site: Site | None, answers: Answers, arguments: argparse.Namespace) -> list[_Group]:
+    """Return what is understood of one file, or of the layouts of a folder's files."""
     alikes = alike(files_in(given), answers.sheet)
     shared = given.is_dir() and len(alikes) == 1
     groups = []
@@ -105,13 +129,29 @@ def _import(given: Path, site: Site | None, answers: Answers, arguments: argpars
             print(f"reading {files[0]}", file=sys.stderr)
         proposal, open_ones = _asked(files, site, answers)
         groups.append(_Group(files, targets, proposal, check(proposal, site), open_ones))
+    return groups
+
+
+def _finish(
+    given: Path, groups: Sequence[_Group], known: Collection[str], site: Site | None, arguments: argparse.Namespace
+) -> bool:
+    """Say what was understood and write it down; tells whether nothing is left open.
+
+    Args:
+        given: file or folder.
+        groups: its layouts.
+        known: quantities that this or another file of the call has.
+        site: the greenhouse, where it is known.
+        arguments: of the command.
+    """
     parts = [group.checked.merged.telemetry for group in groups if group.checked.mapping.columns]
     log = prepare_log(concatenate(parts), site, name=given.name) if parts and any(map(len, parts)) else None
-    needed = [question for group in groups for question in _told(group, _known_to(groups))]
+    needed = [question for group in groups for question in _told(group, known)]
     for line in aside(log) if log is not None else ():
         print(f"note: {line}")
     for question in needed:
-        print(f"open: {question.text} ({', '.join(question.choices[:8])}): answer with {question.option}")
+        choices = f" ({', '.join(question.choices[:8])})" if question.choices else ""
+        print(f"open: {question.text}{choices}: answer with {question.option}")
     if arguments.dry_run:
         return not needed
     if any(question.blocks for question in needed):
@@ -119,7 +159,7 @@ def _import(given: Path, site: Site | None, answers: Answers, arguments: argpars
         return False
     for group in groups:
         for path, target in zip(group.files, group.targets, strict=False):
-            name = given.name if shared else path.name
+            name = given.name if target.name == MAPPING_FILE else path.name
             remarks = [f"How {name} is to be read; written by igrow-trainer import.", *group.checked.mended]
             write_whole(target, as_yaml(group.checked.mapping, remarks).encode())
             print(f"wrote {target}")
@@ -128,7 +168,9 @@ def _import(given: Path, site: Site | None, answers: Answers, arguments: argpars
     if log is not None and len(log) > 1:
         log.plot(plot)
         print(f"wrote {plot}")
-    return True
+    if needed:
+        print("the mapping leaves out what is open; with the answer, --force replaces it")
+    return not needed
 
 
 def _told(group: _Group, known: Collection[str]) -> list[Question]:
@@ -147,11 +189,6 @@ def _told(group: _Group, known: Collection[str]) -> list[Question]:
         for one in group.open_ones
         if not _settled(one, proposal, checked) and (one.blocks or one.about.removeprefix("columns:") not in known)
     ]
-
-
-def _known_to(groups: Sequence[_Group]) -> set[str]:
-    """Return the quantities that some files have."""
-    return {name for group in groups for name in group.checked.mapping.columns}
 
 
 def _settled(question: Question, proposal: Proposal, checked: Checked) -> bool:

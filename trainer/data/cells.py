@@ -19,6 +19,13 @@ EXCEL = (".xlsx", ".xls", ".xlsm", ".xlsb", ".ods")
 TEXT = (".csv", ".csv.gz", ".txt", ".tsv", ".dat", ".txt.gz", ".tsv.gz")
 ENDINGS = (*TEXT, ".parquet", *EXCEL)
 """Endings of files that hold a table."""
+ARCHIVE = ".zip"
+"""Ending of a file that holds several; `igrow-trainer import` unpacks it into a folder of its name."""
+
+
+def may_be_table(name: str) -> bool:
+    """Tell whether a file among others may be a table by its name: hidden ones and those that explain are none."""
+    return name.lower().endswith(ENDINGS) and not name.lower().startswith((".", "readme", "license", "licence"))
 
 
 @dataclass(frozen=True)
@@ -61,10 +68,12 @@ def _start(path: Path) -> bytes:
 def _refuse_what_is_no_text(path: Path, data: bytes) -> None:
     """Raise IgrowError that names what a file is, where it is something else than text."""
     what = {
-        _ZIP: "a zip archive or a workbook: unpack it into a folder and import that, or let its name end in .xlsx",
+        _ZIP: "a zip archive or a workbook: let its name end in .zip or .xlsx",
         _OLD_WORKBOOK: "a workbook: let its name end in .xls",
         _PDF: "a PDF: a table is needed, such as CSV or Excel",
     }
+    if path.name.lower().endswith(ARCHIVE):
+        what[_ZIP] = "a zip archive that is not unpacked yet"
     told = next((text for start, text in what.items() if data.startswith(start)), None)
     if told is None and re.match(rb"\s*<(!doctype|html|table|\?xml)", data[:200], re.IGNORECASE):
         told = "a page of HTML or XML: open it in a spreadsheet and save it as CSV or .xlsx"

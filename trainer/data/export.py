@@ -16,12 +16,14 @@ from igrow.trainer.data.cells import Cells, read_cells
 from igrow.trainer.data.mapping import ColumnMapping, ExportMapping, TimeColumn
 from igrow.trainer.data.number_texts import number
 from igrow.trainer.data.rows import Merged, merge
-from igrow.trainer.data.timestamps import ZONE, to_utc, wall_parser
-from igrow.trainer.data.vocabulary import folded, words_of, zones_called
+from igrow.trainer.data.timestamps import ZONE, to_utc, wall_parser, without_weekday
+from igrow.trainer.data.vocabulary import folded, month_names, words_of, zones_called
 from igrow.trainer.data.zone_abbreviations import split
 
 MOST_UNREADABLE = 0.02
 """Share of rows whose time cannot be read up to which they are no readings; beyond it the form is wrong."""
+_LEAST_WIDTH = 3
+"""Columns of a table in which a line of one cell is a title."""
 LONGEST_INTERVAL = 7200.0
 """Seconds; what fell in a longer one is no rate."""
 
@@ -104,7 +106,7 @@ def as_table(cells: Cells, header: Sequence[int] = (1,), first_row: int | None =
         texts = [row[position] if position < len(row) else "" for row, _ in body]
         if name or any(texts):
             columns[name or f"column {position + 1}"] = texts
-    return ExportTable(cells.path, columns, [line for _, line in body])
+    return _without_titles(ExportTable(cells.path, columns, [line for _, line in body]))
 
 
 def _spread(row: Sequence[str], width: int) -> list[str]:
@@ -115,13 +117,32 @@ def _spread(row: Sequence[str], width: int) -> list[str]:
 def chosen_rows(table: ExportTable, only: Mapping[str, str]) -> ExportTable:
     """Return the rows in which columns have given texts; raises IgrowError where there is none."""
     for name, text in only.items():
-        kept = [row for row, cell in enumerate(table[name]) if cell == text]
-        if not kept:
+        if text not in table[name]:
             there = ", ".join(sorted(set(table[name]))[:9])
             raise IgrowError(f"{table.path}: no row has {text!r} in column {name!r}; it has {there}")
-        columns = {key: [texts[row] for row in kept] for key, texts in table.columns.items()}
-        table = ExportTable(table.path, columns, [table.lines[row] for row in kept])
+        table = _rows(table, [row for row, cell in enumerate(table[name]) if cell == text])
     return table
+
+
+def _without_titles(table: ExportTable) -> ExportTable:
+    """Return a table without lines of one text alone, such as the title of each day's part; a date is no title."""
+    if len(table.columns) < _LEAST_WIDTH:
+        return table
+    first, *others = table.columns.values()
+    titles = {row for row, text in enumerate(first) if _is_title(text) and not any(cells[row] for cells in others)}
+    return _rows(table, [row for row in range(len(first)) if row not in titles])
+
+
+def _is_title(text: str) -> bool:
+    word = re.match(r"[^\W\d_]+", without_weekday(text))
+    return word is not None and folded(word[0]) not in month_names()
+
+
+def _rows(table: ExportTable, kept: Sequence[int]) -> ExportTable:
+    if len(kept) == len(table.lines):
+        return table
+    columns = {name: [cells[row] for row in kept] for name, cells in table.columns.items()}
+    return ExportTable(table.path, columns, [table.lines[row] for row in kept])
 
 
 def readings(table: ExportTable, time: TimeColumn) -> tuple[ExportTable, tuple[str, ...]]:
@@ -148,9 +169,7 @@ def readings(table: ExportTable, time: TimeColumn) -> tuple[ExportTable, tuple[s
     more = f" and {len(strange) - 3} more" if len(strange) > 3 else ""
     notes.append(f"no readings, set aside: {where}{more}")
     out = set(strange)
-    kept = [row for row in range(len(texts)) if row not in out]
-    columns = {name: [cells[row] for row in kept] for name, cells in table.columns.items()}
-    return ExportTable(table.path, columns, [table.lines[row] for row in kept]), tuple(notes)
+    return _rows(table, [row for row in range(len(texts)) if row not in out]), tuple(notes)
 
 
 def _unreadable(table: ExportTable, time: TimeColumn, known: Container[int]) -> list[int]:

@@ -16,6 +16,7 @@ def number(text: str, decimal: str) -> float | None:
         text: such as ``1.234,5``, ``21.5 °C`` or ``8e-06``.
         decimal: the sign before its decimals, ``.`` or ``,``; the other one and blanks are between thousands.
     """
+    text = text.replace("\u2212", "-")
     if _POWER.fullmatch(text):
         return float(text.replace(",", "."))
     found = _WITH_UNIT.fullmatch(text)
@@ -31,5 +32,6 @@ def number(text: str, decimal: str) -> float | None:
 
 def unit_behind(text: str) -> str:
     """Return what stands behind the number of a text, such as ``°C``; empty where nothing does."""
+    text = text.replace("\u2212", "-")
     found = None if _POWER.fullmatch(text) else _WITH_UNIT.fullmatch(text)
     return (found[2] or "").strip() if found is not None else ""

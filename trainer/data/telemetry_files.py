@@ -13,7 +13,7 @@ from igrow.core import telemetry as core
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import QUANTITIES
 from igrow.trainer.data import export, mapping
-from igrow.trainer.data.cells import ENDINGS, EXCEL
+from igrow.trainer.data.cells import ARCHIVE, ENDINGS, EXCEL, may_be_table
 from igrow.trainer.data.rows import Merged, merge
 from igrow.trainer.data.source import Source
 
@@ -31,6 +31,7 @@ def read(paths: Sequence[Path], translation: Path | None = None) -> Source:
     Raises:
         IgrowError: a file breaks the format, or a folder holds no telemetry.
     """
+    paths = [unpacked(path) for path in paths]
     tables = [read_file(part, translation or mapping_beside(part, path)) for path in paths for part in files_in(path)]
     if not tables:
         raise IgrowError("no telemetry files were given")
@@ -38,6 +39,12 @@ def read(paths: Sequence[Path], translation: Path | None = None) -> Source:
     notes = dict.fromkeys(note for one in tables for note in one.notes)
     faults = dict.fromkeys(fault for one in tables for fault in one.faults)
     return Source(paths[0].name, telemetry, notes=tuple(notes), faults=tuple(faults))
+
+
+def unpacked(path: Path) -> Path:
+    """Return the folder of an archive that was unpacked beside it; any other path as it is."""
+    folder = path.with_suffix("")
+    return folder if path.name.lower().endswith(ARCHIVE) and folder.is_dir() else path
 
 
 def read_file(path: Path, translation: Path | None = None) -> Merged:
@@ -102,7 +109,7 @@ def files_in(path: Path) -> list[Path]:
         return [path]
     if not path.exists():
         raise IgrowError(f"{path}: there is no such file or folder")
-    found = [part for part in sorted(path.rglob("*")) if part.is_file() and part.name.lower().endswith(ENDINGS)]
+    found = [part for part in sorted(path.rglob("*")) if part.is_file() and may_be_table(part.name)]
     if not found:
         raise IgrowError(f"{path}: no telemetry in it: CSV, Excel or Parquet files are needed")
     return found

@@ -7,11 +7,10 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from igrow.core.effects import EFFECTS
+from igrow.core.effects import EFFECTS, Effect
 from igrow.core.language import N_, Language
 from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator.hybrid.measurement import PREDICTED
-from igrow.trainer.data.fault import DataFault
 from igrow.trainer.diagnosis.persistence import misfits
 from igrow.trainer.diagnosis.result import DISCREPANCY, WORSE, Diagnosis, Finding
 from igrow.trainer.fit.omission import Omission
@@ -31,28 +30,6 @@ _NO_FIT: Mapping[str, str] = {
     "unexplained": N_(
         "Something real goes on that no known cause explains, and the model does not fit this greenhouse."
     ),
-}
-_FAULTS: Mapping[str, str] = {
-    "sensor": N_("A sensor that is needed does not work: {quantity}."),
-    "kelvin": N_("Readings are in kelvin: {quantity}."),
-    "fahrenheit": N_("Readings are in degrees Fahrenheit: {quantity}."),
-    "tenths": N_("Readings are in tenths of a degree: {quantity}."),
-    "no_temperature": N_("What is taken for a temperature is none: {quantity}."),
-    "fraction": N_("Readings are fractions from 0 to 1 instead of per cent: {quantity}."),
-    "percent": N_("Readings are in per cent: {quantity}."),
-    "absolute_humidity": N_("What is taken for relative humidity is another humidity: {quantity}."),
-    "kilometres_per_hour": N_("Readings are in kilometres per hour: {quantity}."),
-    "radiation_unit": N_("The radiation is in another unit than W/m²."),
-    "radiation_sum": N_("The radiation is a running sum."),
-    "running_sum": N_("Readings are a running sum: {quantity}."),
-    "no_daylight": N_("The radiation does not follow the sun."),
-    "clock": N_("The clock of the log disagrees with the sun."),
-    "local_time": N_("The times are local ones without their time zone."),
-    "repeated_times": N_("The same times stand in the log more than once."),
-    "shuffled_rows": N_("The times do not belong to the readings."),
-    "sparse": N_("There are too few readings for any model."),
-    "swapped_columns": N_("Two columns stand in each other's place: {quantity}."),
-    "screen_reversed": N_("A screen's 100 % means open, not closed: {quantity}."),
 }
 _MORE, _LESS = N_("{channel}: more, {when}"), N_("{channel}: less, {when}")
 _WHEN: Mapping[str, str] = {
@@ -101,20 +78,24 @@ def cause(finding: Finding, language: Language) -> str:
         return language.text(text, quantity=language.name(finding.effect))
     effect = EFFECTS[finding.effect]
     size = finding.parameters[effect.amplitude.name]
-    sentence, amount = effect.told(size.value)
-    value = language.number(language.shown(size.unit).of(amount))
-    told = language.text(sentence, value=value, unit=language.unit(size.unit))
+    told = _told(effect, size.value, size.unit, language)
     if finding.onset is not None:
         return language.text("Since {day}: {told}.", day=language.day(finding.onset.time), told=told)
     return language.text("{told}.", told=f"{told[0].upper()}{told[1:]}")
+
+
+def _told(effect: Effect, size: float, unit: str, language: Language) -> str:
+    """Return an effect's sentence with its size, in the units of the site as far as people there have others."""
+    sentence, amount = effect.told(size)
+    value = language.number(language.shown(unit).of(amount))
+    return language.in_units(language.text(sentence, value=value, unit=language.unit(unit)))
 
 
 def omission(one: Omission, language: Language, *, completed: bool) -> list[str]:
     """Return what a model lacked from its first day, what weeks that no fit saw say of it, and what became of it."""
     effect = EFFECTS[one.effect.name]
     size = one.effect.parameters[effect.amplitude.name]
-    sentence, amount = effect.told(size.value)
-    told = language.text(sentence, value=language.number(amount), unit=language.unit(size.unit))
+    told = _told(effect, size.value, size.unit, language)
     lines = [language.text("The log of the calibration says what the model lacks: {told}.", told=told)]
     for error in one.errors:
         if error.horizon == "24_h":
@@ -166,7 +147,7 @@ def checks(finding: Finding, language: Language) -> list[str]:
     tests = [EFFECTS[name].separating_test for name in (finding.effect, *finding.confounded) if name in EFFECTS]
     if not tests:
         tests = [N_("look at what happens in the greenhouse at these times and in this weather, and write it down")]
-    told = (language.text(one) for one in dict.fromkeys(tests))
+    told = (language.in_units(language.text(one)) for one in dict.fromkeys(tests))
     return [f"{one[0].upper()}{one[1:]}." if language.code != "zh" else f"{one}。" for one in told]
 
 
@@ -272,18 +253,6 @@ def _unjudged(result: Diagnosis, language: Language) -> Iterator[str]:
             yield language.text("CO2 cannot be judged: the log does not tell how much CO2 was dosed.")
         else:
             yield language.text("{quantity} cannot be judged: no unseen day of it is whole.", quantity=name)
-
-
-def fault(one: DataFault, language: Language) -> tuple[str, str]:
-    """Return what a fault of the data is, and what was seen and how to mend it."""
-    quantity = language.listed([language.name(name) for name in one.quantity.split(", ")])
-    known = _FAULTS.get(one.kind)
-    # How to mend it may be a piece of YAML, whose names and numbers stay as they are.
-    seen, mend = language.told(one.sentence, language.values), language.told(one.mend)
-    return (
-        "" if known is None else language.text(known, quantity=quantity),
-        f"{seen}: {mend}" if mend else seen,
-    )
 
 
 def set_aside(result: Diagnosis, language: Language) -> Iterator[str]:

@@ -16,6 +16,8 @@ OUTSIDE = ("outdoor_temperature", "outdoor_humidity", "outdoor_co2", "global_rad
 WEATHER = (*OUTSIDE, "wind_speed", "wind_direction", "rain")
 """Quantities that all compartments share."""
 _CERTAIN = 1000
+_UNLIKELY = {"other", "extreme"}
+"""Words of columns that are taken only where nothing else would do: forecasts, alarms, the highest of a day."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +68,7 @@ def find_matches(columns: Iterable[str], unit_line: Mapping[str, str]) -> list[M
             if not needed or foreign or (units and rule.dimension not in units):
                 continue
             more = sum(word in words for word in rule.likelier)
-            score = 10 * needed + 3 * more + 4 * bool(units) - 12 * ("other" in words) - 2 * ("sum" in words)
+            score = 10 * needed + 3 * more + 4 * bool(units) - 12 * bool(words & _UNLIKELY) - 2 * ("sum" in words)
             found.append(Match(quantity, column, score, units.get(rule.dimension), compartment))
     return found
 
@@ -145,6 +147,15 @@ def assign(matches: Sequence[Match], compartment: str, given: Mapping[str, str])
         elif best.score == one.score and best.compartment == one.compartment:
             rivals[one.quantity] = (*rivals.get(one.quantity, ()), one.column)
     return Assignment(chosen, rivals)
+
+
+def check_given(given: Mapping[str, str], labels: Sequence[str]) -> None:
+    """Raise IgrowError where the user names a quantity or a column that there is not."""
+    for quantity, column in given.items():
+        if quantity not in QUANTITIES:
+            raise IgrowError(f"--column {quantity}={column}: no such quantity: {nearest(quantity, QUANTITIES)}")
+        if column not in labels:
+            raise IgrowError(f"--column {quantity}={column}: no such column: {nearest(column, labels)}")
 
 
 def _spoken_for(one: Match, ranked: Sequence[Match]) -> bool:

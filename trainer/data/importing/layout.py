@@ -17,7 +17,7 @@ import charset_normalizer
 from igrow.core.errors import IgrowError
 from igrow.trainer.data import vocabulary
 from igrow.trainer.data.cells import EXCEL, Cells, is_text, read_bytes, read_cells, sheets
-from igrow.trainer.data.importing.time_format import looks_like_time
+from igrow.trainer.data.importing.time_format import looks_like_time, parts_of_time, spread
 from igrow.trainer.data.mapping import MISSING
 
 DELIMITERS = (";", "\t", "|", ",")
@@ -28,8 +28,8 @@ _BYTES, _HEAD = 100_000, 30
 """Of a text that are looked at for its encoding, and lines in which columns' names stand."""
 _SAMPLE = 400
 """Rows that are looked at."""
-_NUMERIC = re.compile(r"[-+]?\d[\d.,'\u00a0 ]*([eE][-+]?\d+)?\s*(%|°?[CF]|ppm|W/m²|W/m2|m/s|km/h|mph)?")
-_DIGITS = re.compile(r"[-+]?(\d[\d.,]*)(?![\d:/-])")
+_NUMERIC = re.compile(r"[-+\u2212]?\d[\d.,'\u00a0 ]*([eE][-+]?\d+)?\s*(%|°?[CF]|ppm|W/m²|W/m2|m/s|km/h|mph)?")
+_DIGITS = re.compile(r"[-+\u2212]?(\d[\d.,]*)(?![\d:/-])")
 _GROUPED = re.compile(r"[1-9]\d{0,2}([.,]\d{3})+")
 
 
@@ -178,6 +178,9 @@ def _first_reading(cells: Cells) -> int:
         wide = not usual or len(row) >= 0.5 * usual[0][0]
         if wide and times and values:
             return index
+    parts = next((found for row in cells.rows[:_SAMPLE] if len(found := parts_of_time(row)) > 2), ())
+    if parts:
+        raise IgrowError(f"{cells.path}: {spread(parts)}")
     needed = "export the log as a table with a row for each time and a column for each sensor"
     raise IgrowError(f"{cells.path}: no row has a time and numbers: {needed}")
 

@@ -9,7 +9,6 @@ from pathlib import Path
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import QUANTITIES
 from igrow.core.site import Site
-from igrow.core.yaml_schema import nearest
 from igrow.trainer.data import vocabulary
 from igrow.trainer.data.export import ExportTable, as_table, chosen_rows, readings
 from igrow.trainer.data.importing import columns as names
@@ -19,7 +18,7 @@ from igrow.trainer.data.importing.layout import Layout, find_layout
 from igrow.trainer.data.importing.long_table import find_long, units_beside
 from igrow.trainer.data.importing.question import Answers, Question
 from igrow.trainer.data.importing.texts import ColumnTexts, column_texts
-from igrow.trainer.data.importing.time_format import TimeForm, find_time, why_none
+from igrow.trainer.data.importing.time_format import TimeForm, find_time, parts_of_time, spread, why_none
 from igrow.trainer.data.importing.told_units import like_the_others, unit_of_cells
 from igrow.trainer.data.importing.zone import find_zone, zones_asked
 from igrow.trainer.data.mapping import MISSING, ColumnMapping, ExportMapping, LongTable, TimeColumn
@@ -100,8 +99,11 @@ def propose(
     time = find_time(dict(table.columns))
     if time is None:
         raise IgrowError(f"{path}: {why_none(dict(table.columns))}")
+    parts = [one for one in parts_of_time(table.columns) if one not in (time.column, time.time_of_day)]
+    if time.form.endswith("%H") and parts:
+        raise IgrowError(f"{path}: {spread((time.column, str(time.time_of_day), *parts))}")
     time = _ordered(time, answers, draft)
-    table, _ = readings(table, TimeColumn(time.column, time.time_of_day, time.form))
+    table = readings(table, TimeColumn(time.column, time.time_of_day, time.form))[0]
     long = find_long(table, (time.column, time.time_of_day), layout.decimal)
     if long is not None:
         unit_line = units_beside(table, long)
@@ -116,7 +118,7 @@ def propose(
     )
     matches = names.side_by_side(names.find_matches(labels, unit_line))
     compartment = _compartment(matches, answers, draft)
-    _check_given(answers, labels)
+    names.check_given(answers.columns, labels)
     body = _Body(table, labels, long, layout.decimal)
     assigned = names.assign(matches, compartment, answers.columns)
     mapped, units = _mapped(body, assigned, site, answers, draft)
@@ -124,16 +126,19 @@ def propose(
     shared = zones_asked(time, table) if zone is None else ()
     if zone is None:
         choices = shared or ("Europe/Amsterdam", "UTC")
-        question = "in which time zone are its times?"
-        draft.questions.append(Question("time_zone", question, choices, f"--time-zone {choices[0]}", blocks=True))
+        text = "in which time zone are its times?"
+        draft.questions.append(Question("time_zone", text, choices, f"--time-zone {choices[0]}", blocks=True))
     if why:
         draft.notes.append(why)
+    marks = _marks(body, mapped)
+    if marks:
+        draft.notes.append(f"taken for no reading: {', '.join(map(repr, marks[:6]))}" + ", ..." * (len(marks) > 6))
     mapping = ExportMapping(
         columns=mapped,
         time=TimeColumn(time.column, time.time_of_day, time.form, zone or next(iter(shared), "UTC")),
         delimiter=layout.delimiter,
         decimal=layout.decimal,
-        missing=(*MISSING, *_marks(body, mapped)),
+        missing=(*MISSING, *marks),
         encoding=layout.encoding,
         sheet=layout.sheet,
         header=layout.header,
@@ -219,14 +224,6 @@ def _ask_compartment(labels: Sequence[str], draft: _Draft) -> None:
     draft.questions.append(
         Question("compartment", "which compartment is the log of?", tuple(labels), option, blocks=True)
     )
-
-
-def _check_given(answers: Answers, labels: Sequence[str]) -> None:
-    for quantity, column in answers.columns.items():
-        if quantity not in QUANTITIES:
-            raise IgrowError(f"--column {quantity}={column}: no such quantity: {nearest(quantity, QUANTITIES)}")
-        if column not in labels:
-            raise IgrowError(f"--column {quantity}={column}: no such column: {nearest(column, labels)}")
 
 
 def _mapped(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -17,6 +17,8 @@ from igrow.trainer.data.zone_abbreviations import split
 _SAMPLE = 1500
 _LEAST_READ = 0.98
 """Share of a column's texts that a form must read."""
+_LEAST_DATED = 0.8
+"""Share of a column's texts that have a digit, if it is a time."""
 _CLOCK = re.compile(r"\d{1,2}[:.h]\d{2}([:.]\d{2})?([.,]\d+)?(\s?[ap]\.?\s?m\.?)?(\s?(uhr|hrs?|hs?|u))?", re.IGNORECASE)
 _DATE = re.compile(
     r"(\d{1,4}[-/.年]\s?\d{1,2}[-/.月]\s?\d{1,4}日?|\d{8}|\d{1,2}[-\s.]+[^\W\d_]{3,}\.?[-\s]+\d{2,4}|"
@@ -81,6 +83,17 @@ def find_time(columns: dict[str, Sequence[str]]) -> TimeForm | None:
     return max(found, key=lambda one: one[0])[1] if found else None
 
 
+def parts_of_time(names: Iterable[str]) -> tuple[str, ...]:
+    """Return the names of columns that hold the year, the month, the day, the hour or the minute alone."""
+    parts = [word for kind in ("year", "month", "day", "hour", "minute") for word, _ in vocabulary.time_words(kind)]
+    return tuple(name for name in names if vocabulary.folded(name) in parts)
+
+
+def spread(parts: Sequence[str]) -> str:
+    """Return what is said of a time that stands in so many columns."""
+    return f"its time stands in {len(parts)} columns ({', '.join(parts)}): join them in one, such as 2020-02-01 13:30"
+
+
 def why_none(columns: dict[str, Sequence[str]]) -> str:
     """Return why no column of a table is a time, in a line."""
     for name, texts in columns.items():
@@ -93,7 +106,10 @@ def why_none(columns: dict[str, Sequence[str]]) -> str:
 
 def _sample(texts: Sequence[str]) -> list[str]:
     """Return texts from the beginning, in their order (so that midnight is passed), and some from all along."""
-    kept = [text for text in texts if text]
+    filled = [text for text in texts if text]
+    # The header once more, or a line of sums.
+    dated = [text for text in filled if any(map(str.isdigit, text))]
+    kept = dated if len(dated) >= _LEAST_DATED * len(filled) else filled
     return kept if len(kept) <= 2 * _SAMPLE else kept[:_SAMPLE] + kept[_SAMPLE :: max(1, len(kept) // _SAMPLE)]
 
 
