@@ -1,4 +1,4 @@
-"""A command's list of independent jobs, by the fleet's tasks: child processes of this machine, and resumable.
+"""A command's list of independent jobs, by the fleet's tasks: child processes of this machine or Ray, and resumable.
 
     with Jobs("diagnosis scoring", processes=2) as jobs:
         for outcome in jobs.each(judge, cases):
@@ -6,12 +6,15 @@
 
 Each job's result is kept as soon as it is there. A command that was cut short and is started again does what was not
 done yet; one that ends well forgets what it kept. What was kept by other code, or other jobs, does not count.
+
+`IGROW_BENCHMARKS_RAY` names an existing cluster (`ray://head:10001`), whose machines see this folder under the same
+path and have igrow installed; `local` starts one on this machine. The digits are the same.
 """
 
 from __future__ import annotations
 
 import hashlib
-import pickle
+import os
 import shutil
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -21,13 +24,11 @@ from types import TracebackType
 from typing import TypeVar
 
 from benchmarks.provenance import ROOT
-from igrow.core.whole_files import write_whole
-from igrow.trainer.fleet.runner import run_tasks
-from igrow.trainer.fleet.tasks import Ending, Task
+from igrow.trainer.fleet.calls import call_each
+from igrow.trainer.fleet.registry import Backend
 
 KEPT = ROOT / "out" / "benchmarks"
-SECONDS, MEGABYTES = 86_400.0, 16_000
-"""Limits of one job."""
+CLUSTER = "IGROW_BENCHMARKS_RAY"
 J = TypeVar("J")
 R = TypeVar("R")
 
@@ -38,6 +39,7 @@ class Jobs:
     def __init__(self, command: str, processes: int, kept: Path = KEPT) -> None:
         self.folder = kept / command.replace(" ", "-")
         self.processes = processes
+        self.cluster = os.environ.get(CLUSTER, "")
 
     def __enter__(self) -> Jobs:
         self.folder.mkdir(parents=True, exist_ok=True)
@@ -53,46 +55,14 @@ class Jobs:
         """Yield the result of a function of a module for each job, in the order of the jobs.
 
         Raises:
+            IgrowError: the cluster cannot be used.
             RuntimeError: some of them failed, after all others are done and kept.
         """
-        files = [self._asked(function, job) for job in jobs]
-        tasks = [
-            Task(str(number), "benchmarks.jobs:do", {"file": str(file)}, SECONDS, MEGABYTES)
-            for number, file in enumerate(files)
-            if not _result(file).exists()
-        ]
-        failed: list[str] = []
-        outcomes = run_tasks(tasks, workers=self.processes) if tasks else iter(())
-        for file in files:
-            while not failed and not _result(file).exists():
-                outcome = next(outcomes)
-                failed += [outcome.note] * (outcome.ending is not Ending.DONE)
-            if not failed:
-                yield pickle.loads(_result(file).read_bytes())
-        failed += [one.note for one in outcomes if one.ending is not Ending.DONE]
-        if failed:
-            raise RuntimeError(
-                f"{len(failed)} of {len(files)} jobs failed, the others are kept: {failed[0]}; start it again"
-            )
-
-    def _asked(self, function: Callable[[J], R], job: J) -> Path:
-        content = pickle.dumps((function, job))
-        digest = hashlib.sha256(_code() + content).hexdigest()[:32]
-        file = self.folder / f"{digest}.job"
-        if not _result(file).exists():
-            write_whole(file, content)
-        return file
-
-
-def do(file: str) -> dict[str, str]:
-    """Do a job in a child process."""
-    function, job = pickle.loads(Path(file).read_bytes())
-    write_whole(_result(Path(file)), pickle.dumps(function(job)))
-    return {}
-
-
-def _result(file: Path) -> Path:
-    return file.with_suffix(".result")
+        backend = Backend.RAY if self.cluster else Backend.PROCESSES
+        address = None if self.cluster in ("", "local") else self.cluster
+        yield from call_each(
+            function, jobs, self.folder, code=_code(), backend=backend, workers=self.processes, address=address
+        )
 
 
 @cache

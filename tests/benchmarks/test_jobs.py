@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.jobs import Jobs
+from benchmarks.jobs import CLUSTER, Jobs
 
 
 def digits(job: tuple[int, str]) -> tuple[int, Any]:
@@ -44,6 +44,19 @@ def test_one_worker_gives_the_digits_of_two(tmp_path: Path) -> None:
     found = []
     for workers in (1, 2):
         with Jobs("x", workers, tmp_path) as jobs:
+            found.append(list(jobs.each(digits, wanted)))
+    for (one, first), (two, second) in zip(*found, strict=True):
+        assert one == two
+        np.testing.assert_array_equal(first, second)
+
+
+def test_a_local_ray_gives_the_digits_of_processes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("ray")
+    wanted = [(seed, str(tmp_path)) for seed in range(6)]
+    found = []
+    for cluster in ("", "local"):
+        monkeypatch.setenv(CLUSTER, cluster)
+        with Jobs("x", 2, tmp_path) as jobs:
             found.append(list(jobs.each(digits, wanted)))
     for (one, first), (two, second) in zip(*found, strict=True):
         assert one == two

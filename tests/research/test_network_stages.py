@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 from numpy.typing import NDArray
 
 from igrow.core.errors import IgrowError
@@ -78,6 +79,21 @@ def trained():
     training = {name: values[:4] for name, values in columns.items()}
     held_out = {name: values[4:] for name, values in columns.items()}
     return train_simulator(training, hour, np.ones(HOURS, dtype=bool), SMALL), held_out, hour
+
+
+def test_two_workers_train_the_networks_of_one_to_the_last_digit() -> None:
+    columns, hour = seasons(3)
+    short = TrainingPlan(updates=((4, 20), (10, 5)), batch=16, learning_rate=1e-2)
+    few = replace(SMALL, climate_plan=short, growth_plan=short, harvest_plan=short, members=2)
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        one, two = (
+            train_simulator(columns, hour, np.ones(HOURS, dtype=bool), few, workers=workers) for workers in (1, 2)
+        )
+    finally:
+        torch.set_num_threads(before)
+    assert simulator_to_bytes(one) == simulator_to_bytes(two)
 
 
 def test_a_held_out_season_run_freely_follows_the_truth(trained) -> None:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import multiprocessing
+import tempfile
 from collections.abc import Mapping
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import torch
@@ -14,6 +14,7 @@ from igrow.core.arrays import Floats, Mask
 from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator.network import HOURS, LightFormula, NetworkSimulator, Stage
 from igrow.core.simulator.network_run import daily_drivers, day_ends
+from igrow.trainer.fleet.calls import call_each
 from igrow.trainer.research.network.ensemble import merge
 from igrow.trainer.research.network.leaf_picking import fit_picking, followed, picked_area
 from igrow.trainer.training.stage import Report, StageData, StageLayout, TrainingPlan, train_stage, untrained
@@ -175,11 +176,10 @@ def train_simulator(
         for member in range(chosen.members)
     ]
     if workers > 1:
-        with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
-            done = [pool.submit(_train_alone, *task) for task in tasks]
-            trained = []
-            for future in done:
-                trained.append(future.result())
+        trained = []
+        with tempfile.TemporaryDirectory() as folder:
+            for stage in call_each(_train_alone, tasks, Path(folder), workers=workers):
+                trained.append(stage)
                 if report is not None:
                     report(f"{len(trained)} of {len(tasks)} networks trained")
     else:
@@ -191,7 +191,7 @@ def train_simulator(
     return NetworkSimulator(climate, growth, harvest, light, picking)
 
 
-def _train_alone(stage: Stage, data: StageData, plan: TrainingPlan) -> Stage:
+def _train_alone(task: tuple[Stage, StageData, TrainingPlan]) -> Stage:
     """Train in a process that shares its machine with others."""
     torch.set_num_threads(1)
-    return train_stage(stage, data, plan)
+    return train_stage(*task)
