@@ -30,25 +30,17 @@ from igrow.edge.guard.core import LONGEST_RAMP, begin_again, go_on, never_sent, 
 from igrow.edge.guard.findings import moved_and_stood
 from igrow.edge.guard.heartbeat import HEARTBEAT
 from igrow.edge.guard.memory import note, recall
+from igrow.edge.heart import Heart
 from igrow.edge.image import Image, Quality, Value
 from igrow.edge.journal import Journal
 from igrow.edge.sensors import ImageBuilder, RawReading
 from igrow.edge.setpoint_statuses import setpoint_statuses
 from igrow.edge.sources import Decision, Source, decide
-from igrow.edge.stopping import (
-    LOOK_SECONDS,
-    STOP_SECONDS,
-    StopReport,
-    furthest_first,
-    look_after,
-    write_at_once,
-)
+from igrow.edge.stopping import LOOK_SECONDS, STOP_SECONDS, StopReport, furthest_first, look_after, write_at_once
 
 MANUAL = "plc_manual"
 ASKED_AT_STOP = (MANUAL, "plc_fallback", HEARTBEAT)
 """What has to be known beside the setpoints themselves before a stop moves them."""
-MOST_WITHHELD = 2
-"""Beats in a row that wait for a reading of their register; a PLC waits for more than three."""
 
 
 class ControlCycle:
@@ -94,7 +86,7 @@ class ControlCycle:
         """Points to be read in the next cycle although they are not due, since they wait to be written."""
         self._reading: asyncio.Future[Mapping[str, RawReading]] | None = None
         self._seen = self._giving_way = False
-        self._withheld = 0
+        self._heart = Heart(writer, readback, journal)
         self.unknown_until = -math.inf
         """Monotonic seconds until which it is not known what hands have set before a restart; all is left alone."""
 
@@ -132,7 +124,8 @@ class ControlCycle:
         requests = {name: Request(choice.value, choice.source) for name, choice in decision.choices.items()}
         verdict = await self._guard_and_write(requests, image)
         self._log(image, decision, verdict)
-        await self._beat(image)
+        if not self._giving_way:
+            await self._heart.beat(image)
         everything = dict.fromkeys(self._rules.points, self._respect_hand)
         held = everything if self._manual else self.readback.held(image.monotonic)
         statuses = setpoint_statuses(self._rules.points, decision.choices, image, verdict, self.state, held)
@@ -199,11 +192,9 @@ class ControlCycle:
         image = self._builder.build(readings, self._clock.monotonic(), self._clock.true_time())
         self._seen |= image.link_ok and bool(readings)
         self._journal.begin(image)
-        beat = image.value_of(HEARTBEAT)
-        cleared = beat.value is not None and beat.age <= 0.0 and self._writer.beats.was_cleared(beat.value)
-        findings = self.readback.observe(image, restarted=cleared, patient=patient)
+        findings = self.readback.observe(image, restarted=self._heart.was_cleared(image), patient=patient)
         if self.readback.tell_a_start(findings):
-            self._writer.beats.meant_a_start(seen=beat.age <= 0.0)
+            self._heart.meant_a_start(image)
         self._journal.findings(findings, self._respect_hand)
         moved, stood = moved_and_stood(findings, briefly=LONGEST_RAMP)
         self.state = go_on(begin_again(self.state, moved), stood)
@@ -296,28 +287,6 @@ class ControlCycle:
             else:
                 leaving.append(write)
         return leaving
-
-    async def _beat(self, image: Image) -> None:
-        """Tell the PLC that a cycle was completed: the unit that hears it was part of the cycle."""
-        error = None
-        if image.reaches(HEARTBEAT) and not self._giving_way and not self._register_is_to_be_read(image):
-            error = await self._writer.heartbeat()
-            read_now = image.value_of(HEARTBEAT).age <= 0.0
-            if error is None and not (read_now and self._writer.beats.unheard):
-                self.readback.beat(image.monotonic)
-        self._journal.alarm("heartbeat register", self._writer.beats.problem)
-        self._journal.alarm("heartbeat", "" if error is None else f"the heartbeat could not be written: {error}")
-
-    def _register_is_to_be_read(self, image: Image) -> bool:
-        """Tell whether a beat would wipe out what the register says of its PLC, which has just been interrupted.
-
-        It is waited for in two cycles, so that the heart beats on where the register cannot be read any more.
-        """
-        beat = image.value_of(HEARTBEAT)
-        interrupted = any(HEARTBEAT in points for points in image.interrupted.values())
-        unread = interrupted and self._writer.beats.kept and beat.quality is not Quality.MISSING and beat.age > 0.0
-        self._withheld = self._withheld + 1 if unread else 0
-        return 0 < self._withheld <= MOST_WITHHELD
 
     def _log(self, image: Image, decision: Decision, verdict: Verdict) -> None:
         if decision.source != self._source:

@@ -6,32 +6,28 @@ import asyncio
 import contextlib
 import logging
 import math
-import signal
 import time
 from collections.abc import Coroutine, Iterator
 from concurrent.futures import Future
 from datetime import UTC, datetime
-from pathlib import Path
 
 from igrow.core.errors import IgrowError
 from igrow.edge.alarm_levels import Level
 from igrow.edge.carrying_over import carry_over, log_to_remember, remember
-from igrow.edge.configuration import Configuration, load_configuration
+from igrow.edge.configuration import Configuration
 from igrow.edge.cycle_result import CycleResult
 from igrow.edge.earlier import Earlier
-from igrow.edge.hand_off import PATIENCE, HandOff, LateError, settled
+from igrow.edge.hand_off import PATIENCE, HandOff, settled
 from igrow.edge.image import Quality
 from igrow.edge.journal import Journal
 from igrow.edge.notify import Notifier
 from igrow.edge.ports import Plan
 from igrow.edge.reloading import Reloading, refuse_what_needs_a_restart, same_registers
+from igrow.edge.services import SIMULATED_PATIENCE, Services, open_services
 from igrow.edge.snapshot import snapshot_of
-from igrow.edge.state_lock import sole_use
 from igrow.edge.stopping import STOP_SECONDS, StopReport
-from igrow.edge.wiring import SIMULATED_PATIENCE, Control, Services, build_control, open_services
+from igrow.edge.wiring import Control, build_control
 
-LOCK_SECONDS = 5.0
-"""Longest time for the disk to say whether another daemon has the state folder; then control comes first."""
 LEAST_STOP = 5.0
 """Seconds that the safe setpoints get however long the cycle took to give way."""
 LINE_SECONDS = 1.0
@@ -281,23 +277,3 @@ class Daemon:
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(HandOff("closing").run(self.services.close), CLOSE_SECONDS)
             self._notifier.close()
-
-
-async def run_daemon(path: Path) -> None:
-    """Run until SIGTERM or SIGINT; SIGHUP reads the configuration again.
-
-    Raises IgrowError for a bad configuration, and where another daemon has the same state folder.
-    """
-    configuration = load_configuration(path)
-    with contextlib.ExitStack() as held:
-        try:
-            lock = HandOff("lock", patience=LOCK_SECONDS, share=1.0)
-            lock.do(lambda: held.enter_context(sole_use(configuration.state_folder)))
-        except LateError:
-            log.warning("%s does not answer, so nobody knows of another daemon there", configuration.state_folder)
-        daemon = Daemon(configuration)
-        loop = asyncio.get_running_loop()
-        for number in (signal.SIGTERM, signal.SIGINT):
-            loop.add_signal_handler(number, daemon.stop)
-        loop.add_signal_handler(signal.SIGHUP, daemon.reload)
-        await daemon.run()

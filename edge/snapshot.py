@@ -7,7 +7,8 @@ from collections.abc import Iterable
 from igrow.edge.cycle_result import CycleResult
 from igrow.edge.journal import Journal
 from igrow.edge.ports import Snapshot
-from igrow.edge.wiring import Control, Services
+from igrow.edge.services import Services
+from igrow.edge.wiring import Control
 
 
 def snapshot_of(

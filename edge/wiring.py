@@ -1,15 +1,12 @@
-"""Puts the daemon together: services that live as long as it does, and a control that a reload replaces."""
+"""Puts together what controls a site, which a reload replaces; what outlives it, `igrow.edge.services`."""
 
 from __future__ import annotations
 
-import logging
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from igrow import __version__
 from igrow.core.agronomy import Place
-from igrow.core.simulator.hindcast import HindcastPredictor
 from igrow.core.sun import position
 from igrow.edge.bus.plc import RegisterPlc
 from igrow.edge.climate_alarms import ClimateAlarms, usual_climate_alarms
@@ -17,25 +14,22 @@ from igrow.edge.clock import Clock, PlcClock, SystemClock
 from igrow.edge.configuration import Configuration
 from igrow.edge.cycle import ControlCycle
 from igrow.edge.daemon_file import ClockSource
-from igrow.edge.exchange import ExchangeService
-from igrow.edge.exchange.service import TransferRules
 from igrow.edge.guard import GuardedWriter, Readback
 from igrow.edge.guard.heartbeat import HEARTBEAT
-from igrow.edge.hand_off import PATIENCE, SHARE, HandOff
 from igrow.edge.journal import Journal
 from igrow.edge.moment import this_boot
 from igrow.edge.notifications.acknowledged import ACKNOWLEDGED_FILE, AcknowledgementWatch
 from igrow.edge.overriding import override_file
 from igrow.edge.pace import FollowedPlant, Pace, TickPace
-from igrow.edge.planning import GraphProcess, PlanningProcess
 from igrow.edge.planning_schedule import PlanningRules, PlanningSchedule
 from igrow.edge.point_rules import highest_beat
-from igrow.edge.ports import Exchange, Plan, PlanningService, StatusService, Store, UpdateService
+from igrow.edge.ports import Plan
 from igrow.edge.registers.model import TWIN_SUFFIX
 from igrow.edge.remembering import StateNotes, registers_of
 from igrow.edge.sensors import ImageBuilder, TwinSensors
 from igrow.edge.separating_tests import SeparatingTests, approval_file, possible
 from igrow.edge.separating_tests.possible import conditions_of
+from igrow.edge.services import Services
 from igrow.edge.sources import (
     FreshPlan,
     GrowerOverride,
@@ -46,15 +40,7 @@ from igrow.edge.sources import (
     WantedRecipe,
 )
 from igrow.edge.state_file import StateFile
-from igrow.edge.status import StatusServer
-from igrow.edge.status.client import STATUS_FILE
-from igrow.edge.store import StoreAside, StoreError, StoreLimits
-from igrow.edge.updates import BundleUpdates, SignedSource, UpdateRules
 
-SIMULATED_PATIENCE = 60.0
-"""Seconds that a simulated plant waits for its disk, as it runs so fast that a share of its time would be none."""
-STATE_FILE_SECONDS = 1.0
-"""How long the stop waits for the small files of the state folder."""
 TWIN_TOLERANCE = {
     "air_temperature": 1.5,
     "air_humidity": 8.0,
@@ -66,40 +52,6 @@ TWIN_TOLERANCE = {
 """Largest difference of two working sensors of one quantity, in its unit."""
 FALLBACK_CYCLES = 3.0
 """A PLC's heartbeat timeout is longer than this many cycles (docs/commissioning.md)."""
-
-
-log = logging.getLogger("igrow.edge")
-
-
-@dataclass
-class Services:
-    """What lives as long as the daemon."""
-
-    store: Store
-    state_files: HandOff
-    """Reads and writes the small files of the state folder."""
-    graphs: GraphProcess
-    planning: PlanningService | None
-    updates: UpdateService
-    exchange: Exchange | None
-    status: StatusService
-
-    def close(self) -> None:
-        """Stop all but the status page; the store last, since the others still write to it.
-
-        None of them waits for what hangs longer than its own few seconds.
-        """
-        self.graphs.close()
-        if self.planning is not None:
-            self.planning.close()
-        self.updates.close()
-        if self.exchange is not None:
-            self.exchange.close()
-        self.state_files.close(STATE_FILE_SECONDS)
-        try:
-            self.store.close()
-        except StoreError as error:
-            log.warning("%s", error)
 
 
 @dataclass
@@ -125,63 +77,6 @@ class Control:
     def lockstep(self) -> bool:
         """The plant waits for us, so we may wait for plans and updates."""
         return self.configuration.file.cycle.clock is ClockSource.LOCKSTEP
-
-
-def open_services(configuration: Configuration) -> Services:
-    """Open the store and what works on it. Never raises for a bad disk or a bad bundle: each reports its health."""
-    state, file, site = configuration.state_folder, configuration.file, configuration.site
-    simulated = file.cycle.clock is not ClockSource.SYSTEM
-    limits = StoreLimits(survive_power_cut=not simulated, batch_seconds=3600.0 if simulated else 60.0)
-    patience, share = (SIMULATED_PATIENCE, 1.0) if simulated else (PATIENCE, SHARE)
-    store = StoreAside(configuration.store_folder, limits, patience=patience, share=share)
-    exchange = _exchange(configuration, store)
-    graphs = GraphProcess()
-    source = None
-    if exchange is not None and file.updates.enabled and configuration.trusted_root is not None:
-        source = SignedSource(exchange.bundles, state / "updates" / "trust", configuration.trusted_root)
-    updates = BundleUpdates(
-        state / "updates",
-        site=site.name,
-        igrow_version=__version__,
-        store=store,
-        graphs=graphs,
-        predictor=HindcastPredictor(),
-        source=source,
-        reports=exchange,
-        rules=UpdateRules(
-            shadow_hours=file.updates.shadow.total_seconds() / 3600.0,
-            watch_hours=file.updates.watch.total_seconds() / 3600.0,
-        ),
-        first_bundle=configuration.bundle_folder,
-    )
-    planning = None
-    if file.planning.enabled:
-        planning = PlanningProcess(site, graphs, seconds=file.planning.timeout.total_seconds())
-    late_after = max(60.0, 3.0 * file.cycle.interval.total_seconds())
-    status = StatusServer(file.status.port, state / STATUS_FILE, late_after=late_after)
-    state_files = HandOff("state files", patience=patience, share=share)
-    return Services(store, state_files, graphs, planning, updates, exchange, status)
-
-
-def _exchange(configuration: Configuration, store: StoreAside) -> ExchangeService | None:
-    if configuration.exchange is None:
-        return None
-    settings, hosts, identity = configuration.file.transfer, configuration.known_hosts, configuration.identity
-    rules = TransferRules(
-        every=settings.every.total_seconds(),
-        period=int(settings.segment.total_seconds()),
-        budget=settings.budget * 10**6,
-        known_hosts=None if hosts is None else str(hosts),
-        identity=None if identity is None else str(identity),
-    )
-    return ExchangeService(
-        str(configuration.exchange),
-        configuration.state_folder / "exchange",
-        configuration.site.name,
-        store,
-        igrow_version=__version__,
-        rules=rules,
-    )
 
 
 def build_control(

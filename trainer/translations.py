@@ -38,7 +38,8 @@ _CREATED = datetime.datetime(2026, 11, 22, tzinfo=datetime.UTC)
 _KEYWORDS = {"text": None, "N_": None, "_": None}
 _SPEAKING = (
     *(_EDGE / name for name in (
-        "climate_alarms.py", "clock.py", "cycle.py", "daemon.py", "guard", "image.py", "journal.py", "overriding.py",
+        "climate_alarms.py", "clock.py", "cycle.py", "daemon.py", "guard", "heart.py", "image.py", "journal.py",
+        "overriding.py",
         "planning/forecast.py", "planning/make_plan.py", "planning/process.py", "planning/worker.py",
         "planning_schedule.py", "sensors", "separating_tests", "setpoint_statuses.py", "sources", "stopping.py",
         "updates", "hand_off.py", "bus/errors.py", "bus/opening.py", "bus/plc.py", "bus/request_slot.py",

@@ -12,7 +12,6 @@ import json
 import sys
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -22,6 +21,7 @@ import numpy as np
 from benchmarks.diagnosis import real
 from benchmarks.diagnosis.cases import SEASONS
 from benchmarks.diagnosis.nurseries import calibration_logs, nursery
+from benchmarks.jobs import Jobs
 from benchmarks.provenance import provenance
 from igrow.core.effects import EFFECTS
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
@@ -195,8 +195,8 @@ def main(options: Namespace) -> int:
     kind = "tuning" if options.tuning else "scoring"
     taken_out = () if options.tuning else tuple(TAKEN_OUT)
     count, told = options.greenhouses or GREENHOUSES, list[Told]()
-    with ProcessPoolExecutor(options.processes) as pool:
-        for found in pool.map(season, [(kind, name, count, taken_out) for name in options.season or list(SEASONS)]):
+    with Jobs("diagnosis omission", options.processes) as jobs:
+        for found in jobs.each(season, [(kind, name, count, taken_out) for name in options.season or list(SEASONS)]):
             told += found
     if options.json:
         options.json.write_text("".join(json.dumps(asdict(one)) + "\n" for one in told), encoding="utf-8")

@@ -4,16 +4,26 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import contextlib
 import faulthandler
 import logging
 import os
+import signal
+from pathlib import Path
 
 from igrow.core.errors import IgrowError
 from igrow.edge.cli.common import add_configuration
 from igrow.edge.cli.log_lines import set_up_logging
-from igrow.edge.daemon import run_daemon
+from igrow.edge.configuration import load_configuration
+from igrow.edge.daemon import Daemon
+from igrow.edge.hand_off import HandOff, LateError
+from igrow.edge.state_lock import sole_use
 
 EXAMPLE = "igrow-edge run /etc/igrow/daemon.yaml"
+LOCK_SECONDS = 5.0
+"""Longest time for the disk to say whether another daemon has the state folder; then control comes first."""
+
+log = logging.getLogger("igrow.edge")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,7 +43,27 @@ def run(options: argparse.Namespace) -> int:
     except IgrowError:
         raise
     except BaseException:
-        logging.getLogger("igrow.edge").exception("the daemon ends by a fault of its own")
+        log.exception("the daemon ends by a fault of its own")
         code = 1
     journal.close()
     os._exit(code)
+
+
+async def run_daemon(path: Path) -> None:
+    """Run until SIGTERM or SIGINT; SIGHUP reads the configuration again.
+
+    Raises IgrowError for a bad configuration, and where another daemon has the same state folder.
+    """
+    configuration = load_configuration(path)
+    with contextlib.ExitStack() as held:
+        try:
+            lock = HandOff("lock", patience=LOCK_SECONDS, share=1.0)
+            lock.do(lambda: held.enter_context(sole_use(configuration.state_folder)))
+        except LateError:
+            log.warning("%s does not answer, so nobody knows of another daemon there", configuration.state_folder)
+        daemon = Daemon(configuration)
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGTERM, signal.SIGINT):
+            loop.add_signal_handler(number, daemon.stop)
+        loop.add_signal_handler(signal.SIGHUP, daemon.reload)
+        await daemon.run()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,10 @@ import numpy as np
 import pytest
 
 from benchmarks.jobs import CLUSTER, Jobs
+from igrow.trainer.fleet import calls
+from igrow.trainer.fleet.registry import Backend
+from igrow.trainer.fleet.runner import run_tasks
+from igrow.trainer.fleet.tasks import Outcome, Task
 
 
 def digits(job: tuple[int, str]) -> tuple[int, Any]:
@@ -50,17 +55,21 @@ def test_one_worker_gives_the_digits_of_two(tmp_path: Path) -> None:
         np.testing.assert_array_equal(first, second)
 
 
-def test_a_local_ray_gives_the_digits_of_processes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("ray")
-    wanted = [(seed, str(tmp_path)) for seed in range(6)]
+def test_a_cluster_that_is_named_gets_the_same_tasks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[Backend, str | None]] = []
+
+    def noted(tasks: Sequence[Task], backend: Backend, *, workers: int, address: str | None) -> Iterator[Outcome]:
+        asked.append((backend, address))
+        return run_tasks(tasks, workers=workers)
+
+    monkeypatch.setattr(calls, "run_tasks", noted)
     found = []
-    for cluster in ("", "local"):
+    for cluster in ("", "local", "ray://head:10001"):
         monkeypatch.setenv(CLUSTER, cluster)
         with Jobs("x", 2, tmp_path) as jobs:
-            found.append(list(jobs.each(digits, wanted)))
-    for (one, first), (two, second) in zip(*found, strict=True):
-        assert one == two
-        np.testing.assert_array_equal(first, second)
+            found.append([seed for seed, _ in jobs.each(digits, [(0, str(tmp_path)), (1, str(tmp_path))])])
+    assert asked == [(Backend.PROCESSES, None), (Backend.RAY, None), (Backend.RAY, "ray://head:10001")]
+    assert found == 3 * [[0, 1]]
 
 
 def test_what_was_kept_for_another_job_does_not_count(tmp_path: Path) -> None:

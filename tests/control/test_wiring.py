@@ -4,8 +4,8 @@ import json
 import socket
 
 from igrow.edge.configuration import load_configuration
+from igrow.edge.services import open_services
 from igrow.edge.status import StatusServer
-from igrow.edge.wiring import open_services
 from tests.control.daemon_bench import Plant, free_port, running, until, write_files
 
 
