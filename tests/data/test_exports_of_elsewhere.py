@@ -427,6 +427,19 @@ def test_of_what_is_open_the_status_tells_although_a_mapping_is_written(tmp_path
     assert imported(tmp_path, str(tmp_path / "weather.csv"), "--force", export="inside.csv") == 0
 
 
+def test_lamps_in_per_cent_have_their_power(tmp_path: Path, log: Telemetry) -> None:
+    """Their power is made of whether they burn; what sets right the one sets right the other."""
+    frame = written(log, PLAIN)
+    frame["AssimLight"] = np.where(log["lamp_power"] > 1.0, 100, 0)
+    frame.to_csv(tmp_path / "export.csv", index=False)
+    assert imported(tmp_path) == 0
+    read = read_log(tmp_path / "export.csv", tmp_path / "site.yaml")
+    lamps = read.known_site.greenhouse.lamps
+    assert lamps is not None
+    assert read.telemetry["lamp_power"].max() == pytest.approx(lamps.power)
+    assert read.telemetry["lamp_on"].max() == 1.0
+
+
 def test_what_is_set_aside_is_said_at_once(tmp_path: Path, log: Telemetry, capsys) -> None:
     frame = written(log, PLAIN).drop(columns="Wind (m/s)")
     frame.loc[100:119, "CO2 (ppm)"] = 9999

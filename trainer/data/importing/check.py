@@ -10,7 +10,7 @@ import numpy as np
 from igrow.core.local_time import to_local
 from igrow.core.site import Site
 from igrow.trainer.data import export
-from igrow.trainer.data.fault import DataFault
+from igrow.trainer.data.fault import DataFault, Remedy
 from igrow.trainer.data.importing.proposal import Proposal
 from igrow.trainer.data.importing.told_units import BY_SIZE, like_the_others
 from igrow.trainer.data.importing.zone import fixed
@@ -101,6 +101,18 @@ def _candidates(site: Site, merged: Merged) -> list[str]:
     return list(dict.fromkeys([*zones, "UTC", fixed(solar)]))
 
 
+def _of_one_column(quantity: str, rules: Mapping[str, ColumnMapping]) -> list[str]:
+    """Return a quantity and those that are made of its column, as the lamps' power is of whether they burn."""
+    return [name for name, rule in rules.items() if rule.column == rules[quantity].column]
+
+
+def _with_remedy(rule: ColumnMapping, remedy: Remedy) -> ColumnMapping:
+    amount = rule.amount if remedy.amount == "rate" else remedy.amount
+    return replace(
+        rule, scale=rule.scale * remedy.scale, offset=rule.offset * remedy.scale + remedy.offset, amount=amount
+    )
+
+
 def _remedied(
     mapping: ExportMapping, faults: Sequence[DataFault], proposal: Proposal, mended: list[str]
 ) -> ExportMapping | None:
@@ -125,14 +137,8 @@ def _remedied(
             one, other = fault.quantity.split(", ")
             changed[one], changed[other] = changed[other], changed[one]
         elif fault.remedy is not None and fault.quantity in changed:
-            rule = changed[fault.quantity]
-            amount = rule.amount if fault.remedy.amount == "rate" else fault.remedy.amount
-            changed[fault.quantity] = replace(
-                rule,
-                scale=rule.scale * fault.remedy.scale,
-                offset=rule.offset * fault.remedy.scale + fault.remedy.offset,
-                amount=amount,
-            )
+            for name in _of_one_column(fault.quantity, changed):
+                changed[name] = _with_remedy(changed[name], fault.remedy)
         else:
             continue
         choice = " (--unit wind_speed=mph or knots says otherwise)" if fault.kind == "kilometres_per_hour" else ""
