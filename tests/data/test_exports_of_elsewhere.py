@@ -424,7 +424,9 @@ def test_of_what_is_open_the_status_tells_although_a_mapping_is_written(tmp_path
     assert "with the answer, --force replaces it" in told
     assert "next:" not in told
     assert (tmp_path / "inside.mapping.yaml").is_file()
-    assert imported(tmp_path, str(tmp_path / "weather.csv"), "--force", export="inside.csv") == 0
+    both = [str(tmp_path / name) for name in ("inside.csv", "weather.csv")]
+    assert main(["import", *both, "--site", str(tmp_path / "site.yaml"), "--force"]) == 0
+    assert "open: " not in capsys.readouterr().out
 
 
 def test_lamps_in_per_cent_have_their_power(tmp_path: Path, log: Telemetry) -> None:

@@ -72,8 +72,6 @@ def _refuse_what_is_no_text(path: Path, data: bytes) -> None:
         _OLD_WORKBOOK: "a workbook: let its name end in .xls",
         _PDF: "a PDF: a table is needed, such as CSV or Excel",
     }
-    if path.name.lower().endswith(ARCHIVE):
-        what[_ZIP] = "a zip archive that is not unpacked yet"
     told = next((text for start, text in what.items() if data.startswith(start)), None)
     if told is None and re.match(rb"\s*<(!doctype|html|table|\?xml)", data[:200], re.IGNORECASE):
         told = "a page of HTML or XML: open it in a spreadsheet and save it as CSV or .xlsx"

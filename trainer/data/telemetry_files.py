@@ -42,9 +42,13 @@ def read(paths: Sequence[Path], translation: Path | None = None) -> Source:
 
 
 def unpacked(path: Path) -> Path:
-    """Return the folder of an archive that was unpacked beside it; any other path as it is."""
+    """Return the folder of an archive that was unpacked beside it, any other path as it is; raises IgrowError."""
+    if not (path.is_file() and path.name.lower().endswith(ARCHIVE)):
+        return path
     folder = path.with_suffix("")
-    return folder if path.name.lower().endswith(ARCHIVE) and folder.is_dir() else path
+    if not folder.is_dir():
+        raise IgrowError(f"{path}: is a zip archive that is not unpacked yet")
+    return folder
 
 
 def read_file(path: Path, translation: Path | None = None) -> Merged:
