@@ -282,3 +282,14 @@ def test_the_charts_tell_their_lines_apart_without_colour(visit):
         )
     )
     assert len(dashes) == len(set(dashes)) == 4
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_the_reason_of_a_held_setpoint_has_room_at_any_width(visit, width):
+    page = visit(width)
+    unfold(page)
+    shown = [one for one in page.get_by_text("above the limit of 28").all() if one.is_visible()]
+    assert len(shown) == 1
+    box = shown[0].bounding_box()
+    assert box is not None
+    assert box["width"] > 150
