@@ -21,7 +21,7 @@ demo: $(STAMP) ## Run the whole loop on a virtual greenhouse with an undeclared 
 	$(BIN)/python config/demo/run.py --out out/demo
 
 test: $(STAMP) ## Run the tests (at most 10 minutes).
-	$(BIN)/pytest -n 2 --dist worksteal -m 'not soak and not notebooks' tests
+	$(BIN)/pytest -n 3 --dist worksteal -m 'not soak and not notebooks' tests
 
 page-pictures: $(STAMP) ## Take the pictures of docs/page.md anew (needs Chromium).
 	IGROW_PICTURES=1 $(BIN)/pytest tests/page/test_page_in_a_browser.py
