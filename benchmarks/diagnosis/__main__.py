@@ -56,7 +56,7 @@ def main() -> int:
     )
     parser.add_argument("--tuning", action="store_true", help="of `same`: greenhouses and seeds that rules are set on")
     parser.add_argument("--compartment", default="", help="of `real`: those whose name has this in it (default: all)")
-    parser.add_argument("--withheld-only", action="store_true", help="of `real`: leave out lost terms and placebo")
+    parser.add_argument("--withheld-only", action="store_true", help="of `real`: leave out built-in bundle and placebo")
     parser.add_argument("--history-only", action="store_true", help="of `same`: leave out what is known in general")
     parser.add_argument("--days", type=int, default=28)
     parser.add_argument(

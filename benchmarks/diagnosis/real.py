@@ -35,6 +35,8 @@ COMPARTMENTS = (
 CALIBRATION_DAYS, DIAGNOSIS_DAYS = 56, 28
 WITHHELD = ("lamp_power", "rail_pipe_temperature", "grow_pipe_temperature", "energy_screen", "blackout_screen")
 """Columns that are taken out of the log."""
+RISE = 0.2
+"""Share by which an error rises from which on a withheld column must be named."""
 PLACEBO = ("wind_speed", "wind_direction", "rain")
 
 
@@ -73,6 +75,15 @@ def say(title: str, diagnosis: Diagnosis, whole: Diagnosis | None = None) -> Non
             print(f"{'':44} {quantity:16} 24 h: {stages}{more}")
 
 
+def rise_of(told: Diagnosis, whole: Diagnosis) -> float:
+    """Return the largest rise of a recalibrated error a day ahead over that of the whole log, as a share of it."""
+    return max(
+        horizons["24_h"]["recalibrated"] / whole.errors[quantity]["24_h"]["recalibrated"] - 1.0
+        for quantity, horizons in told.errors.items()
+        if "24_h" in horizons and quantity in whole.errors
+    )
+
+
 def placebo(log: Log, other: Log) -> Log:
     """Return a log whose wind and rain come from another stretch of the season."""
     rows = np.arange(len(log)) % len(other)
@@ -86,6 +97,7 @@ def main(data: Path | None, only: str = "", *, withheld_only: bool = False) -> i
         print("error: name the folder of the public data sets: python -m benchmarks.diagnosis real DATA")
         return 2
     found: dict[str, set[str]] = {}
+    withheld: list[tuple[bool, bool]] = []
     for one in compartments(data):
         if only not in one.name:
             continue
@@ -98,12 +110,16 @@ def main(data: Path | None, only: str = "", *, withheld_only: bool = False) -> i
             if column in one.after.telemetry:
                 told = diagnose(one.after.without(column), model)
                 say(f"  log without {column}", told, whole=diagnosis)
+                withheld.append((rise_of(told, diagnosis) >= RISE, column in {one.effect for one in told.findings}))
         if withheld_only:
             continue
         transferred = diagnose(one.after, built_in(one.site))
         say("  with the built-in bundle", transferred)
         false = diagnose(placebo(one.after, one.before), model)
         say("  wind and rain of other weeks", false)
+    for matters, where in ((True, "rises by a fifth"), (False, "does not")):
+        named = [is_named for does, is_named in withheld if does == matters]
+        print(f"withheld columns named, where an error {where}: {sum(named)} of {len(named)}")
     shared = {name for names in found.values() for name in names if sum(name in other for other in found.values()) > 1}
     print(f"causes found in more than one compartment: {', '.join(sorted(shared)) or 'none'}")
     return 0

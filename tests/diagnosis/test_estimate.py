@@ -96,13 +96,13 @@ def leak(size: float) -> Estimated:
 
 
 def test_a_size_beyond_its_bound_is_brought_back_and_its_interval_reaches_it() -> None:
-    one = within_bounds(leak(1.4 * BOUNDS.high))
+    one = within_bounds(leak(1.4 * BOUNDS.high), make_design())
     assert one.term.amplitude == one.amplitude.value == one.amplitude.low == BOUNDS.high
     assert one.amplitude.high == 1.4 * BOUNDS.high + 0.5
 
 
 def test_a_size_within_its_bounds_stays() -> None:
-    assert within_bounds(leak(0.5 * BOUNDS.high)) == leak(0.5 * BOUNDS.high)
+    assert within_bounds(leak(0.5 * BOUNDS.high), make_design()) == leak(0.5 * BOUNDS.high)
 
 
 def test_a_refitted_interval_allows_for_what_no_covariance_knows() -> None:

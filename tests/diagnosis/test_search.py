@@ -39,9 +39,12 @@ def test_a_size_of_the_wrong_sign_gains_nothing() -> None:
     assert "co2_valve_leak" not in [one.effect for one in scored(wrong)]
 
 
-def test_a_size_beyond_its_bound_gains_what_the_bound_allows() -> None:
-    design = make_design(Truth({"lamp_heat": 1.2}, {}))
-    best, bound = scored(design)[0], design.candidates[0].definition.amplitude.high
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_size_beyond_either_bound_gains_what_the_bound_allows(sign: float) -> None:
+    design = make_design(Truth({"lamp_heat": 1.2 * sign}, {}))
+    best, size = scored(design)[0], design.candidates[0].definition.amplitude
+    assert size.low == -size.high
+    bound = sign * size.high
     (column,) = design.columns("effect:lamp_heat")
     null = design.null_model()
     held = with_column(design, "residual", design.values[0] + bound * design.values[column])

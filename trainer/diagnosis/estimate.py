@@ -90,10 +90,9 @@ def with_refitted(one: Estimated, refitted: Refitted, rules: DecisionRules) -> E
     return replace(one, term=refitted.term, amplitude=interval, shapes=shapes, regimes=regimes)
 
 
-def within_bounds(one: Estimated) -> Estimated:
+def within_bounds(one: Estimated, design: Design) -> Estimated:
     """Return the cause with its size brought to the nearest bound, if it lies beyond."""
-    bounds = EFFECTS[one.effect].amplitude
-    size = float(np.clip(one.term.amplitude, bounds.low, bounds.high))
+    size = float(np.clip(one.term.amplitude, *design.amplitude_bounds(one.effect, one.hypothesis.term.onset)))
     interval = replace(one.amplitude, value=size, low=min(one.amplitude.low, size), high=max(one.amplitude.high, size))
     return replace(one, term=replace(one.term, amplitude=size), amplitude=interval)
 

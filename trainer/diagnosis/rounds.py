@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from igrow.core.arrays import Floats
-from igrow.core.effects import EFFECTS
 from igrow.core.site import Site
 from igrow.trainer.diagnosis import history
 from igrow.trainer.diagnosis.change import changed
@@ -100,9 +99,11 @@ class Search:
                 found = refit(judged.design, judged.named, [one.term for one in causes], self.knowledge.terms)
         except (np.linalg.LinAlgError, DivergenceError):
             # A poor start can run away; the causes then stay as the search found them.
-            return [within_bounds(one) for one in causes]
+            return [within_bounds(one, judged.design) for one in causes]
         better = [with_refitted(one, two, self.rules) for one, two in zip(causes, found, strict=True)]
-        stands = all(one.term.amplitude != 0.0 for one in better) and all(map(_is_inside, better[1:]))
+        stands = all(one.term.amplitude != 0.0 for one in better) and all(
+            _is_inside(one, judged.design) for one in better[1:]
+        )
         return better if stands and (len(found) == 1 or are_identifiable(found)) else []
 
 
@@ -163,7 +164,8 @@ def laid_out(
     return history.lay_out(days.record, days.split, about, activate(days.record, terms), site.longitude, rules)
 
 
-def _is_inside(one: Estimated) -> bool:
+def _is_inside(one: Estimated, design: Design) -> bool:
     """Tell whether a cause lies inside its bounds."""
-    bound, amplitude = EFFECTS[one.effect].amplitude, one.term.amplitude
-    return amplitude < bound.high and (bound.low == 0.0 or amplitude > bound.low)
+    low, high = design.amplitude_bounds(one.effect, one.hypothesis.term.onset)
+    amplitude = one.term.amplitude
+    return amplitude < high and (low == 0.0 or amplitude > low)
