@@ -1,4 +1,4 @@
-"""Physics of moist air: saturation, humidity, density, and the conversions between units of gas content.
+"""Physics of moist air: saturation, humidity, and the conversions between units of gas content.
 
 Every function is pure and elementwise; where it takes `xp` it works in numpy, in torch and while a graph is
 traced. Temperatures are degC, pressures Pa, gas contents kg m-3.
@@ -24,11 +24,6 @@ LATENT_HEAT = 2.45e6
 """Heat of evaporation of water at 20 degC, J kg-1."""
 STEFAN_BOLTZMANN = 5.670374419e-8
 """W m-2 K-4."""
-
-
-def density(air_temperature: Array, pressure: float = STANDARD_PRESSURE) -> Array:
-    """Return the density of dry air in kg m-3 (ideal gas, R = 287.05 J kg-1 K-1)."""
-    return pressure / (287.05 * (air_temperature + 273.15))
 
 
 def saturation_pressure(xp: Any, temperature: Array) -> Array:

@@ -123,38 +123,6 @@ def harvest_income(prices: Prices, local_time: Times, class_a: Values, class_b: 
     return product_price(prices, local_time, brix) * (class_a + prices.class_b * class_b)
 
 
-def season_balance(
-    prices: Prices,
-    *,
-    harvest_days: Times,
-    class_a: Values,
-    class_b: Values,
-    brix: Values,
-    plant_density: float,
-    stem_density: Values,
-    electricity_peak: Values,
-    electricity_off_peak: Values,
-    heat: Values,
-    co2: Values,
-) -> Balance:
-    """Return the balance of a whole crop from its harvests and its resources of each day.
-
-    Per harvest: local days, kg m-2 of class A and of class B, degree Brix. Per day: stems m-2, kWh m-2 in peak and
-    in other hours, MJ m-2, kg m-2. Plants per m2. Days of resources that are NaN count as nothing used.
-    """
-    return Balance(
-        income=np.asarray(np.nansum(harvest_income(prices, harvest_days, class_a, class_b, brix))),
-        plants=np.asarray(prices.plant * plant_density),
-        upkeep=np.asarray(prices.stem_day * np.nansum(stem_density)),
-        electricity=np.asarray(
-            prices.electricity.peak * np.nansum(electricity_peak)
-            + prices.electricity.off_peak * np.nansum(electricity_off_peak)
-        ),
-        heat=np.asarray(prices.heat * np.nansum(heat)),
-        co2=co2_cost(prices, 0.0, np.nansum(co2)),
-    )
-
-
 def local_days(time: Times, time_zone: str) -> Times:
     """Return the local day of UTC times, datetime64[D]."""
     return to_local(time, time_zone).astype("datetime64[D]")

@@ -222,14 +222,6 @@ class RegisterMap:
     """Assumptions that the source does not state, or that the site decides, one line each."""
     path: Path | None = field(default=None, compare=False)
 
-    def bus_of(self, point: Point) -> BusSettings:
-        """Return the bus that leads to a point."""
-        return self.buses[self.devices[point.device].bus]
-
-    def points_on(self, bus: str) -> tuple[Point, ...]:
-        """Return the points that one bus leads to."""
-        return tuple(p for p in self.points.values() if self.devices[p.device].bus == bus)
-
 
 TWIN_SUFFIX = "_2"
 """A second sensor of a quantity has the quantity's name with this suffix."""

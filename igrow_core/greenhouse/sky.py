@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow.core.air import STEFAN_BOLTZMANN, saturation_pressure
+from igrow.core.air import saturation_pressure
 
 
 def sky_temperature(temperature: Any, humidity: Any, cloud: Any) -> NDArray[np.float64]:
@@ -27,10 +27,3 @@ def sky_temperature(temperature: Any, humidity: Any, cloud: Any) -> NDArray[np.f
     clear = 0.711 + 0.0056 * dew_point + 0.000073 * dew_point * dew_point
     emission = clear + 0.84 * np.asarray(cloud) * (1.0 - clear)
     return np.asarray((np.asarray(temperature) + 273.15) * emission**0.25 - 273.15)
-
-
-def sky_temperature_from_net(temperature: Any, net_long_wave: Any) -> NDArray[np.float64]:
-    """Return the sky temperature in degC from a pyrgeometer's net radiation in W m-2 (negative: the sky is colder)."""
-    kelvin = np.asarray(temperature) + 273.15
-    down = STEFAN_BOLTZMANN * kelvin**4 + np.asarray(net_long_wave)
-    return np.asarray((np.maximum(down, 1.0) / STEFAN_BOLTZMANN) ** 0.25 - 273.15)

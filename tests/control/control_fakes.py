@@ -12,7 +12,6 @@ import numpy as np
 from igrow.core.telemetry import Telemetry
 from igrow.edge.bus.errors import BusError, NoAnswerError
 from igrow.edge.bus.plc import Reading
-from igrow.edge.clock import FakeClock
 from igrow.edge.cycle import ControlCycle
 from igrow.edge.earlier import Earlier
 from igrow.edge.guard import GuardedWriter, GuardRules, Interlock, PointRule, Readback
@@ -21,6 +20,7 @@ from igrow.edge.journal import Journal
 from igrow.edge.records import AlarmRecord, WriteRecord
 from igrow.edge.sensors import ImageBuilder, SensorRule
 from igrow.edge.sources import HandsOff, Source
+from tests.fake_clock import FakeClock
 
 SETPOINTS = ("heating_setpoint", "co2_setpoint")
 

@@ -9,7 +9,6 @@ from typing import Any
 
 from igrow.edge.bus.errors import AddressRefusedError, NoAnswerError, NoValueError
 from igrow.edge.bus.plc import Reading
-from igrow.edge.clock import FakeClock
 from igrow.edge.cycle import ControlCycle
 from igrow.edge.guard import GuardedWriter, GuardRules, Interlock, PointRule, Readback
 from igrow.edge.guard.heartbeat import HEARTBEAT
@@ -18,6 +17,7 @@ from igrow.edge.journal import Journal
 from igrow.edge.sensors import ImageBuilder, SensorRule
 from igrow.edge.sources import HandsOff, Source
 from tests.control.control_fakes import READ_AGAIN, Bench, FakePlc, MemoryStore
+from tests.fake_clock import FakeClock
 
 SAFE = {"heating_setpoint": 18.0, "co2_setpoint": 400.0, "lamp_on": 0.0, "irrigation_on": 0.1}
 RULES: Mapping[str, PointRule] = {

@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import pytest
 
-from igrow.edge.clock import FakeClock
 from igrow.edge.moment import Moment, from_json, this_boot, to_json
 from igrow.edge.remembering import NOTE_AGAIN, StateNotes
 from tests.control.control_fakes import FixedSource, MemoryStore
 from tests.control.stubborn_plc import RULES, SAFE, make_stubborn_bench
+from tests.fake_clock import FakeClock
 
 WISH = {"heating_setpoint": 21.0, "co2_setpoint": 700.0, "lamp_on": 1.0, "irrigation_on": 0.5}
 

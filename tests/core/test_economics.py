@@ -12,7 +12,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from igrow.core.economics import co2_cost, electricity_price, is_peak, product_price, running_costs, season_balance
+from igrow.core.economics import (
+    Balance,
+    co2_cost,
+    electricity_price,
+    harvest_income,
+    is_peak,
+    product_price,
+    running_costs,
+)
 from igrow.core.site import ElectricityTariff, Prices, Tier
 
 PRICES = Prices()
@@ -100,18 +108,16 @@ def test_the_balance_of_a_challenge_team_follows_from_its_files(team: str, data_
     harvest = np.where(production[0] == 43510, 43875, production[0])  # its first row bears the wrong year
     measured = np.flatnonzero(~np.isnan(crop[4]))
     held = np.clip(np.searchsorted(crop[0][measured], resources[0], side="right") - 1, 0, None)
-    balance = season_balance(
-        PRICES,
-        harvest_days=days(harvest),
-        class_a=production[1],
-        class_b=production[2],
-        brix=np.interp(harvest, quality[0], quality[2]),
-        plant_density=crop[5][0],
-        stem_density=crop[4][measured][held],
-        heat=resources[1],
-        electricity_peak=resources[2],
-        electricity_off_peak=resources[3],
-        co2=resources[4],
+    brix = np.interp(harvest, quality[0], quality[2])
+    income = harvest_income(PRICES, days(harvest), production[1], production[2], brix)
+    heat, peak, off_peak, co2 = (np.nansum(resources[column]) for column in range(1, 5))
+    balance = Balance(
+        income=np.asarray(np.nansum(income)),
+        plants=np.asarray(PRICES.plant * crop[5][0]),
+        upkeep=PRICES.stem_day * np.nansum(crop[4][measured][held]),
+        electricity=PRICES.electricity.peak * peak + PRICES.electricity.off_peak * off_peak,
+        heat=PRICES.heat * heat,
+        co2=co2_cost(PRICES, 0.0, co2),
     )
     found = (balance.income, balance.plants, balance.upkeep, balance.electricity, balance.heat, balance.co2)
     np.testing.assert_allclose([*found, balance.net_profit], TEAMS[team], atol=0.011)

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from igrow.core import sun
-from igrow.core.errors import IgrowError
 from igrow.core.simulator.hybrid.record import Record
 
 Mask = NDArray[np.bool_]
@@ -70,21 +69,8 @@ def weeks(time: NDArray[np.datetime64]) -> NDArray[np.int64]:
     return number
 
 
-def split_weeks(time: NDArray[np.datetime64], fit: int, selection: int) -> WeekSplit:
-    """Return the first `fit` weeks, the next `selection` weeks, and all later ones.
-
-    Raises:
-        IgrowError: nothing would be left to test on.
-    """
-    week = weeks(time)
-    if fit < 1 or week[-1] < fit + selection:
-        raise IgrowError(f"the log has {week[-1] + 1} weeks: {fit} to fit and {selection} to select leave none to test")
-    return WeekSplit(week < fit, (week >= fit) & (week < fit + selection), week >= fit + selection)
-
-
-def alternate_weeks(time: NDArray[np.datetime64], held_out_every: int = 4) -> WeekSplit:
-    """Return every `held_out_every`-th week held out and the one before it for selection, for logs of few weeks."""
-    week = weeks(time)
-    held_out = week % held_out_every == held_out_every - 1
-    selection = week % held_out_every == held_out_every - 2
+def alternate_weeks(time: NDArray[np.datetime64]) -> WeekSplit:
+    """Return every fourth week held out and the one before it for selection, for logs of few weeks."""
+    phase = weeks(time) % 4
+    held_out, selection = phase == 3, phase == 2
     return WeekSplit(~held_out & ~selection, selection, held_out)

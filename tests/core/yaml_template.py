@@ -15,12 +15,12 @@ _PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9_./+-]*( [A-Za-z0-9_./+-]+)*")
 _COMMENT_COLUMN = 44
 
 
-def dump(instance: Any, *, annotated: bool = True) -> str:
-    """Return the YAML text of a dataclass made of `setting` fields; annotated with unit, bounds and meaning."""
-    return "\n".join([*_lines(instance, 0, annotated), ""])
+def dump(instance: Any) -> str:
+    """Return the YAML text of a dataclass made of `setting` fields, with unit, bounds and meaning of each."""
+    return "\n".join([*_lines(instance, 0), ""])
 
 
-def _lines(instance: Any, depth: int, annotated: bool) -> list[str]:
+def _lines(instance: Any, depth: int) -> list[str]:
     lines: list[str] = []
 
     def add(line: str, comment: str) -> None:
@@ -31,10 +31,10 @@ def _lines(instance: Any, depth: int, annotated: bool) -> list[str]:
     for field in dataclasses.fields(instance):
         value = getattr(instance, field.name)
         start = f"{'  ' * depth}{field.name}:"
-        comment = _comment(field.metadata) if annotated else ""
+        comment = _comment(field.metadata)
         if dataclasses.is_dataclass(value):
             add(start, comment)
-            lines += _lines(value, depth + 1, annotated)
+            lines += _lines(value, depth + 1)
         elif isinstance(value, Mapping) and value:
             add(start, comment)
             lines += [f"{'  ' * (depth + 1)}{_text(key)}: {_flow(item)}" for key, item in value.items()]
