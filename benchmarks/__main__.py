@@ -8,7 +8,7 @@ import sys
 BENCHMARKS = {
     "simulator": ["benchmarks.simulator"],
     "network": ["benchmarks.network"],
-    "planner": ["benchmarks.planner", "speed"],
+    "planner": ["benchmarks.planner"],
     "greenhouse": ["benchmarks.greenhouse", "speed"],
     "bus": ["benchmarks.bus"],
     "gateway": ["benchmarks.gateway"],

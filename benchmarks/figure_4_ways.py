@@ -17,7 +17,6 @@ from benchmarks.simulated_houses import SimulatedHouses
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.gaps import held
 from igrow.core.greenhouse import tomato
-from igrow.core.planner.policy import OnnxPolicy, chosen, observe, to_setpoints
 from igrow.core.planner.season.search import GENERATIONS, Genes, rule_and_strategy
 from igrow.core.quantities import SETPOINTS
 from igrow.core.simulator.plan import BundleSimulator
@@ -25,6 +24,7 @@ from igrow.core.site import Site
 from igrow.core.telemetry import to_grid
 from igrow.trainer.data.public import agc2019
 from igrow.trainer.research.paper.compartments import read_2019
+from igrow.trainer.research.policies.policy import OnnxPolicy, chosen, observe, to_setpoints
 from igrow.trainer.research.policies.train import export, train
 
 DAYS = 119

@@ -15,10 +15,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.planner import recipe_table
+from benchmarks.led_greenhouses import run
 from igrow.core.agronomy import Memory
 from igrow.core.economics import co2_cost, harvest_income, is_peak, local_days
-from igrow.core.greenhouse import GreenhouseParameters, generate_weather
+from igrow.core.greenhouse import GreenhouseParameters, generate_weather, hourly_weather, recipe_by_hour
 from igrow.core.greenhouse.disturbances import QUIET
 from igrow.core.greenhouse.hidden import HiddenEffect
 from igrow.core.greenhouse.parameters import stack
@@ -27,7 +27,6 @@ from igrow.core.greenhouse.sensors import EXACT
 from igrow.core.greenhouse.weather_table import WeatherTable
 from igrow.core.local_time import hour_of_day
 from igrow.core.planner.objective import Outcome, Simulator
-from igrow.core.planner.plant_simulator import run
 from igrow.core.planner.recent_use import SCALED, factors
 from igrow.core.planner.season import Strategy
 from igrow.core.planner.season.course import RADIATION, asked
@@ -36,7 +35,6 @@ from igrow.core.planner.template import Template, for_site
 from igrow.core.site import Site
 from igrow.core.sun import unix_seconds
 from igrow.core.telemetry import Telemetry
-from igrow.trainer.research.policies.environment import hourly_weather
 
 Values = NDArray[np.float64]
 
@@ -227,7 +225,7 @@ def lead(
         begin = START + day * DAY
         expected = led.expected(day)
         template = for_site(site, begin, 24, radiation=expected[:, :, RADIATION].mean(axis=0))
-        recipe, present = recipe_table(site, begin, 24), led.measured()
+        recipe, present = recipe_by_hour(begin, 24, site.longitude), led.measured()
         mornings = {
             name: Morning(
                 day, begin, expected[part], recipe, template, {key: value[part] for key, value in present.items()},
@@ -264,7 +262,7 @@ def settle(site: Site, led: Houses) -> tuple[Past, Values, Memory]:
         if day == -JUDGED:
             initial = {name: value.copy() for name, value in led.measured().items()}
         radiation = led.expected(day)[:, :, RADIATION].mean(axis=0)
-        recipe = np.repeat(recipe_table(site, begin, 24)[None], len(led.hourly), axis=0)
+        recipe = np.repeat(recipe_by_hour(begin, 24, site.longitude)[None], len(led.hourly), axis=0)
         course = for_site(site, begin, 24, radiation=radiation).follow(recipe, applied, memory)
         applied, memory = course.setpoints[:, -1], course.memory
         outcome = led.advance(course.setpoints, begin)

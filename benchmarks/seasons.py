@@ -32,10 +32,10 @@ from numpy.typing import NDArray
 from scipy.stats import spearmanr
 from scipy.stats import t as student
 
-from benchmarks.planner import SITE, recipe_table
+from benchmarks.led_greenhouses import SITE
 from benchmarks.season_houses import DAY, PARTS, START, Led, Past, Recipe, Way, lead, money
 from igrow.core.bundle import default_bundle_folder, read_bundle
-from igrow.core.greenhouse import generate_weather, tomato
+from igrow.core.greenhouse import generate_weather, hourly_weather, recipe_by_hour, tomato
 from igrow.core.greenhouse.described import parameters_of
 from igrow.core.planner.objective import Simulator
 from igrow.core.planner.recent_use import Corrected
@@ -44,7 +44,6 @@ from igrow.core.planner.season.course import STRETCH, typical_days
 from igrow.core.planner.season.search import GENERATIONS, SETTINGS, Genes, Search, genetic, rule_and_strategy
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Site, load_site
-from igrow.trainer.research.policies.environment import hourly_weather
 
 Values = NDArray[np.float64]
 
@@ -78,7 +77,7 @@ def typical_weather(days: int) -> Values:
 def season_of(site: Site, days: int) -> Season:
     """Return the season to be tuned on: the default bundle's simulator, typical weather."""
     simulator = BundleSimulator(read_bundle(default_bundle_folder()), site.greenhouse, members=1)
-    recipe = recipe_table(site, START, 24)
+    recipe = recipe_by_hour(START, 24, site.longitude)
     return Season(site, simulator, parameters_of(site), START, days, typical_weather(days), STRETCH // 2, recipe)
 
 

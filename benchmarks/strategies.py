@@ -24,13 +24,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.planner import SITE, recipe_table
+from benchmarks.led_greenhouses import DAY, SITE, Greenhouses, Scenario
 from igrow.core.agronomy import Memory
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.economics import harvest_income, local_days
+from igrow.core.greenhouse import hourly_weather, recipe_by_hour
 from igrow.core.planner import Objective, Outcome, PlanningState, Simulator, optimise
-from igrow.core.planner.policy import HOURS as POLICY_HOURS
-from igrow.core.planner.policy import OnnxPolicy
 from igrow.core.planner.recent_use import (
     SCALED,
     Corrected,
@@ -48,7 +47,8 @@ from igrow.core.sun import unix_seconds
 from igrow.core.telemetry import Telemetry
 from igrow.edge.planning.forecast import persistence
 from igrow.edge.planning.make_plan import RECENT_DAYS
-from igrow.trainer.research.policies.environment import DAY, Greenhouses, Scenario, hourly_weather
+from igrow.trainer.research.policies.policy import HOURS as POLICY_HOURS
+from igrow.trainer.research.policies.policy import OnnxPolicy
 
 Values = NDArray[np.float64]
 
@@ -130,14 +130,14 @@ def lead(
     houses = Greenhouses(site, scenario)
     for _ in range(SETTLING):
         # A grown crop is set down in the greenhouse; it and the soil need days to fit each other.
-        houses.advance(np.repeat(recipe_table(site, houses.time, 24)[None], houses.count, axis=0))
+        houses.advance(np.repeat(recipe_by_hour(houses.time, 24, site.longitude)[None], houses.count, axis=0))
     books = {name: Book() for name in strategies}
     co2 = np.zeros(houses.count)
     past: list[deque[Day]] = [deque(maxlen=round(RECENT_DAYS * 24 / every)) for _ in range(houses.count)]
     for choice in range((scenario.days - SETTLING) * 24 // every):
         begin = houses.time
         present, applied = houses.measurements(), houses.applied()
-        recipe = recipe_table(site, begin, HORIZON)
+        recipe = recipe_by_hour(begin, HORIZON, site.longitude)
         coming = houses.coming_weather(HORIZON)
         chosen, expected, states = [], [], []
         for place, (name, strategy) in enumerate(strategies.items()):
@@ -246,7 +246,7 @@ def best_template(site: Site, simulator: Simulator, count: int = 500) -> Strateg
             template = for_site(site, at, HORIZON)
             if not genes.size:
                 genes = template.draw(rng, count)
-            candidates = template.decode(genes, recipe_table(site, at, HORIZON), np.full(4, np.nan))
+            candidates = template.decode(genes, recipe_by_hour(at, HORIZON, site.longitude), np.full(4, np.nan))
             outcome = simulator.simulate({}, hourly_weather(weather, at, HORIZON), candidates, at)
             hours = at + np.arange(HORIZON) * np.timedelta64(3600, "s")
             score += Objective(site, hours).value(outcome).score.mean(axis=0)

@@ -15,7 +15,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from igrow.core.bundle import BUILT_IN
-from igrow.core.greenhouse import Season, generate_weather, recipe, simulate_many
+from igrow.core.greenhouse import Season, generate_weather, recipe_by_hour, simulate_many
 from igrow.core.greenhouse.described import parameters_of
 from igrow.core.quantities import SETPOINTS
 from igrow.core.simulator.crop import CropStages
@@ -67,7 +67,7 @@ def virtual_seasons(site: Site, count: int, days: int, seed: int) -> list[Season
 def plain_recipe(start: np.datetime64, end: np.datetime64) -> Telemetry:
     """Return the recipe hour by hour."""
     hours = np.arange(start, end + np.timedelta64(1, "h"), np.timedelta64(1, "h"))
-    rows = np.array([[recipe(hour)[name] for name in SETPOINTS] for hour in hours])
+    rows = recipe_by_hour(start, len(hours))
     return Telemetry(hours, {name: rows[:, column] for column, name in enumerate(SETPOINTS)})
 
 

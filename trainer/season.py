@@ -21,15 +21,14 @@ from numpy.typing import NDArray
 
 from igrow.core.bundle import Bundle
 from igrow.core.errors import IgrowError
-from igrow.core.greenhouse import generate_weather
-from igrow.core.greenhouse import recipe as growers_recipe
+from igrow.core.greenhouse import generate_weather, recipe_by_hour
 from igrow.core.greenhouse.described import parameters_of
 from igrow.core.greenhouse.weather import WeatherClimate
 from igrow.core.planner.season import Season, SeasonPlan, Strategy, valued
 from igrow.core.planner.season.course import DAY, STRETCH, typical_days
 from igrow.core.planner.season.plan import first_crop
 from igrow.core.planner.season.search import GENERATIONS, Genes, genetic, worth_of
-from igrow.core.quantities import SETPOINTS, WEATHER
+from igrow.core.quantities import WEATHER
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry, to_grid
@@ -127,10 +126,9 @@ def season_of(site: Site, bundle: Bundle, begins: datetime.date, weather: Teleme
         raise IgrowError(f"{site.name}: {days} days from {begins} to crop.end_date: {SHORTEST} are needed for a season")
     midnight = datetime.datetime.combine(begins, datetime.time(), ZoneInfo(site.time_zone))
     start = np.datetime64(midnight.astimezone(datetime.UTC).replace(tzinfo=None), "s")
-    hours = start + np.arange(24) * np.timedelta64(3600, "s")
-    recipe = np.array([[growers_recipe(hour, site.longitude)[name] for name in SETPOINTS] for hour in hours])
     simulator = BundleSimulator(bundle, site.greenhouse, members=1)
     typical = _typical(site, start, days, weather, say)
+    recipe = recipe_by_hour(start, 24, site.longitude)
     return Season(site, simulator, parameters_of(site), start, days, typical, STRETCH // 2, recipe)
 
 

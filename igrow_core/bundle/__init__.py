@@ -1,9 +1,9 @@
 """The bundle: what the trainer ships to a gateway, one folder that proves itself.
 
 A bundle holds `simulator.onnx` (candidate strategies over a day), `optimizer.onnx` (one generation of the
-genetic algorithm), where there are such `hindcast.onnx` (the climate given what the actuators did, for shadow
-runs) and `policy.onnx`, further files that the manifest lists, `golden.npz`
-(inputs and the outputs they must give) and `manifest.json`. The story of a bundle:
+genetic algorithm), where there is one `hindcast.onnx` (the climate given what the actuators did, for shadow
+runs), further files that the manifest lists, `golden.npz` (inputs and the outputs they must give) and
+`manifest.json`. The story of a bundle:
 
 1. The trainer fills a `Manifest` and calls `write_bundle`: files are checksummed, written into a folder next
    to the target and renamed into place, so that nobody ever sees half a bundle.
@@ -15,7 +15,6 @@ runs) and `policy.onnx`, further files that the manifest lists, `golden.npz`
 from igrow.core.bundle.files import (
     BUILT_IN,
     GOLDEN_FILE,
-    GRAPHS,
     MANIFEST_FILE,
     REQUIRED_FILES,
     Bundle,
@@ -46,7 +45,6 @@ __all__ = [
     "BUILT_IN",
     "FORMAT_VERSION",
     "GOLDEN_FILE",
-    "GRAPHS",
     "MANIFEST_FILE",
     "REQUIRED_FILES",
     "Bundle",

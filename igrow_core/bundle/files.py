@@ -21,10 +21,8 @@ from igrow.core.whole_files import sync_folder, write_through
 
 MANIFEST_FILE = "manifest.json"
 GOLDEN_FILE = "golden.npz"
-GRAPHS = ("simulator", "optimizer", "hindcast", "policy")
-"""The graphs that a bundle can hold, each in a file of its name with the suffix .onnx."""
 REQUIRED_GRAPHS = ("simulator", "optimizer")
-"""Those that it must hold, with golden values."""
+"""The graphs that a bundle must hold, each in a file of its name with the suffix .onnx, with golden values."""
 REQUIRED_FILES = (*(f"{graph}.onnx" for graph in REQUIRED_GRAPHS), GOLDEN_FILE)
 
 LARGEST_FILE = 256 * 2**20
@@ -52,7 +50,7 @@ class Bundle:
         return f"Bundle({self.label!r}, {self.manifest.variant}, {str(self.folder)!r})"
 
     def graph(self, name: str) -> Path:
-        """Return the file of one of `GRAPHS`; raises BundleError where the bundle has none."""
+        """Return the file of a graph; raises BundleError where the bundle has none."""
         file = f"{name}.onnx"
         if file not in self.manifest.files:
             raise BundleError(f"{self.folder}: the bundle holds no {file}")

@@ -16,11 +16,11 @@ Wageningen; C. Stanghellini (1987), Transpiration of greenhouse crops, PhD thesi
 from igrow.core.greenhouse.disturbances import Disturbances
 from igrow.core.greenhouse.hidden import HiddenEffect
 from igrow.core.greenhouse.parameters import GreenhouseParameters
-from igrow.core.greenhouse.recipe import recipe
+from igrow.core.greenhouse.recipe import recipe, recipe_by_hour
 from igrow.core.greenhouse.season import Season, simulate, simulate_many
 from igrow.core.greenhouse.sensors import Sensors
 from igrow.core.greenhouse.virtual import VirtualGreenhouse
-from igrow.core.greenhouse.weather import generate_weather
+from igrow.core.greenhouse.weather import generate_weather, hourly_weather
 
 __all__ = [
     "Disturbances",
@@ -30,7 +30,9 @@ __all__ = [
     "Sensors",
     "VirtualGreenhouse",
     "generate_weather",
+    "hourly_weather",
     "recipe",
+    "recipe_by_hour",
     "simulate",
     "simulate_many",
 ]

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from igrow.core.arrays import Floats
+from igrow.core.quantities import SETPOINTS
 from igrow.core.sun import solar_hour
 
 
 def recipe(time: np.datetime64, longitude: float = 4.53) -> dict[str, float]:
     """Return the four setpoints of a tomato grower in winter and spring at a time (UTC).
 
-    Local solar time counts: 20.5 degC and 800 ppm by day from 7 to 17, an afternoon of 19.5 degC, a night of 17 degC
-    after 20 h; lamps from 1 to 17 h, which the PLC puts off in strong light; irrigation from 2 h after the lamps to
-    2 h before sunset.
+    Local solar time counts: 18.5 degC from 1 to 7 h, 20.5 degC to 17 h, 19 degC to 20 h, then a night of 17 degC;
+    lamps, which the PLC puts off in strong light, and 800 ppm from 1 to 17 h, 400 ppm else; irrigation from 3 to 16 h.
     """
     hour = float(solar_hour(time, 52.0, longitude))
     if 7.0 <= hour < 17.0:
@@ -29,3 +30,9 @@ def recipe(time: np.datetime64, longitude: float = 4.53) -> dict[str, float]:
         "lamp_on": 1.0 if 1.0 <= hour < 17.0 else 0.0,
         "irrigation_on": 1.0 if 3.0 <= hour < 16.0 else 0.0,
     }
+
+
+def recipe_by_hour(start: np.datetime64, hours: int, longitude: float = 4.53) -> Floats:
+    """Return the recipe at each hour from `start` (UTC) on, in the order of `SETPOINTS`, (hours, 4)."""
+    times = start + np.arange(hours) * np.timedelta64(3600, "s")
+    return np.array([[recipe(time, longitude)[name] for name in SETPOINTS] for time in times])

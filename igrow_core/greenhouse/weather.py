@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from igrow.core.errors import IgrowError
 from igrow.core.greenhouse.sky import sky_temperature
+from igrow.core.quantities import WEATHER
 from igrow.core.sun import elevation, solar_hour, unix_seconds
-from igrow.core.telemetry import Telemetry
+from igrow.core.telemetry import Telemetry, to_grid
 
 STEP = 300
 """Seconds between rows."""
@@ -144,3 +145,9 @@ def generate_weather(
 def _saturation_ratio(dew_point: NDArray[np.float64], temperature: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return vapour pressure at the dew point over that of saturation at the temperature (Magnus form)."""
     return np.asarray(np.exp(17.625 * dew_point / (dew_point + 243.04) - 17.625 * temperature / (temperature + 243.04)))
+
+
+def hourly_weather(weather: Telemetry, start: np.datetime64, hours: int) -> NDArray[np.float64]:
+    """Return hourly means from `start` on in the registry's order, (H, 6); `start` is a whole hour."""
+    table = to_grid(weather.select(start, start + np.timedelta64(hours, "h")), 3600)
+    return np.stack([table[name] for name in WEATHER[:6]], axis=1)

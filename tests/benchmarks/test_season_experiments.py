@@ -7,10 +7,10 @@ import pytest
 
 from benchmarks.figure_4_ways import DAYS, HEATING, LAMPS, champion, growers, simulator_of
 from benchmarks.logged_houses import LATER, STEP, LoggedHouses
-from benchmarks.planner import recipe_table
 from benchmarks.season_houses import BEFORE, DAY, START
 from benchmarks.seasons import described
 from benchmarks.simulated_houses import SimulatedHouses
+from igrow.core.greenhouse import recipe_by_hour
 from igrow.core.sun import unix_seconds
 from tests import needs
 
@@ -18,7 +18,7 @@ from tests import needs
 def test_copies_of_a_house_are_disturbed_alike_and_log_what_their_sensors_show() -> None:
     houses = LoggedHouses(1, [0, 1, 0, 1])
     begin = START - BEFORE * DAY
-    setpoints = np.repeat(recipe_table(described("today", 30), begin, 24)[None], 4, axis=0)
+    setpoints = np.repeat(recipe_by_hour(begin, 24, described("today", 30).longitude)[None], 4, axis=0)
     houses.advance(setpoints[:, :2], begin)
     air = houses.measured()["air_temperature"]
     # Copies read sensors of their own, whose noise the climate computer follows.
@@ -47,7 +47,7 @@ def test_the_second_effect_of_a_house_begins_later() -> None:
 def test_a_simulated_house_goes_on_where_it_ended_and_its_crop_is_picked() -> None:
     site = described("today", 30)
     houses = SimulatedHouses(site, simulator_of(site), 4, [0, 0, 1])
-    setpoints = np.repeat(recipe_table(site, START, 24)[None], 3, axis=0)
+    setpoints = np.repeat(recipe_by_hour(START, 24, site.longitude)[None], 3, axis=0)
     picked = []
     for day in range(3):
         outcome = houses.advance(setpoints, START + day * DAY)

@@ -1,4 +1,4 @@
-"""The policy in a plan: what it sees, what it may do, and where it is judged."""
+"""The policy in a plan: what it sees, and what it may do."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from igrow.core.errors import IgrowError
-from igrow.core.planner.policy import ACTIONS, OBSERVATIONS, OnnxPolicy, chosen, observe, to_setpoints
 from igrow.core.quantities import SETPOINTS
+from igrow.trainer.research.policies.policy import ACTIONS, OBSERVATIONS, OnnxPolicy, chosen, observe, to_setpoints
 from tests.planner.toy_greenhouse import START
 
 
@@ -60,19 +60,3 @@ def test_a_file_that_is_no_policy_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.onnx").write_bytes(export_optimizer(EvolutionSettings()).SerializeToString())
     with pytest.raises(IgrowError, match="is no policy of 76 observations"):
         OnnxPolicy(tmp_path / "a.onnx")
-
-
-def test_greenhouses_of_an_environment_are_the_same_for_the_same_seed(site) -> None:
-    from igrow.trainer.research.policies.environment import DailyGreenhouses, Scenario
-
-    actions = np.random.default_rng(0).uniform(-1, 1, (2, ACTIONS)).astype(np.float32)
-    worth = []
-    for seed in (3, 3, 4):
-        world = DailyGreenhouses(site, Scenario(START, 1, 2, seed))
-        seen = world.observe()
-        valuation = world.step(to_setpoints(site, actions))
-        assert world.done
-        worth.append((seen, valuation.score))
-    np.testing.assert_array_equal(worth[0][0], worth[1][0])
-    np.testing.assert_array_equal(worth[0][1], worth[1][1])
-    assert (worth[0][1] != worth[2][1]).all()

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from igrow.core.errors import IgrowError
-from igrow.core.planner.policy import ACTIONS, HOURS, OBSERVATIONS, OnnxPolicy
 from igrow.core.site import Site
+from igrow.trainer.research.policies.policy import ACTIONS, HOURS, OBSERVATIONS, OnnxPolicy
 from igrow.trainer.research.policies.train import SETTINGS, export, train
 from tests import needs
 from tests.planner.toy_greenhouse import ToySimulator

@@ -14,16 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from igrow.core.agronomy import Memory, one_of
-from igrow.core.greenhouse import generate_weather
-from igrow.core.greenhouse import recipe as growers_recipe
+from igrow.core.greenhouse import generate_weather, hourly_weather, recipe_by_hour
 from igrow.core.planner.objective import Objective, Simulator
 from igrow.core.planner.optimise import RADIATION
-from igrow.core.planner.policy import ACTIONS, HOURS, OBSERVATIONS, PRESENT, chosen, observe, to_setpoints
 from igrow.core.planner.template import BLOCK_STARTS, for_site
 from igrow.core.quantities import SETPOINTS
 from igrow.core.site import Site
-from igrow.trainer.research.policies.environment import DAY, hourly_weather
+from igrow.trainer.research.policies.policy import ACTIONS, HOURS, OBSERVATIONS, PRESENT, chosen, observe, to_setpoints
 
+DAY = np.timedelta64(86_400, "s")
 FIRST_START = np.datetime64("2020-01-04T23:00:00", "s")
 LAST_START_DAYS = 110
 """Episodes begin on a day up to this long after the first start."""
@@ -90,7 +89,7 @@ class SimulatedDays(gymnasium.Env):  # type: ignore[misc]
         """Live a day; the reward is what it is worth more than a day by the recipe."""
         now, weather = self._start, self._weather[self._day]
         time = now.time + np.arange(HOURS) * np.timedelta64(3600, "s")
-        recipe = np.array([[growers_recipe(one, self.site.longitude)[name] for name in SETPOINTS] for one in time])
+        recipe = recipe_by_hour(now.time, HOURS, self.site.longitude)
         asked = chosen(self.site, to_setpoints(self.site, by_hour(action[None])), recipe)
         template = for_site(self.site, now.time, HOURS, radiation=weather[:, RADIATION])
         # Both in one batch, which costs the simulator as much as one.

@@ -21,10 +21,10 @@ from torch import nn
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.errors import IgrowError
 from igrow.core.planner.objective import Simulator
-from igrow.core.planner.policy import ACTIONS, OBSERVATIONS
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Site, load_site
 from igrow.trainer.exporting.wiring import finished_model
+from igrow.trainer.research.policies.policy import ACTIONS, OBSERVATIONS
 
 EXAMPLE = "igrow-trainer policy --site config/site.yaml --out policy.onnx"
 SETTINGS: dict[str, Any] = {

@@ -74,7 +74,7 @@ def chosen(site: Site, setpoints: Setpoints, recipe: Setpoints) -> Setpoints:
 
 
 class OnnxPolicy:
-    """A bundle's policy.onnx."""
+    """A policy.onnx."""
 
     def __init__(self, path: Path) -> None:
         """Open the graph; raises IgrowError where it is no policy of 76 observations and 96 actions."""

@@ -1,33 +1,36 @@
-"""Where a policy is judged: mechanistic greenhouses, each under weather of its own, which any strategy can lead."""
+"""Mechanistic greenhouses, each under weather of its own, that any strategy can lead; and what came of the hours."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from benchmarks.provenance import ROOT
 from igrow.core.agronomy import Memory, one_of
 from igrow.core.arrays import Floats
-from igrow.core.greenhouse import GreenhouseParameters, generate_weather
+from igrow.core.greenhouse import GreenhouseParameters, generate_weather, hourly_weather
 from igrow.core.greenhouse.disturbances import QUIET
 from igrow.core.greenhouse.parameters import stack
 from igrow.core.greenhouse.plant import Plant
 from igrow.core.greenhouse.sensors import EXACT
 from igrow.core.greenhouse.weather_table import WeatherTable
-from igrow.core.planner.objective import Objective, Outcome, Valuation
+from igrow.core.planner.objective import Outcome
 from igrow.core.planner.optimise import RADIATION
-from igrow.core.planner.plant_simulator import run
-from igrow.core.planner.policy import HOURS, observe
 from igrow.core.planner.template import Setpoints, for_site
-from igrow.core.quantities import WEATHER
+from igrow.core.quantities import SETPOINTS
 from igrow.core.site import Site
 from igrow.core.sun import unix_seconds
-from igrow.core.telemetry import Telemetry, to_grid
 
+SITE = ROOT / "config" / "site.yaml"
+"""The described greenhouse, from which they differ."""
 DAY = np.timedelta64(86_400, "s")
 BEFORE, AHEAD = 3, 3
 """Days of weather before the first day, from which a forecast can be made, and beyond the last one."""
+_TOTALS = {"heat": ("boiler_in", 1e-6), "electricity": ("electricity", 1 / 3.6e6), "co2": ("co2_dosed", 1.0)}
+_STATES = ("air_temperature", "air_humidity", "air_co2", "leaf_area_index")
+_CUMULATIVE = ("net_growth", "fruit_fresh_weight")
 
 
 @dataclass(frozen=True)
@@ -100,30 +103,29 @@ class Greenhouses:
         return None if self._memory is None else one_of(self._memory, greenhouse)
 
 
-class DailyGreenhouses:
-    """Mechanistic greenhouses that live through `days` days, one action each day."""
-
-    def __init__(self, site: Site, scenario: Scenario) -> None:
-        self._greenhouses, self._days, self.day = Greenhouses(site, scenario), scenario.days, 0
-
-    @property
-    def done(self) -> bool:
-        """All days are over."""
-        return self.day >= self._days
-
-    def observe(self) -> NDArray[np.float32]:
-        """Return the observations of the day that comes, (N, 76)."""
-        known = self._greenhouses
-        return observe(known.site, known.measurements(), known.coming_weather(HOURS), known.time)
-
-    def step(self, setpoints: Setpoints) -> Valuation:
-        """Live through a day under setpoints (N, 24, 4), and return what it was worth, arrays (1, N)."""
-        time = self._greenhouses.time + np.arange(HOURS) * np.timedelta64(3600, "s")
-        self.day += 1
-        return Objective(self._greenhouses.site, time).value(self._greenhouses.advance(setpoints))
+def run(plant: Plant, setpoints: Floats) -> Outcome:
+    """Carry a batch of B plants along setpoints (B, H, 4); arrays (1, B, H), climate as of each hour's end."""
+    columns: dict[str, list[Any]] = {name: [] for name in (*_STATES, *_TOTALS, *_CUMULATIVE)}
+    before = _books(plant)
+    for hour in range(setpoints.shape[1]):
+        command = {name: setpoints[:, hour, column] for column, name in enumerate(SETPOINTS)}
+        # Actuators are read as means: those of the last hour, when the hours are over.
+        plant.reset_means()
+        plant.advance(3600.0, command)
+        after = _books(plant)
+        for name in _STATES:
+            columns[name].append(after[name])
+        for name in (*_TOTALS, *_CUMULATIVE):
+            columns[name].append(after[name] - before[name])
+        before = after
+    arrays = {name: np.stack(values, axis=-1)[None] for name, values in columns.items()}
+    return Outcome(**arrays, outside=np.zeros_like(arrays["heat"]))
 
 
-def hourly_weather(weather: Telemetry, start: np.datetime64, hours: int) -> Floats:
-    """Return hourly means from `start` on in the registry's order, (H, 6); `start` is a whole hour."""
-    table = to_grid(weather.select(start, start + np.timedelta64(hours, "h")), 3600)
-    return np.stack([table[name] for name in WEATHER[:6]], axis=1)
+def _books(plant: Plant) -> dict[str, Floats]:
+    truth = plant.truth({})
+    like = np.zeros(plant.count or 1)
+    books = {name: like + truth[name] for name in (*_STATES, *_CUMULATIVE)}
+    for name, (total, scale) in _TOTALS.items():
+        books[name] = like + plant.state.totals.get(total, 0.0) * scale
+    return books
