@@ -24,6 +24,8 @@ UNEVEN_READINGS = 3
 which the clock counts as one that does not run: a step of a time service is one such reading, a slew none."""
 PACE_SECONDS = 1.0
 """Between two looks at the pace, at the least: two clocks are never read in the very same instant."""
+PLANT_EARLIEST = datetime(1980, 1, 1, tzinfo=UTC).timestamp()
+"""Of a plant's own clock."""
 SETTLE_SECONDS = 60.0
 """After a jump the clock must run evenly for this long before it is trusted again."""
 MOST_AHEAD = 400 * 86_400.0
@@ -63,20 +65,13 @@ class Clock(Protocol):
 class TrustedTime:
     """Tells whether a wall clock may be trusted: by its date, by how evenly it runs, and by what was known before.
 
-    A clock is trusted when it shows a plausible date and has run evenly for `settle` seconds since its last jump; at a
+    A clock is trusted when it shows a plausible date and has run evenly for `SETTLE_SECONDS` since its last jump; at a
     start the last time that is known takes the place of the reading before. One that is years ahead of that is
     not believed however evenly it runs, without a witness: the time service, or the PLC's own clock.
     """
 
-    def __init__(
-        self,
-        earliest: float = EARLIEST_PLAUSIBLE,
-        settle: float = SETTLE_SECONDS,
-        synchronised: Callable[[], bool] = SYNCHRONISED_FILE.exists,
-    ) -> None:
+    def __init__(self, synchronised: Callable[[], bool] = SYNCHRONISED_FILE.exists) -> None:
         """`synchronised` tells whether the system's time service has set the clock."""
-        self._earliest = earliest
-        self._settle = settle
         self._synchronised = synchronised
         self._offset: float | None = None
         self._paced: tuple[float, float] | None = None
@@ -109,7 +104,7 @@ class TrustedTime:
         if self._offset is not None and abs(offset - self._offset) > JUMP_SECONDS:
             self.jumps += 1
             # A clock that was never set and now is (1970 to today) has been corrected, not disturbed.
-            if self._offset + monotonic >= self._earliest:
+            if self._offset + monotonic >= EARLIEST_PLAUSIBLE:
                 self._jumped_at = monotonic
         elif self._offset is None and self.known is not None and wall < self.known - JUMP_SECONDS:
             self._jumped_at = monotonic
@@ -128,9 +123,9 @@ class TrustedTime:
             self._jumped_at = monotonic
 
     def _doubts(self, monotonic: float, wall: float) -> str:
-        if not self._earliest <= wall < LATEST_PLAUSIBLE:
+        if not EARLIEST_PLAUSIBLE <= wall < LATEST_PLAUSIBLE:
             return f"the clock shows {_date(wall)}, so it was never set"
-        if monotonic - self._jumped_at < self._settle:
+        if monotonic - self._jumped_at < SETTLE_SECONDS:
             if self._uneven >= UNEVEN_READINGS:
                 return f"the clock does not run evenly; it shows {_date(wall)}"
             return f"the clock has jumped, to {_date(wall)}"
@@ -195,14 +190,7 @@ class PlcClock:
     long past.
     """
 
-    def __init__(
-        self,
-        earliest: float = datetime(1980, 1, 1, tzinfo=UTC).timestamp(),
-        wall: Callable[[], float] = time.monotonic,
-    ) -> None:
-        """`wall` is the gateway's own monotonic clock, by which a jump is told from a plant that runs fast."""
-        self._earliest = earliest
-        self._wall = wall
+    def __init__(self) -> None:
         self._register: float | None = None
         self._heard_at = 0.0
         self._monotonic = 0.0
@@ -211,7 +199,8 @@ class PlcClock:
     def follow(self, register: float) -> bool:
         """Take a new reading of the register; tell whether it moved."""
         previous, self._register = self._register, register
-        heard_before, self._heard_at = self._heard_at, self._wall()
+        # By the gateway's own clock a jump is told from a plant that runs fast.
+        heard_before, self._heard_at = self._heard_at, time.monotonic()
         if previous is None or register == previous:
             return previous is None
         growth = register - previous
@@ -227,7 +216,7 @@ class PlcClock:
         """Why the date is not trusted; empty while it is."""
         if self._register is None:
             return "the plant's clock was not read yet"
-        if not self._earliest <= self._register < LATEST_PLAUSIBLE:
+        if not PLANT_EARLIEST <= self._register < LATEST_PLAUSIBLE:
             return f"the plant's clock shows {_date(self._register)}, so it was never set"
         return f"the plant's clock has jumped, to {_date(self._register)}" if self._even < PLANT_SETTLES else ""
 

@@ -265,18 +265,16 @@ def _cells(reader: Any, path: str | Path) -> tuple[list[str], list[Sequence[str]
     return header, columns, lines
 
 
-def parse_numbers(
-    path: str | Path, name: str, cells: Sequence[str], lines: Sequence[int], missing: frozenset[str] = frozenset()
-) -> Values:
-    """Return one column of cells as float64; empty cells, `nan` and the texts in `missing` become NaN."""
+def parse_numbers(path: str | Path, name: str, cells: Sequence[str], lines: Sequence[int]) -> Values:
+    """Return one column of cells as float64; empty cells and `nan` become NaN."""
     try:
-        values = np.array([float(cell) if cell and cell not in missing else np.nan for cell in cells], dtype=np.float64)
+        values = np.array([float(cell) if cell else np.nan for cell in cells], dtype=np.float64)
     except ValueError:
         values = np.empty(len(cells))
         for position, cell in enumerate(cells):
             text = cell.strip()
             try:
-                values[position] = float(text) if text and text not in missing else np.nan
+                values[position] = float(text) if text else np.nan
             except ValueError:
                 where = f"{path}:{lines[position]}"
                 raise TelemetryError(f"{where}: {name} is {text!r}: a number or an empty cell is needed") from None

@@ -8,11 +8,11 @@ import os
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
+from time import monotonic
 from typing import Protocol
 
 from igrow.core.errors import IgrowError
@@ -63,14 +63,12 @@ class ExchangeService:
         *,
         igrow_version: str,
         rules: TransferRules | None = None,
-        monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
         """`folder` is the exchange's part of the state folder."""
         rules = rules or TransferRules()
         self._rules = rules
         self._folder = folder
         self._store = store
-        self._monotonic = monotonic
         self._order = Order(
             str(folder), str(store.folder), site, url, igrow_version, None, rules.period, rules.budget,
             known_hosts=rules.known_hosts, identity=rules.identity, deadline=rules.deadline,
@@ -113,7 +111,7 @@ class ExchangeService:
         self._look_at(time)
         if self._process is not None:
             return
-        since = self._monotonic() - self._started
+        since = monotonic() - self._started
         period = -1 if time is None else int((time - GRACE_SECONDS) // self._rules.period)
         soon = (period != self._period_sealed or self._report_waits) and since >= SOON_SECONDS
         if since >= self._rules.every or soon:
@@ -147,7 +145,7 @@ class ExchangeService:
         self._aside.close(CLOSING_SECONDS + 1.0)
 
     def _last_round(self) -> None:
-        until = self._monotonic() + CLOSING_SECONDS
+        until = monotonic() + CLOSING_SECONDS
         try:
             if self._process is None or self._waited(until):
                 self._start(self._newest, partly=True)
@@ -174,7 +172,7 @@ class ExchangeService:
             self._process.stdin.close()
         except OSError as error:
             self._problem = f"exchange: no round can be started: {error.strerror or error}"
-        self._started = self._monotonic()
+        self._started = monotonic()
         self._report_waits = False
 
     def _reap(self) -> None:
@@ -183,7 +181,7 @@ class ExchangeService:
         if process is None:
             return
         code = process.poll()
-        took = self._monotonic() - self._started
+        took = monotonic() - self._started
         if code is None:
             if took > self._rules.deadline + 10.0:
                 _kill(process)
@@ -206,7 +204,7 @@ class ExchangeService:
         if self._process is None:
             return True
         with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(max(0.0, until - self._monotonic()))
+            self._process.wait(max(0.0, until - monotonic()))
         self._reap()
         return self._process is None
 

@@ -126,8 +126,9 @@ def chart(
     return "".join(parts)
 
 
-def spark(time: Values, value: Values, *, width: int = 150, height: int = 34) -> str:
+def spark(time: Values, value: Values) -> str:
     """Return a small line without axes; empty for fewer than two points."""
+    width, height = 150, 34
     if len(time) < 2:
         return ""
     low, span = float(np.min(value)), max(float(np.ptp(value)), 1e-9)

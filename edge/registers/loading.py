@@ -248,6 +248,6 @@ def load_register_map(path: str | os.PathLike[str]) -> RegisterMap:
     return load(path, MapFile).register_map(Path(path))
 
 
-def parse_register_map(text: str, name: str = "text") -> RegisterMap:
+def parse_register_map(text: str) -> RegisterMap:
     """Read and check a register map from YAML text; raises igrow.core.yaml_schema.SchemaError."""
-    return parse(text, MapFile, name).register_map()
+    return parse(text, MapFile).register_map()

@@ -30,6 +30,8 @@ DAY = 86_400_000
 """Milliseconds."""
 _LATEST = 2**43
 """Milliseconds since 1970, in the year 2248: beyond any row."""
+_SALVAGE_TRIES = 4096
+"""Ranges of time that are looked at in a damaged file."""
 
 
 class TelemetryFile:
@@ -173,7 +175,7 @@ def read_first_time(path: Path, start: int) -> int | None:
     return None if found is None else int(found) // 1000
 
 
-def salvage(damaged: Path, connection: sqlite3.Connection, *, tries: int = 4096) -> int:
+def salvage(damaged: Path, connection: sqlite3.Connection) -> int:
     """Copy every readable row of a damaged file into an open one; returns their number.
 
     A range of time that cannot be read is halved again and again, so that one bad page costs its own rows only.
@@ -190,7 +192,7 @@ def salvage(damaged: Path, connection: sqlite3.Connection, *, tries: int = 4096)
             )
         except sqlite3.Error:
             return 0
-        ranges = [(0, _LATEST)]
+        ranges, tries = [(0, _LATEST)], _SALVAGE_TRIES
         while ranges and tries > 0:
             tries -= 1
             low, high = ranges.pop()

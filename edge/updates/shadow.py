@@ -8,7 +8,7 @@ itself is judged, and the bundle in force is judged on the very same hours.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -108,14 +108,13 @@ def compare(
     log: Telemetry,
     start: np.datetime64,
     end: np.datetime64,
-    horizons: Sequence[int] = HORIZONS,
 ) -> Comparison:
     """Compare two bundles on the predictions that begin and end in [start, end).
 
     `log` lies on a regular grid and may begin before `start`, as history for a simulator that needs one.
     """
     pairs = []
-    for horizon in horizons:
+    for horizon in HORIZONS:
         origins, steps = _origins(log, start, end, horizon)
         if len(origins) == 0:
             continue

@@ -186,14 +186,14 @@ class ModbusServer:
         self._listeners.append(listener)
         return int(listener.sockets[0].getsockname()[1])
 
-    async def serve_serial(self, serial_port: str, baudrate: int, parity: Parity, stop_bits: int) -> None:
+    async def serve_serial(self, serial_port: str, baudrate: int, parity: Parity) -> None:
         """Answer on a serial port. Raises OSError."""
         await open_serial_port(
             _SerialConnection(self._units, self._connections),
             serial_port,
             baudrate,
             parity,
-            stop_bits,
+            1,
             HandOff("serial port"),
         )
 

@@ -161,11 +161,9 @@ class VirtualPlc:
         self._start_pace()
         return bound
 
-    async def start_serial(
-        self, serial_port: str, baudrate: int = 19200, parity: Parity = Parity.EVEN, stop_bits: int = 1
-    ) -> None:
+    async def start_serial(self, serial_port: str, baudrate: int = 19200, parity: Parity = Parity.EVEN) -> None:
         """Answer on a serial port and start the pace. Raises OSError."""
-        await self._server.serve_serial(serial_port, baudrate, parity, stop_bits)
+        await self._server.serve_serial(serial_port, baudrate, parity)
         self._start_pace()
 
     def drop_connections(self) -> None:

@@ -22,7 +22,7 @@ class Deviation:
     relative: float
 
 
-def self_test(bundle: Bundle, *, threads: int = 1) -> tuple[Deviation, ...]:
+def self_test(bundle: Bundle) -> tuple[Deviation, ...]:
     """Run every graph on its golden inputs and compare.
 
     Returns the deviation of each output. Raises BundleError at the first output that is not finite where it
@@ -37,7 +37,7 @@ def self_test(bundle: Bundle, *, threads: int = 1) -> tuple[Deviation, ...]:
     for graph, signature in bundle.manifest.graphs.items():
         if graph not in golden:
             raise BundleError(f"{bundle.folder}: no golden values for {graph}.onnx, so it cannot be tested")
-        session = open_session(bundle.graph(graph), threads=threads)
+        session = open_session(bundle.graph(graph))
         names = [output.name for output in session.get_outputs()]
         _compare_names(bundle, graph, "input", [t.name for t in signature.inputs], session.get_inputs())
         _compare_names(bundle, graph, "output", [t.name for t in signature.outputs], session.get_outputs())

@@ -12,25 +12,25 @@ from numpy.typing import NDArray
 from igrow.core.bundle.manifest import BundleError
 
 
-def new_session(graph: Path | bytes, *, threads: int = 1) -> Any:
-    """Open a graph, a file or a serialised model, in onnxruntime; raises what onnxruntime raises.
+def new_session(graph: Path | bytes) -> Any:
+    """Open a graph, a file or a serialised model, in onnxruntime, on one thread; raises what onnxruntime raises.
 
-    A gateway shares its cores with the control cycle, so the thread count is never left to the library. Nor is its
+    A gateway shares its cores with the control cycle, so the number of threads is never left to the library. Nor is its
     memory: the library is loaded by whoever opens a graph, and the daemon opens none.
     """
     onnxruntime = importlib.import_module("onnxruntime")
     options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = threads
+    options.intra_op_num_threads = 1
     options.inter_op_num_threads = 1
     options.log_severity_level = 4  # its reasons reach the user through the exception
     source = graph if isinstance(graph, bytes) else str(graph)
     return onnxruntime.InferenceSession(source, options, providers=["CPUExecutionProvider"])
 
 
-def open_session(path: Path, *, threads: int = 1) -> Any:
+def open_session(path: Path) -> Any:
     """Open a graph's file in onnxruntime; raises BundleError where it cannot."""
     try:
-        return new_session(path, threads=threads)
+        return new_session(path)
     except Exception as error:
         raise BundleError(f"{path}: onnxruntime cannot load the graph: {_first_line(error)}") from None
 

@@ -12,10 +12,10 @@ LARGEST_DOCUMENT = 4 * 2**20
 """Bytes; receipts, seals and reports are a thousand times smaller."""
 
 
-def parse_object(data: bytes, what: str, *, largest: int = LARGEST_DOCUMENT) -> dict[str, Any]:
+def parse_object(data: bytes, what: str) -> dict[str, Any]:
     """Return the JSON object in `data`; raises IgrowError that begins with `what` for anything else."""
-    if len(data) > largest:
-        raise IgrowError(f"{what}: {len(data)} bytes long, at most {largest} are right")
+    if len(data) > LARGEST_DOCUMENT:
+        raise IgrowError(f"{what}: {len(data)} bytes long, at most {LARGEST_DOCUMENT} are right")
     try:
         document = json.loads(data, parse_int=_integer)
     except RecursionError:

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from igrow.core import gaps
 from igrow.core.errors import IgrowError
-from igrow.core.greenhouse.climate_computer import ClimateComputer
 from igrow.core.greenhouse.disturbances import Disturbances, combined
 from igrow.core.greenhouse.hidden import HiddenEffect
 from igrow.core.greenhouse.parameters import GreenhouseParameters, stack
@@ -27,6 +26,10 @@ Schedule = Callable[[np.datetime64], Mapping[str, Any]]
 """Setpoints at a time (UTC); values are floats or, for a batch, arrays (N,)."""
 
 RESOURCES = ("heat", "electricity", "co2", "irrigation", "drain")
+
+
+STEP = 300
+"""Seconds between the rows of a log."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +64,6 @@ def simulate(
     effects: Sequence[HiddenEffect] = (),
     disturbances: Disturbances | None = None,
     sensors: Sensors | None = None,
-    computer: ClimateComputer | None = None,
-    step: int = 300,
     tick: float = TICK,
     crop: str | Crop = "mature",
 ) -> Season:
@@ -78,8 +79,6 @@ def simulate(
         effects: what happens in the plant without the model knowing.
         disturbances: unmodelled fluxes; `disturbances.QUIET` for none.
         sensors: noise; `sensors.EXACT` for none.
-        computer: settings of the PLC.
-        step: seconds between rows.
         tick: longest step of the climate, s.
         crop: "mature", "young", or a state of the crop.
 
@@ -88,9 +87,9 @@ def simulate(
     """
     plant = Plant(
         parameters, WeatherTable(weather), float(unix_seconds(start)), effects=effects, disturbances=disturbances,
-        sensors=sensors, computer=computer, crop=crop, seed=seed, tick=tick,
+        sensors=sensors, crop=crop, seed=seed, tick=tick,
     )  # fmt: skip
-    return _run(plant, _schedule(setpoints), end, step)[0]
+    return _run(plant, _schedule(setpoints), end)[0]
 
 
 def simulate_many(
@@ -105,9 +104,6 @@ def simulate_many(
     effects: Sequence[HiddenEffect] | Sequence[Sequence[HiddenEffect]] = (),
     disturbances: Disturbances | Sequence[Disturbances] | None = None,
     sensors: Sensors | None = None,
-    computer: ClimateComputer | None = None,
-    step: int = 300,
-    tick: float = TICK,
     crop: str | Crop = "mature",
     reached: Callable[[np.datetime64], None] | None = None,
 ) -> list[Season]:
@@ -126,9 +122,9 @@ def simulate_many(
         disturbances = combined(disturbances)
     plant = Plant(
         parameters, WeatherTable(weather), float(unix_seconds(start)), count=count, effects=effects,
-        disturbances=disturbances, sensors=sensors, computer=computer, crop=crop, seed=seed, tick=tick,
+        disturbances=disturbances, sensors=sensors, crop=crop, seed=seed,
     )  # fmt: skip
-    return _run(plant, _schedule(setpoints), end, step, reached)
+    return _run(plant, _schedule(setpoints), end, reached)
 
 
 def _schedule(setpoints: Telemetry | Sequence[Telemetry] | Schedule) -> Schedule:
@@ -170,19 +166,18 @@ def _run(
     plant: Plant,
     schedule: Schedule,
     end: np.datetime64,
-    step: int,
     reached: Callable[[np.datetime64], None] | None = None,
 ) -> list[Season]:
     seconds = int(plant.state.seconds)
-    rows = (int(unix_seconds(end)) - seconds) // step + 1
-    times = np.datetime64(seconds, "s") + np.arange(rows) * np.timedelta64(step, "s")
+    rows = (int(unix_seconds(end)) - seconds) // STEP + 1
+    times = np.datetime64(seconds, "s") + np.arange(rows) * np.timedelta64(STEP, "s")
     count = plant.count or 1
     logs: dict[str, dict[str, NDArray[np.float64]]] = {"true": {}, "measured": {}, "resources": {}}
     command: Mapping[str, Any] = schedule(times[0])
     for row in range(rows):
         if row:
             command = schedule(times[row - 1])
-            plant.advance(step, command)
+            plant.advance(STEP, command)
         truth = plant.truth(command)
         for kind, values in (
             ("true", truth),

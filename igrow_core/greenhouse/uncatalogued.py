@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any
 
 from igrow.core.air import LATENT_HEAT
 from igrow.core.arrays import Array
@@ -25,11 +25,11 @@ def _effect(
     contribution: Callable[[Any, Drivers, Values, Array], Mapping[str, Array]],
     sentence: str,
     memory: Memory | None = None,
-    kind: Literal["process", "sensor"] = "process",
 ) -> Effect:
     return Effect(
-        name=name, kind=kind, balances=balances, drivers=drivers, parameters=(amplitude,), contribution=contribution,
-        signature=sentence, separating_test="", title=sentence, sentence=sentence, source=_SOURCE, memory=memory,
+        name=name, kind="process", balances=balances, drivers=drivers, parameters=(amplitude,),
+        contribution=contribution, signature=sentence, separating_test="", title=sentence, sentence=sentence,
+        source=_SOURCE, memory=memory,
     )  # fmt: skip
 
 

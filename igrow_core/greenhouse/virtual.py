@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from igrow.core.greenhouse.climate_computer import SAFE_SETPOINTS, ClimateComputer
+from igrow.core.greenhouse.climate_computer import SAFE_SETPOINTS
 from igrow.core.greenhouse.disturbances import Disturbances
 from igrow.core.greenhouse.hidden import HiddenEffect
 from igrow.core.greenhouse.parameters import GreenhouseParameters
 from igrow.core.greenhouse.plant import Plant
-from igrow.core.greenhouse.sensors import Sensors
 from igrow.core.greenhouse.state import PlantState
 from igrow.core.greenhouse.tomato import Crop
 from igrow.core.greenhouse.weather_table import WeatherTable
@@ -29,8 +28,6 @@ class VirtualGreenhouse:
         effects: hidden effects.
         seed: of disturbances and sensor noise.
         disturbances: unmodelled fluxes; the default ones if None.
-        sensors: sensor noise; the default ones if None.
-        computer: settings of the PLC.
         crop: "mature", "young", or a state of the crop.
     """
 
@@ -43,13 +40,11 @@ class VirtualGreenhouse:
         effects: Sequence[HiddenEffect] = (),
         seed: int = 0,
         disturbances: Disturbances | None = None,
-        sensors: Sensors | None = None,
-        computer: ClimateComputer | None = None,
         crop: str | Crop = "mature",
     ) -> None:
         self._plant = Plant(
             parameters, WeatherTable(weather), float(unix_seconds(start)), effects=effects, seed=seed,
-            disturbances=disturbances, sensors=sensors, computer=computer, crop=crop,
+            disturbances=disturbances, crop=crop,
         )  # fmt: skip
         self._setpoints: Mapping[str, float] = dict(SAFE_SETPOINTS)
 

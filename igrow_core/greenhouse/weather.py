@@ -43,11 +43,9 @@ class WeatherClimate:
     """ppm."""
 
 
-def autoregressive(
-    rng: np.random.Generator, count: int, correlation_seconds: float, step: float = STEP
-) -> NDArray[np.float64]:
+def autoregressive(rng: np.random.Generator, count: int, correlation_seconds: float) -> NDArray[np.float64]:
     """Return a stationary AR(1) series of unit variance, shape (count,), with the given correlation time."""
-    keep = float(np.exp(-step / correlation_seconds))
+    keep = float(np.exp(-STEP / correlation_seconds))
     drawn = rng.standard_normal(count)
     drawn[1:] *= np.sqrt(1.0 - keep * keep)
     # Blocks turn the recursion into products of whole arrays; 256 steps keep the powers within range.

@@ -17,22 +17,19 @@ OUTPUTS = ("survivors", "survivor_fitness", "next_offspring")
 
 
 class OnnxGeneration:
-    """Runs optimizer.onnx; its sizes are read from the graph, its rates from `rates`."""
+    """Runs optimizer.onnx; its sizes are read from the graph."""
 
-    def __init__(self, path: Path, rates: EvolutionSettings | None = None) -> None:
+    def __init__(self, path: Path) -> None:
         """Open the graph; raises IgrowError where it is no optimizer."""
         self._session = open_session(path)
         shapes = {item.name: item.shape for item in self._session.get_inputs()}
         missing = {"parents", "offspring", "tournament"} - shapes.keys()
         if missing:
             raise IgrowError(f"{path}: is no optimizer: it lacks the inputs {', '.join(sorted(missing))}")
-        rates = rates or EvolutionSettings()
         self.settings = EvolutionSettings(
             parents=shapes["parents"][0],
             offspring=shapes["offspring"][0],
             contestants=shapes["tournament"][2],
-            mutations=rates.mutations,
-            step=rates.step,
         )
 
     def __call__(

@@ -11,7 +11,7 @@ candidate leaves them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -169,7 +169,6 @@ def for_site(
     start: np.datetime64,
     hours: int,
     *,
-    starts: Sequence[int] = BLOCK_STARTS,
     radiation: NDArray[np.float64] | None = None,
 ) -> Template:
     """Return the template of a horizon of `hours` from `start` (UTC), in blocks or hours of the site's local day.
@@ -185,9 +184,9 @@ def for_site(
     pattern = np.minimum(day - day[0], max(day[-1] - day[0] - 1, 0))
     hour = local.astype("datetime64[h]").astype(np.int64) % 24
     # Hours before the first block's start belong to the last block, which then runs over midnight.
-    period = (np.searchsorted(np.array(starts), hour, side="right") - 1) % len(starts)
+    period = (np.searchsorted(np.array(BLOCK_STARTS), hour, side="right") - 1) % len(BLOCK_STARTS)
     free = tuple(name for name in SETPOINTS if name in site.setpoints and name in site.planning.optimise)
-    _, by_period = np.unique(pattern * len(starts) + period, return_inverse=True)
+    _, by_period = np.unique(pattern * len(BLOCK_STARTS) + period, return_inverse=True)
     _, by_hour = np.unique(pattern * 24 + hour, return_inverse=True)
     limits = [site.limits[name] for name in SETPOINTS]
     place = Place.of(site)

@@ -80,10 +80,10 @@ class SimulatorSettings:
 class Hindcast:
     """Runs hindcast.onnx of a bundle."""
 
-    def __init__(self, bundle: Bundle, *, threads: int = 1) -> None:
+    def __init__(self, bundle: Bundle) -> None:
         """Open the graph; raises BundleError where the bundle has none or it is damaged."""
         self.settings = SimulatorSettings.of(bundle)
-        self._session = open_session(bundle.graph("hindcast"), threads=threads)
+        self._session = open_session(bundle.graph("hindcast"))
         tensors = {tensor.name: tensor.quantities for tensor in bundle.manifest.graphs["hindcast"].inputs}
         self._inputs = tensors["inputs"]
         self._parameters = np.array(
@@ -142,8 +142,7 @@ class Hindcast:
 class HindcastPredictor:
     """Free-run predictions of any bundle over a log; keeps the two bundles last used open."""
 
-    def __init__(self, *, threads: int = 1) -> None:
-        self._threads = threads
+    def __init__(self) -> None:
         self._open: dict[str, Hindcast] = {}
 
     def predict(self, bundle: Bundle, log: Telemetry, origins: NDArray[np.int64], steps: int) -> dict[str, Floats]:
@@ -154,7 +153,7 @@ class HindcastPredictor:
         if bundle.identity not in self._open:
             if len(self._open) >= 2:
                 self._open.pop(next(iter(self._open)))
-            self._open[bundle.identity] = Hindcast(bundle, threads=self._threads)
+            self._open[bundle.identity] = Hindcast(bundle)
         hindcast = self._open[bundle.identity]
         return hindcast.run(hindcast.settings.record(log, log.step), origins, steps)
 

@@ -47,13 +47,12 @@ _USUAL = {
 class BundleSimulator:
     """Runs simulator.onnx of a bundle; implements `igrow.core.planner.objective.Simulator`."""
 
-    def __init__(self, bundle: Bundle, greenhouse: Greenhouse, *, threads: int = 1, members: int | None = None) -> None:
+    def __init__(self, bundle: Bundle, greenhouse: Greenhouse, *, members: int | None = None) -> None:
         """Open the graph.
 
         Args:
             bundle: with a `simulator` of the hybrid variant.
             greenhouse: what the pipes give off, by the site's description; see `_heat_paid`.
-            threads: of onnxruntime.
             members: how many of the posterior's draws to run (None: all that the bundle carries; 1: the mean alone).
 
         Raises:
@@ -62,7 +61,7 @@ class BundleSimulator:
         self.settings = SimulatorSettings.of(bundle)
         self.growth = GrowthBalance.of(bundle.manifest.simulator)
         """What growth is computed with; None where it is a network's affair."""
-        self._session = open_session(bundle.graph("simulator"), threads=threads)
+        self._session = open_session(bundle.graph("simulator"))
         try:
             tensors = {one.name: one.quantities for one in bundle.manifest.graphs["simulator"].inputs}
             self._weather = tensors["weather"]

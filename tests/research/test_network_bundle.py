@@ -106,7 +106,7 @@ def run_graph_by_days(
 
 @pytest.fixture(scope="module")
 def season(bundle: Bundle, simulator: NetworkSimulator) -> tuple[Columns, NDArray[np.float64]]:
-    return run_graph_by_days(open_session(bundle.graph("simulator"), threads=1), simulator, columns())
+    return run_graph_by_days(open_session(bundle.graph("simulator")), simulator, columns())
 
 
 def test_the_graph_by_days_gives_the_free_run_of_a_season(simulator: NetworkSimulator, season) -> None:

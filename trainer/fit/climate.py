@@ -63,7 +63,6 @@ def fit_climate(
     prior: Gaussian,
     effects: ActiveEffects | None = None,
     *,
-    every_hours: float = EVERY_HOURS,
     progress: Callable[[str], None] | None = None,
 ) -> Gaussian:
     """Return the posterior of the parameters.
@@ -72,14 +71,13 @@ def fit_climate(
         parts: records on the working grid; several compartments of one kind are fitted with one set of parameters.
         prior: of all parameters; one of an effect, to be fitted with them, is called ``effect:parameter``.
         effects: the active effects, held but for such parameters.
-        every_hours: between the starts of the free runs.
         progress: is told of each step in a line.
 
     Raises:
         IgrowError: no complete run lies within the rows.
         DivergenceError: the model runs out of all bounds where the fit begins.
     """
-    runs = [some for record, rows in parts if (some := _runs_of(record, rows, every_hours)) is not None]
+    runs = [some for record, rows in parts if (some := _runs_of(record, rows)) is not None]
     if not runs:
         raise IgrowError(f"no stretch of {RUN_HOURS:g} h of the log is complete enough to calibrate on")
     low, high = bounds(prior.names)
@@ -112,7 +110,7 @@ def fit_climate(
         ) from None
     # What the data are worth is only known at the end, when the errors are those of the fitted model. Runs that overlap
     # meet the same disturbances, which count once.
-    overlap = max(1.0, RUN_HOURS / every_hours)
+    overlap = max(1.0, RUN_HOURS / EVERY_HOURS)
     scale = np.concatenate(
         [np.tile(observed_scale(part), (part.size, 1)) for part in _split(found.residuals, shapes).values()]
     )
@@ -169,11 +167,11 @@ class _Runs:
         return values
 
 
-def _runs_of(record: Record, rows: Mask | None, every_hours: float) -> _Runs | None:
+def _runs_of(record: Record, rows: Mask | None) -> _Runs | None:
     """Return the runs of a record, and the part of it that they need, or None where none is complete."""
     steps = max(1, round(RUN_HOURS * 3600.0 / record.step))
     allowed = np.ones(len(record), dtype=bool) if rows is None else rows
-    starts = starts_within(record, allowed, steps, max(1, round(every_hours * 3600.0 / record.step)))
+    starts = starts_within(record, allowed, steps, max(1, round(EVERY_HOURS * 3600.0 / record.step)))
     if len(starts) == 0:
         return None
     # The floor's temperature follows the air for days before the first run.

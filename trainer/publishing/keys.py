@@ -54,7 +54,7 @@ class RoleStatus:
     """Private keys of it that lie in the folder."""
 
 
-def create_keys(folder: Path, *, root_keys: int = 1, threshold: int = 1, now: datetime | None = None) -> Path:
+def create_keys(folder: Path, *, root_keys: int = 1, threshold: int = 1) -> Path:
     """Create the keys in `folder`, readable by their owner only; returns the root metadata that gateways get.
 
     Raises PublishingError where one exists: a lost root key can never be made again.
@@ -66,7 +66,7 @@ def create_keys(folder: Path, *, root_keys: int = 1, threshold: int = 1, now: da
         if path.exists():
             raise PublishingError(f"{path}: exists already; a signing key is never overwritten")
     folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-    root = Root(expires=_expiry(now or datetime.now(UTC)))
+    root = Root(expires=_expiry())
     for name in names:
         role = name.split("-")[0]
         root.add_key(_create(folder / f"{name}.pem").public_key, role)
@@ -74,7 +74,7 @@ def create_keys(folder: Path, *, root_keys: int = 1, threshold: int = 1, now: da
     return _sign_root(root, None, [folder], folder)
 
 
-def replace_key(role: str, folder: Path, root_folders: Sequence[Path], *, now: datetime | None = None) -> Path:
+def replace_key(role: str, folder: Path, root_folders: Sequence[Path]) -> Path:
     """Replace the key of `role` (not root) by a new one; returns the new root metadata.
 
     `root_folders` hold root keys, as many as the threshold asks for. Raises PublishingError.
@@ -82,7 +82,7 @@ def replace_key(role: str, folder: Path, root_folders: Sequence[Path], *, now: d
     if role not in ROLES[1:]:
         raise PublishingError(f"{role}: targets, snapshot or timestamp can be replaced")
     before = load_root(folder)
-    root = _next(before, now)
+    root = _next(before)
     path = folder / f"{role}.pem"
     fresh = folder / f".{role}.new.pem"
     fresh.unlink(missing_ok=True)
@@ -95,10 +95,10 @@ def replace_key(role: str, folder: Path, root_folders: Sequence[Path], *, now: d
     return written
 
 
-def renew_root(folder: Path, root_folders: Sequence[Path], *, now: datetime | None = None) -> Path:
+def renew_root(folder: Path, root_folders: Sequence[Path]) -> Path:
     """Give the root metadata another ten years; returns the new file. Raises PublishingError."""
     before = load_root(folder)
-    return _sign_root(_next(before, now), before, root_folders, folder)
+    return _sign_root(_next(before), before, root_folders, folder)
 
 
 def take_offline(folder: Path, target: Path) -> list[Path]:
@@ -139,12 +139,12 @@ def status(folder: Path) -> tuple[list[RoleStatus], datetime, int]:
     return roles, root.expires, root.version
 
 
-def load_root(folder: Path, version: int | None = None) -> Metadata[Root]:
-    """Return root metadata of a folder of keys, the newest or one version; raises PublishingError."""
+def load_root(folder: Path) -> Metadata[Root]:
+    """Return the newest root metadata of a folder of keys; raises PublishingError."""
     versions = root_versions(folder)
     if not versions:
         raise PublishingError(f"{folder}: no root metadata here: `igrow-trainer keys create {folder}` makes keys")
-    path = versions[max(versions) if version is None else version]
+    path = versions[max(versions)]
     try:
         return Metadata[Root].from_file(str(path))
     except (RepositoryError, DeserializationError, OSError):
@@ -175,10 +175,10 @@ def load_signer_file(path: Path, role: str = "") -> CryptoSigner:
     return CryptoSigner(key)
 
 
-def _next(before: Metadata[Root], now: datetime | None) -> Root:
+def _next(before: Metadata[Root]) -> Root:
     root = Root.from_dict(before.signed.to_dict())
     root.version += 1
-    root.expires = _expiry(now or datetime.now(UTC))
+    root.expires = _expiry()
     return root
 
 
@@ -222,5 +222,5 @@ def _write_private(path: Path, content: bytes) -> None:
         os.fsync(stream.fileno())
 
 
-def _expiry(now: datetime) -> datetime:
-    return (now + ROOT_LIFETIME).astimezone(UTC).replace(microsecond=0)
+def _expiry() -> datetime:
+    return (datetime.now(UTC) + ROOT_LIFETIME).replace(microsecond=0)

@@ -250,14 +250,14 @@ def free_run(
     return {name: np.stack(np.broadcast_arrays(*values)) for name, values in shown.items()}
 
 
-def complete_starts(record: Record, steps: int, every: int, first: int = 0) -> NDArray[np.int64]:
-    """Return the rows, `every` apart from `first` on, from which `steps` rows can be run on usable inputs.
+def complete_starts(record: Record, steps: int, every: int) -> NDArray[np.int64]:
+    """Return the rows, `every` apart, from which `steps` rows can be run on usable inputs.
 
     The climate must have been measured in the start row itself.
     """
     known = record.usable.copy()
     bad = np.concatenate([[0], np.cumsum(~known)])
-    starts = np.arange(first, len(record) - steps, every)
+    starts = np.arange(0, len(record) - steps, every)
     whole = bad[starts + steps] - bad[starts] == 0
     measured_at_start = np.all([np.isfinite(values[starts]) for values in _given(record)], axis=0)
     chosen: NDArray[np.int64] = starts[whole & measured_at_start]

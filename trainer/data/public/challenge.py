@@ -110,14 +110,14 @@ def to_telemetry(local: NDArray[np.datetime64], columns: Mapping[str, Floats], e
     return from_rows(time[keep], {name: values[keep] for name, values in columns.items()})
 
 
-def daily(path: Path | None, columns: Mapping[str, str], time: str = "time") -> DailyTable | None:
+def daily(path: Path | None, columns: Mapping[str, str]) -> DailyTable | None:
     """Return a table by day: our names -> the file's; None without a file."""
     if path is None:
         return None
     frame = excel_tables.read(path)
-    serial = excel_tables.column(frame, time)
+    serial = excel_tables.column(frame, "time")
     if serial is None:
-        raise IgrowError(f"{path}: no column {time}")
+        raise IgrowError(f"{path}: no column time")
     known = np.isfinite(serial)
     found = {ours: excel_tables.column(frame, theirs) for ours, theirs in columns.items()}
     return DailyTable(

@@ -41,6 +41,8 @@ _SCALES = {
 """Error that counts as one, and independent errors in each: of half-hour means, and of means over the whole run."""
 _HELD = ("lamp_capacity", "lamp_radiation", "co2_capacity", "irrigation_rate")
 """Rules that are read off the log itself."""
+_EVALUATIONS = 10
+"""Points that are tried at most."""
 _MEAN = 1800.0
 """Seconds over which errors are averaged."""
 
@@ -56,7 +58,6 @@ def refine_actuation(
     *,
     rows: Mask | None = None,
     fluxes: Fluxes | None = None,
-    evaluations: int = 10,
 ) -> dict[str, float]:
     """Return the rules refitted together, or as they were where no day of the log is complete.
 
@@ -67,7 +68,6 @@ def refine_actuation(
         rules: from `fit_actuation`, where the search starts.
         rows: that may be used, (n,); None: all.
         fluxes: what else is known to enter the balances.
-        evaluations: at most.
     """
     steps = round(86_400.0 / record.step)
     starts = starts_within(record, np.ones(len(record), dtype=bool) if rows is None else rows, steps, steps)
@@ -110,7 +110,7 @@ def refine_actuation(
         [_SCALES[name][1] * np.isfinite(errors[0]).ravel() for name, errors in errors_of(start[None]).items()]
     )
     residuals, jacobian = by_differences(batch, prior, high)
-    found = solve(residuals, jacobian, prior, low, high, weights=weights, robust=ROBUST, evaluations=evaluations)
+    found = solve(residuals, jacobian, prior, low, high, weights=weights, robust=ROBUST, evaluations=_EVALUATIONS)
     return dict(rules) | found.posterior.values
 
 

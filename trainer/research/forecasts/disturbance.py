@@ -230,14 +230,11 @@ def _daily_course(
     return total / np.maximum(weights, 1e-9)
 
 
-def fit_disturbance(
-    parts: Sequence[tuple[Record, Mask | None, Mapping[str, Floats]]], hours: float = 24.0
-) -> DisturbanceModel:
-    """Return the disturbance model that predicts missing fluxes best (least squares) over the next `hours`.
+def fit_disturbance(parts: Sequence[tuple[Record, Mask | None, Mapping[str, Floats]]]) -> DisturbanceModel:
+    """Return the disturbance model that predicts missing fluxes best (least squares) over the next day.
 
     Args:
         parts: records, the rows that may be used (None: all), and their missing fluxes by channel, (n,).
-        hours: how far ahead.
     """
     model = DisturbanceModel()
     best: tuple[float, DisturbanceModel] | None = None
@@ -246,7 +243,7 @@ def fit_disturbance(
         total = 0.0
         daily, recent, decay = {}, {}, {}
         for channel in parts[0][2]:
-            cost, daily[channel], recent[channel], decay[channel] = _fit_channel(parts, channel, trial, hours)
+            cost, daily[channel], recent[channel], decay[channel] = _fit_channel(parts, channel, trial)
             total += cost
         if best is None or total < best[0]:
             best = (total, replace(trial, daily_share=daily, recent_share=recent, decay_hours=decay))
@@ -275,14 +272,13 @@ def _fit_channel(
     parts: Sequence[tuple[Record, Mask | None, Mapping[str, Floats]]],
     channel: str,
     model: DisturbanceModel,
-    hours: float,
 ) -> tuple[float, float, float, float]:
     """Return (cost relative to no forecast, daily share, recent share, decay hours) of one channel."""
     targets, usual, departures, leads = [], [], [], []
     for record, rows, missing in parts:
         flux = missing[channel]
         allowed = np.ones(len(record), dtype=bool) if rows is None else rows
-        steps = max(1, round(hours * 3600.0 / record.step))
+        steps = max(1, round(86_400.0 / record.step))
         starts = starts_within(record, allowed, steps, max(1, round(4.1 * 3600.0 / record.step)))
         if len(starts) == 0 or not np.isfinite(flux).any():
             continue

@@ -50,6 +50,8 @@ RANGE_DRIVERS = (
 )
 """What the training range watches: weather, climate and setpoints of a plan."""
 _PENALTIES = (0.03, 0.1, 0.3, 1.0)
+_WIDENING = 1.5
+"""By which the spread of other compartments' parameters is held too small for a new one."""
 _STEP = 900.0
 """Seconds between the rows that parameters and rules are fitted on: several times as fast as 5 minutes."""
 
@@ -187,14 +189,14 @@ def fit_forecaster(
     return replace(corrected(fit | selection), combined_growth=growth_of_runs([(record, selection, doubted)]))
 
 
-def adapt(model: Forecaster, record: Record, rows: Mask, widening: float = 1.5) -> Forecaster:
+def adapt(model: Forecaster, record: Record, rows: Mask) -> Forecaster:
     """Return a model of other compartments brought to a new one of which there are few days.
 
-    Only the parameters move, under their posterior with standard deviations `widening` times as large; residual
+    Only the parameters move, under their posterior with standard deviations `_WIDENING` times as large; residual
     model and disturbance are kept, since a week tells nothing about them.
     """
     known = model.posterior
-    prior = Gaussian(known.names, known.mean, known.covariance * widening**2)
+    prior = Gaussian(known.names, known.mean, known.covariance * _WIDENING**2)
     return replace(model, posterior=fit_climate([_working(record, rows)], prior, model.effects))
 
 

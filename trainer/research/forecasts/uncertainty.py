@@ -20,6 +20,10 @@ from igrow.trainer.fit.evaluation import Predictor, starts_within
 
 DAYLIGHT = 20.0
 """W m-2 of global radiation that parts day from night."""
+COVERAGE = 0.9
+"""Of an interval."""
+_LEADS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 24.0, 48.0, 96.0, 168.0)
+"""Hours at which quantiles are taken, each over the steps around it, beside the first and the last lead."""
 _INDEPENDENT = {24.0: 3.0, 168.0: 1.0}
 """Length of runs in hours -> independent errors that a day is worth, for the width of intervals: within a day morning,
 noon and night differ; of runs of a week the errors last from day to day, and one a day is generous."""
@@ -52,8 +56,6 @@ def error_growth(
     error: Floats,
     lead_hours: Floats,
     radiation: Floats,
-    coverage: float = 0.9,
-    centres: tuple[float, ...] = (),
     independent: float = float("inf"),
 ) -> ErrorGrowth:
     """Return the growth of errors seen on days that the model was not fitted on.
@@ -62,16 +64,12 @@ def error_growth(
         error: measured minus predicted, (steps, runs), NaN where not measured.
         lead_hours: of each step, (steps,).
         radiation: global, W m-2, (steps, runs).
-        coverage: of the interval.
-        centres: lead times at which quantiles are taken, each over the steps around it; () for a usual set.
         independent: how many independent errors they are worth. With few, the quantiles are taken further out, as
             conformal prediction does to keep its promise.
     """
-    usual = (lead_hours[0], 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 24.0, 48.0, 96.0, 168.0)
-    hours = np.array(
-        sorted({float(c) for c in (centres or usual) if lead_hours[0] <= c <= lead_hours[-1]} | {float(lead_hours[-1])})
-    )
-    tail = 0.5 * (1.0 - coverage)
+    first, last = float(lead_hours[0]), float(lead_hours[-1])
+    hours = np.array(sorted({first, last} | {lead for lead in _LEADS if first <= lead <= last}))
+    tail = 0.5 * (1.0 - COVERAGE)
     tail = max(tail - (1.0 - tail) / independent, 0.1 * tail)
     low, high = np.zeros((2, len(hours))), np.zeros((2, len(hours)))
     for position, hour in enumerate(hours):

@@ -129,14 +129,13 @@ def write_network_bundle(
     site: str,
     created: datetime,
     training_range: Mapping[str, tuple[float, float]],
-    seed: int = 0,
 ) -> Bundle:
     """Export a simulator and write its bundle to `folder`, which must not exist yet.
 
     Raises:
         BundleError: the bundle cannot be written.
     """
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(0)
     settings = EvolutionSettings()
     graphs = {"simulator": day_model(simulator), "optimizer": export_optimizer(settings)}
     inputs = {

@@ -129,12 +129,12 @@ def daily_data(stage: StageLayout | Stage, columns: Mapping[str, Floats]) -> Sta
     return StageData(drivers, states, np.zeros(shape[1]), np.ones(shape, dtype=bool))
 
 
-def fit_light(columns: Mapping[str, Floats], threshold: float = 50.0) -> LightFormula:
+def fit_light(columns: Mapping[str, Floats]) -> LightFormula:
     """Fit par (umol m-2 s-1) by least squares as a linear function of radiation and lamps over all hours."""
     radiation, lamp = columns["global_radiation"].ravel(), columns["lamp_on"].ravel()
     matrix = np.stack([radiation, lamp, np.ones_like(lamp)], axis=-1)
     solution, *_ = np.linalg.lstsq(matrix, columns["par"].ravel(), rcond=None)
-    return LightFormula(float(solution[0]), float(solution[1]), float(solution[2]), threshold)
+    return LightFormula(float(solution[0]), float(solution[1]), float(solution[2]))
 
 
 def train_simulator(

@@ -50,7 +50,7 @@ def predicted_profit(champion: Compartment, others: Sequence[Compartment], harve
     return np.asarray(income - costs)
 
 
-def distances(folder: Path, books: Path, prices: Prices | None = None) -> tuple[Champion, dict[str, Floats]]:
+def distances(folder: Path, books: Path) -> tuple[Champion, dict[str, Floats]]:
     """Return the champion's measured profit, and the predicted ones (days,) by predictor, Wageningen's included.
 
     Raises IgrowError where the champion's compartment is missing from `folder`.
@@ -61,10 +61,10 @@ def distances(folder: Path, books: Path, prices: Prices | None = None) -> tuple[
         raise IgrowError(f"{folder}: no compartment {CHAMPION}")
     champion, others = found[0], [crop for crop in compartments if crop.name != CHAMPION]
     measured = read_champion(books)
-    used = prices or Prices()
-    curves = {"Wageningen's simulator": measured.simulated - used.plant * champion.plant_density}
+    prices = Prices()
+    curves = {"Wageningen's simulator": measured.simulated - prices.plant * champion.plant_density}
     for name, predictor in PREDICTORS.items():
-        curves[name] = predicted_profit(champion, others, predictor(others, champion), used)
+        curves[name] = predicted_profit(champion, others, predictor(others, champion), prices)
     return measured, curves
 
 

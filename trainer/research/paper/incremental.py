@@ -113,13 +113,13 @@ def _weight_of_real(virtual: StageData, real: StageData, share: float) -> Floats
     return np.full(real.states.shape[0], float(ratio))
 
 
-def day_starts(data: StageData, history: int = 24) -> Integers:
-    """Return (run, hour) of each midnight with `history` valid hours before it and 24 after."""
+def day_starts(data: StageData) -> Integers:
+    """Return (run, hour) of each midnight with 24 valid hours before it and 24 after."""
     starts = [
         (run, hour)
         for run, valid in enumerate(data.valid)
-        for hour in range(history, valid.size - 24)
-        if data.hour[hour] == 0 and valid[hour - history : hour + 25].all()
+        for hour in range(24, valid.size - 24)
+        if data.hour[hour] == 0 and valid[hour - 24 : hour + 25].all()
     ]
     if not starts:
         raise IgrowError("no day without gaps to score")
