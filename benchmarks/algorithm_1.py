@@ -23,9 +23,10 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.logged_houses import LATER, LoggedHouses
-from benchmarks.season_houses import Houses, Morning, Recipe, Values, Way, lead, money
+from benchmarks.season_houses import Houses, Morning, Recipe, Way, lead, money
 from benchmarks.season_plans import Planned
 from benchmarks.seasons import brought, described, season_of, ways_of
+from igrow.core.arrays import Floats
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.greenhouse import tomato
 from igrow.core.planner import PlanResult
@@ -67,7 +68,7 @@ class Watched(Planned):
         self._plans[house] = super().plan(morning, house)
         return self._plans[house]
 
-    def learn(self, morning: Morning, outcome: Outcome, weather: Values) -> None:
+    def learn(self, morning: Morning, outcome: Outcome, weather: Floats) -> None:
         """Book both sides of the day."""
         super().learn(morning, outcome, weather)
         for house, plan in self._plans.items():
@@ -146,12 +147,12 @@ class Renewed(Watched):
             self._simulators[house] = BundleSimulator(bundle, self._site.greenhouse, members=1)
 
 
-def climate_errors(renewed: Renewed, row: int, days: int, every: int) -> dict[int, dict[str, list[Values]]]:
+def climate_errors(renewed: Renewed, row: int, days: int, every: int) -> dict[int, dict[str, list[Floats]]]:
     """Return by day of the turn, and ``before`` or ``after``: each house's errors a day ahead by `CLIMATE`.
 
     On the days until the next turn, which no step of the lower level had seen; `row` is the first house's.
     """
-    found: dict[int, dict[str, list[Values]]] = {}
+    found: dict[int, dict[str, list[Floats]]] = {}
     for turn in renewed.turns:
         later = renewed.log(row + turn.house, turn.day, min(turn.day + every, days))
         scores = compare({"before": turn.before, "after": turn.after}, later, ("24_h",)).scores
@@ -203,7 +204,7 @@ def main() -> int:
     return 0
 
 
-def tell(renewed: Renewed, errors: Mapping[int, Mapping[str, list[Values]]]) -> None:
+def tell(renewed: Renewed, errors: Mapping[int, Mapping[str, list[Floats]]]) -> None:
     """Print the simulators' errors before and after each run of the lower level, and what it said."""
     heads = [f"{quantity.removeprefix('air_')}, {unit}" for quantity, unit in CLIMATE.items()]
     print(f"\n{'error a day ahead':22s}" + "".join(f"{head:>18s}" for head in heads))
@@ -219,7 +220,7 @@ def tell(renewed: Renewed, errors: Mapping[int, Mapping[str, list[Values]]]) -> 
 
 
 def draw(
-    path: Path, site: Site, books: Mapping[str, Mapping[str, Values]], errors: Mapping[int, Mapping[str, list[Values]]]
+    path: Path, site: Site, books: Mapping[str, Mapping[str, Floats]], errors: Mapping[int, Mapping[str, list[Floats]]]
 ) -> None:
     """Draw what plans netted more than the recipe from day to day, and the simulators' error of temperature."""
     from igrow.trainer.figure_style import COLOURS, name_above, panels  # noqa: PLC0415, only this draws
@@ -227,7 +228,7 @@ def draw(
     figure, (gain, error) = panels(2, 5.0, width=6.0)
     days = books["recipe"]["kg"].shape[1]
 
-    def net(name: str) -> Values:
+    def net(name: str) -> Floats:
         """Return the net profit of the houses until each day, (days,), mean."""
         until = range(1, days + 1)
         return np.array(

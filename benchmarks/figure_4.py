@@ -27,8 +27,9 @@ import numpy as np
 
 from benchmarks.figure_4_ways import DAYS, GROWN, SIMULATED, Learning, Tuning, World, led, prepare
 from benchmarks.jobs import Jobs
-from benchmarks.season_houses import Values, money
+from benchmarks.season_houses import money
 from benchmarks.seasons import brought, described
+from igrow.core.arrays import Floats
 from igrow.core.planner.season.search import GENERATIONS, SETTINGS
 from igrow.core.site import Site
 
@@ -63,7 +64,7 @@ def main() -> int:
     return 0
 
 
-def draw(path: Path, site: Site, books: Mapping[str, Mapping[str, Mapping[str, Values]]]) -> None:
+def draw(path: Path, site: Site, books: Mapping[str, Mapping[str, Mapping[str, Floats]]]) -> None:
     """Draw cumulative net profit from day to day, mean over the houses, in the simulator and in the plant."""
     from igrow.trainer.figure_style import name_above, panels  # noqa: PLC0415, only this draws
 

@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from benchmarks.season_houses import DAY, HOUR, START, Houses, Led, Morning, Recipe, Values, Way, lead
+from benchmarks.season_houses import DAY, HOUR, START, Houses, Led, Morning, Recipe, Way, lead
 from benchmarks.seasons import described, season_of, ways_of
 from benchmarks.simulated_houses import SimulatedHouses
+from igrow.core.arrays import Floats
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.gaps import held
 from igrow.core.greenhouse import tomato
@@ -37,10 +38,10 @@ SIMULATED, GROWN = "in our simulator", "in the plant"
 class Published(Recipe):
     """Setpoints that somebody had, day by day."""
 
-    setpoints: Values
+    setpoints: Floats
     """(DAYS, 24, 4); NaN where the recipe's count."""
 
-    def ask(self, morning: Morning) -> Values:
+    def ask(self, morning: Morning) -> Floats:
         """Return the day's for each house."""
         said = self.setpoints[morning.day]
         return np.repeat(np.where(np.isfinite(said), said, morning.recipe)[None], len(morning.weather), axis=0)
@@ -53,13 +54,13 @@ class Policed(Recipe):
     site: Site
     policy: OnnxPolicy
 
-    def ask(self, morning: Morning) -> Values:
+    def ask(self, morning: Morning) -> Floats:
         """Return what it says of each house's day."""
         seen = observe(self.site, morning.present, morning.weather, morning.begin)
         return chosen(self.site, to_setpoints(self.site, self.policy.act(seen)), morning.recipe)
 
 
-def growers(folder: Path) -> Values:
+def growers(folder: Path) -> Floats:
     """Return the realised setpoints of the Reference, (DAYS, 24, 4); irrigation is NaN."""
     log = agc2019.read(folder, "Reference").telemetry
     hourly = to_grid(log.select(START, START + DAYS * DAY), 3600)
@@ -71,7 +72,7 @@ def growers(folder: Path) -> Values:
     return setpoints
 
 
-def champion(folder: Path) -> Values:
+def champion(folder: Path) -> Floats:
     """Return the growers' setpoints with the heating shifted by the difference of the slabs, (DAYS, 24, 4)."""
     crops = {one.name: one for one in read_2019(folder)}
     warmer = crops["Automatoes"].drivers["temperature"] - crops["Reference"].drivers["temperature"]
@@ -133,7 +134,7 @@ class World:
     data: Path
 
 
-def led(world: World) -> dict[str, dict[str, Values]]:
+def led(world: World) -> dict[str, dict[str, Floats]]:
     """Return what the houses of each way used and picked by day."""
     site, kinds = described("today", DAYS), ways_of(DAYS)
     with tempfile.TemporaryDirectory() as folder:

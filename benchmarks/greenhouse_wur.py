@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats
 from igrow.core.greenhouse import Disturbances, GreenhouseParameters, Sensors, climate, tomato
 from igrow.core.greenhouse.climate_computer import ClimateComputer
 from igrow.core.greenhouse.parameters import stack
@@ -23,7 +23,6 @@ from igrow.core.greenhouse.weather_table import WeatherTable
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data.public.wur2020 import Seasons, read_seasons
 
-Values = NDArray[np.float64]
 HOUR = 3600
 CLIMATE = ("air_temperature", "air_humidity", "air_co2")
 UNITS = {"air_temperature": "K", "air_humidity": "%", "air_co2": "ppm"}
@@ -85,15 +84,15 @@ class Days:
     """Days of seasons, side by side: K runs of 24 hours."""
 
     weather: WeatherTable
-    setpoints: Mapping[str, Values]
+    setpoints: Mapping[str, Floats]
     """(24, K): row h holds from hour h to h + 1."""
-    start: Mapping[str, Values]
+    start: Mapping[str, Floats]
     """(K,) climate and leaf area at the beginning."""
-    floor: Values
-    soil: Values
-    truth: Mapping[str, Values]
+    floor: Floats
+    soil: Floats
+    truth: Mapping[str, Floats]
     """(24, K): means over the hour before, and daily totals (K,) as heat, electricity, co2."""
-    yesterday: Mapping[str, Values]
+    yesterday: Mapping[str, Floats]
 
 
 def load(data: Path) -> Seasons:
@@ -108,7 +107,7 @@ def split(seasons: Seasons) -> tuple[list[int], list[int]]:
     return order[:10], order[10:]
 
 
-def requested(seasons: Seasons, row: int) -> dict[str, Values]:
+def requested(seasons: Seasons, row: int) -> dict[str, Floats]:
     """Return the setpoints of one season, (hours,), lamps put off above the radiation limit of the hour."""
     values = {name: seasons.columns[name][row] for name in SETPOINTS}
     dim = seasons.columns["global_radiation"][row] < seasons.columns["lamp_radiation_limit"][row]
@@ -138,7 +137,7 @@ def cut_days(seasons: Seasons, rows: Sequence[int], every: int) -> Days:
     weather.rows = weather.rows[:, :, index]
     picks = [(row, hour) for hour in starts for row in rows]
 
-    def window(name: str, offset: int, length: int) -> Values:
+    def window(name: str, offset: int, length: int) -> Floats:
         return np.stack([seasons.columns[name][row][hour + offset : hour + offset + length] for row, hour in picks], 1)
 
     setpoints = [requested(seasons, row) for row in range(len(seasons.names))]
@@ -161,13 +160,13 @@ def cut_days(seasons: Seasons, rows: Sequence[int], every: int) -> Days:
     )
 
 
-def free_run(days: Days, parameters: GreenhouseParameters, copies: int = 1) -> dict[str, Values]:
+def free_run(days: Days, parameters: GreenhouseParameters, copies: int = 1) -> dict[str, Floats]:
     """Run all days at once; returns hourly means (24, K) of the climate and daily totals (K,).
 
     With `copies`, K is that many times the number of days, and `parameters` hold arrays of that length.
     """
 
-    def spread(values: Values) -> Values:
+    def spread(values: Floats) -> Floats:
         return np.tile(values, copies)
 
     table = WeatherTable.__new__(WeatherTable)
@@ -185,7 +184,7 @@ def free_run(days: Days, parameters: GreenhouseParameters, copies: int = 1) -> d
         sensors=EXACT,
     )  # fmt: skip
     plant.state.control = plant.state.control._replace(heating_setpoint=start["heating_setpoint_realised"])
-    result: dict[str, Values] = {name: np.empty((24, count)) for name in CLIMATE}
+    result: dict[str, Floats] = {name: np.empty((24, count)) for name in CLIMATE}
     setpoints = {name: np.tile(values, (1, copies)) for name, values in days.setpoints.items()}
     for hour in range(24):
         command = {name: values[hour] for name, values in setpoints.items()}
@@ -215,7 +214,7 @@ SEASON_STEP = 120.0
 SCALE = {"air_temperature": 1.0, "air_humidity": 5.0, "air_co2": 80.0}
 
 
-def residual_rows(days: Days, thetas: Sequence[Values]) -> Values:
+def residual_rows(days: Days, thetas: Sequence[Floats]) -> Floats:
     """Return the residuals of several sets of log-parameters, (sets, residuals), from one batch."""
     length = len(days.floor)
     columns = {

@@ -9,14 +9,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats, Integers, Mask
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.fit.evaluation import Predictor
 from igrow.trainer.research.network.simulator import layout
 from igrow.trainer.training.stage import StageData, TrainingPlan, run_windows, train_stage, untrained
-
-Floats = NDArray[np.float64]
 
 PLAN = TrainingPlan(updates=((4, 1500), (24, 500)), decay=10.0)
 """Chosen on weeks 7 and 8 of the AGC 2019 Reference compartment after training on weeks 1 to 6."""
@@ -24,7 +22,7 @@ _NO_DRIVERS = ("elapsed_days", "hour")
 """A day's number lies beyond all that was learned from; the hour jumps at midnight, and the sun's place tells it."""
 
 
-def network_predictor(record: Record, setpoints: Mapping[str, Floats], fit: NDArray[np.bool_]) -> Predictor:
+def network_predictor(record: Record, setpoints: Mapping[str, Floats], fit: Mask) -> Predictor:
     """Return runs of a climate stage that learned from the rows `fit` (n,); `setpoints` by name, (n,)."""
     columns = {name: values for name, values in {**record.inputs, **setpoints}.items() if name not in _NO_DRIVERS}
     drivers = tuple(name for name, values in columns.items() if np.ptp(values[fit]) > 0.0)
@@ -44,7 +42,7 @@ def network_predictor(record: Record, setpoints: Mapping[str, Floats], fit: NDAr
     stage = untrained(layout("climate", states, drivers, (1.0, 3.0, 24.0), (64, 64)), data, seed=0)
     stage = train_stage(stage, data, PLAN)
 
-    def predict(starts: NDArray[np.int64], steps: int) -> Mapping[str, Floats]:
+    def predict(starts: Integers, steps: int) -> Mapping[str, Floats]:
         hours = -(-steps // hour)
         path = run_windows(stage, data, np.stack([starts % hour, starts // hour], axis=-1), hours)
         path = np.concatenate([known[starts][:, None], path], axis=1)

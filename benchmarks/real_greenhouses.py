@@ -17,10 +17,10 @@ from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from sklearn.ensemble import HistGradientBoostingRegressor
 
 from benchmarks.measured_network import network_predictor
+from igrow.core.arrays import Floats, Integers, Mask
 from igrow.core.economics import local_days
 from igrow.core.errors import IgrowError
 from igrow.core.planner.recent_use import used_in
@@ -39,9 +39,6 @@ from igrow.trainer.research.forecasts.combination import remembering
 from igrow.trainer.research.forecasts.forecaster import Forecaster, adapt, fit_forecaster, from_few_days
 from igrow.trainer.research.forecasts.totals import coverage, daily_totals
 from igrow.trainer.research.forecasts.uncertainty import ErrorGrowth
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 STEP = 300.0
 HORIZONS = ("1_h", "24_h", "7_d")
@@ -109,7 +106,7 @@ def boosted(
     quantities = list(record.measured)
     measured = np.stack([record.measured[name] for name in quantities], axis=1)
 
-    def features(starts: NDArray[np.int64], target: NDArray[np.int64]) -> Floats:
+    def features(starts: Integers, target: Integers) -> Floats:
         lead = (target - starts)[:, None] * STEP / 3600.0
         return np.concatenate(
             [table[target - 1], table[np.maximum(target - 1 - lag, starts)], measured[starts], np.minimum(lead, 24.0)],
@@ -129,7 +126,7 @@ def boosted(
             features(starts[good], target[good]), measured[target[good], position]
         )
 
-    def predict(begin_rows: NDArray[np.int64], steps: int) -> Mapping[str, Floats]:
+    def predict(begin_rows: Integers, steps: int) -> Mapping[str, Floats]:
         stride = 1 if steps <= 300 else 6
         leads = np.arange(0, steps, stride)
         result = {name: np.full((steps, len(begin_rows)), np.nan) for name in quantities}

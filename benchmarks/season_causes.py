@@ -19,8 +19,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.season_houses import EFFECTS, House, Houses, Led, Values, lead, money
+from benchmarks.season_houses import EFFECTS, House, Houses, Led, lead, money
 from benchmarks.seasons import GROWN_AND_USED, STRATEGIES, described, season_of, ways_of
+from igrow.core.arrays import Floats
 from igrow.core.greenhouse import GreenhouseParameters, tomato
 from igrow.core.greenhouse.plant import Plant
 from igrow.core.planner.season import SeasonOutcome, run_season
@@ -46,7 +47,7 @@ class Kinds(Houses):
         return super().stand([*mean, *off, *each[-count:]])
 
 
-def by_month(outcome: SeasonOutcome, every: int) -> Values:
+def by_month(outcome: SeasonOutcome, every: int) -> Floats:
     """Return what the season's crop is expected to grow in each whole 30 days, kg m-2."""
     grown = [float(np.squeeze(crop.net_growth)) for crop in (*outcome.crops, outcome.crop)]
     return np.diff(grown[:: MONTH // every])
@@ -80,7 +81,7 @@ def main() -> int:
         ratios[kind] = expected / np.stack(had, axis=1)
     print(f"{'expected / obtained':38s}" + "".join(f"{head:>12s}" for head in HEADS))
 
-    def show(label: str, rows: Values) -> None:
+    def show(label: str, rows: Floats) -> None:
         print(f"{label:38s}" + "".join(f"{cell:12.2f}" for cell in np.median(rows, axis=0)))
 
     for kind in KINDS:

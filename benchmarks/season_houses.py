@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.led_greenhouses import run
 from igrow.core.agronomy import Memory
+from igrow.core.arrays import Floats
 from igrow.core.economics import co2_cost, harvest_income, is_peak, local_days
 from igrow.core.greenhouse import GreenhouseParameters, generate_weather, hourly_weather, recipe_by_hour
 from igrow.core.greenhouse.disturbances import QUIET
@@ -35,8 +35,6 @@ from igrow.core.planner.template import Template, for_site
 from igrow.core.site import Site
 from igrow.core.sun import unix_seconds
 from igrow.core.telemetry import Telemetry
-
-Values = NDArray[np.float64]
 
 START = np.datetime64("2020-01-01T23:00:00")
 """Local midnight of the first day."""
@@ -60,40 +58,40 @@ class Morning:
 
     day: int
     begin: np.datetime64
-    weather: Values
+    weather: Floats
     """That is expected: the mean of the last three days, (N, 24, 6)."""
-    recipe: Values
+    recipe: Floats
     """(24, 4)."""
     template: Template
-    present: Mapping[str, Values]
+    present: Mapping[str, Floats]
     """As measured, by quantity, (N,)."""
-    applied: Values
+    applied: Floats
     """(N, 4)."""
     memory: Memory
     """Of all rows; `rows` are the way's."""
     rows: slice
-    co2_before: Values
+    co2_before: Floats
     """kg m-2 since the beginning, (N,)."""
 
 
 class Way(Protocol):
     """Leads houses."""
 
-    def ask(self, morning: Morning) -> Values:
+    def ask(self, morning: Morning) -> Floats:
         """Return the setpoints of a day, (N, 24, 4)."""
 
-    def learn(self, morning: Morning, outcome: Outcome, weather: Values) -> None:
+    def learn(self, morning: Morning, outcome: Outcome, weather: Floats) -> None:
         """Take notice of what the day did, arrays (1, N, 24), under which weather, (N, 24, 6)."""
 
 
 class Recipe:
     """The grower's day."""
 
-    def ask(self, morning: Morning) -> Values:
+    def ask(self, morning: Morning) -> Floats:
         """Return it for each house."""
         return np.repeat(morning.recipe[None], len(morning.weather), axis=0)
 
-    def learn(self, morning: Morning, outcome: Outcome, weather: Values) -> None:
+    def learn(self, morning: Morning, outcome: Outcome, weather: Floats) -> None:
         """Learn nothing."""
 
 
@@ -105,7 +103,7 @@ class Led(Recipe):
     genes: Genes
     """(1, G) or (N, G)."""
 
-    def ask(self, morning: Morning) -> Values:
+    def ask(self, morning: Morning) -> Floats:
         """Return what it says under each house's weather."""
         many = np.broadcast_to(self.genes, (len(morning.weather), self.genes.shape[1]))
         days = [
@@ -137,19 +135,19 @@ class Houses:
             sensors=EXACT,
         )
 
-    def advance(self, setpoints: Values, begin: np.datetime64) -> Outcome:
+    def advance(self, setpoints: Floats, begin: np.datetime64) -> Outcome:
         """Live from local midnight on under setpoints (rows, 24, 4); returns what happened, (1, rows, 24)."""
         return run(self.plant, setpoints)
 
-    def weather(self, day: int) -> Values:
+    def weather(self, day: int) -> Floats:
         """Return the weather of a day counted from the season's first, (rows, 24, 6)."""
         return self.hourly[:, day - FIRST]
 
-    def expected(self, day: int) -> Values:
+    def expected(self, day: int) -> Floats:
         """Return the mean of the three days before it, (rows, 24, 6)."""
         return np.asarray(self.hourly[:, day - FIRST - 3 : day - FIRST].mean(axis=1))
 
-    def measured(self) -> dict[str, Values]:
+    def measured(self) -> dict[str, Floats]:
         """Return what the houses' sensors show, by quantity, (rows,)."""
         total = self.plant.count or 1
         return {name: np.broadcast_to(value, total) for name, value in self.plant.truth({}).items()}
@@ -161,7 +159,7 @@ class House:
 
     parameters: GreenhouseParameters
     weather: Telemetry
-    hourly: Values
+    hourly: Floats
     effects: Sequence[HiddenEffect]
 
 
@@ -179,13 +177,13 @@ class Past:
     """What houses did under the recipe before a season; a row for each."""
 
     start: np.datetime64
-    initial: Mapping[str, Values]
+    initial: Mapping[str, Floats]
     """As measured at the start, (rows,)."""
-    weather: Values
+    weather: Floats
     """(rows, H, 6)."""
-    setpoints: Values
+    setpoints: Floats
     """(rows, H, 4)."""
-    used: Mapping[str, Values]
+    used: Mapping[str, Floats]
     """Heat, electricity and CO2 by day, (rows, days)."""
 
     def factor(self, simulator: Simulator, row: int) -> dict[str, float]:
@@ -205,7 +203,7 @@ def lead(
     ways: Mapping[str, Way],
     houses: Mapping[str, Sequence[int]],
     stood: Callable[[int, Sequence[int]], Houses] = Houses,
-) -> tuple[dict[str, dict[str, Values]], Past]:
+) -> tuple[dict[str, dict[str, Floats]], Past]:
     """Lead houses by each way; return what each used and picked by day, and what all did before.
 
     By way and name, (its houses, days): `heat` MJ m-2, `electricity` kWh m-2 (and `peak` of it), `co2`, `net_growth`
@@ -219,7 +217,7 @@ def lead(
     led = stood(days, numbers)
     past, applied, memory = settle(site, led)
     co2 = np.zeros(len(numbers))
-    books: dict[str, list[Values]] = {name: [] for name in (*USED, "peak", "kg")}
+    books: dict[str, list[Floats]] = {name: [] for name in (*USED, "peak", "kg")}
     began = time.monotonic()
     for day in range(days):
         begin = START + day * DAY
@@ -252,10 +250,10 @@ def lead(
     return found, past
 
 
-def settle(site: Site, led: Houses) -> tuple[Past, Values, Memory]:
+def settle(site: Site, led: Houses) -> tuple[Past, Floats, Memory]:
     """Lead all houses by the recipe until the season; return the past, the last setpoints and what crops have had."""
     applied, memory = np.full((len(led.hourly), 4), np.nan), None
-    initial: dict[str, Values] = {}
+    initial: dict[str, Floats] = {}
     setpoints, used = [], []
     for day in range(-BEFORE, 0):
         begin = START + day * DAY
@@ -280,7 +278,7 @@ def settle(site: Site, led: Houses) -> tuple[Past, Values, Memory]:
     return past, applied, memory
 
 
-def money(site: Site, book: Mapping[str, Values]) -> dict[str, Values]:
+def money(site: Site, book: Mapping[str, Floats]) -> dict[str, Floats]:
     """Return what a season brought, EUR m-2: income of fruit that was picked, costs by `PARTS`, and net, (houses,)."""
     prices, days = site.prices, book["kg"].shape[1]
     local = local_days(START + np.arange(days) * DAY + DAY // 2, site.time_zone)

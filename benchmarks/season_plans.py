@@ -18,10 +18,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.season_houses import Led, Morning, Recipe, Values, Way, lead, money
+from benchmarks.season_houses import Led, Morning, Recipe, Way, lead, money
 from benchmarks.seasons import brought, described, season_of, ways_of
 from benchmarks.strategies import Day, recently
 from igrow.core.agronomy.memory import one_of
+from igrow.core.arrays import Floats
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.greenhouse import tomato
 from igrow.core.planner import Budget, EvolutionSettings, NumpyGeneration, PlanningState, PlanResult, optimise
@@ -46,11 +47,11 @@ class Lived:
     begin: np.datetime64
     present: dict[str, float]
     """As measured at its beginning."""
-    weather: Values
+    weather: Floats
     """(24, 6)."""
-    setpoints: Values
+    setpoints: Floats
     """(24, 4)."""
-    had: dict[str, Values]
+    had: dict[str, Floats]
     """What it used and grew, (1,) each."""
     warmth: float
     """Mean of the air's temperature, degC."""
@@ -71,9 +72,9 @@ class Planned(Recipe):
         self._season = season
         self._budget = Budget(generations, generations)
         self._past: dict[int, deque[Lived]] = {}
-        self._chosen: list[Values] = []
+        self._chosen: list[Floats] = []
 
-    def ask(self, morning: Morning) -> Values:
+    def ask(self, morning: Morning) -> Floats:
         """Return the first day of a plan for each house."""
         self._chosen = [self.plan(morning, house).setpoints[:24] for house in range(len(morning.weather))]
         return np.stack(self._chosen)
@@ -120,7 +121,7 @@ class Planned(Recipe):
             worth=worth,
         )
 
-    def learn(self, morning: Morning, outcome: Outcome, weather: Values) -> None:
+    def learn(self, morning: Morning, outcome: Outcome, weather: Floats) -> None:
         """Remember what the day was."""
         for house, chosen in enumerate(self._chosen):
             had = {name: each[[house]] for name, each in totals(outcome).items()}

@@ -28,12 +28,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import spearmanr
 from scipy.stats import t as student
 
 from benchmarks.led_greenhouses import SITE
 from benchmarks.season_houses import DAY, PARTS, START, Led, Past, Recipe, Way, lead, money
+from igrow.core.arrays import Floats
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.greenhouse import generate_weather, hourly_weather, recipe_by_hour, tomato
 from igrow.core.greenhouse.described import parameters_of
@@ -44,8 +44,6 @@ from igrow.core.planner.season.course import STRETCH, typical_days
 from igrow.core.planner.season.search import GENERATIONS, SETTINGS, Genes, Search, genetic, rule_and_strategy
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Site, load_site
-
-Values = NDArray[np.float64]
 
 STRATEGIES = Path(__file__).with_name("season_strategies.json")
 TUNING_SEEDS = tuple(range(9_001, 9_021))
@@ -66,7 +64,7 @@ def described(prices: str, days: int) -> Site:
     return replace(site, prices=replace(site.prices, heat=2 * site.prices.heat, electricity=twice))
 
 
-def typical_weather(days: int) -> Values:
+def typical_weather(days: int) -> Floats:
     """Return the two typical days of each stretch of some years, (2 S, 24, 6)."""
     years = [generate_weather(START, START + days * DAY, seed=seed) for seed in TUNING_SEEDS]
     hours = np.stack([hourly_weather(year, START, 24 * days) for year in years]).reshape(len(years), days, 24, 6)
@@ -82,7 +80,7 @@ def season_of(site: Site, days: int) -> Season:
 
 
 def cma_es(
-    value: Callable[[Genes], Values], genes: int, generations: int, seed: int, first: Genes | None = None
+    value: Callable[[Genes], Floats], genes: int, generations: int, seed: int, first: Genes | None = None
 ) -> tuple[Genes, list[float]]:
     """Return the best genes by CMA-ES (Hansen 2016, arXiv:1604.00772) with as many candidates."""
     import cma  # noqa: PLC0415 - wanted by this table alone
@@ -169,7 +167,7 @@ def judge(arguments: argparse.Namespace) -> None:
         expected_and_obtained(site, days, {name: ways[key] for name, key in led.items()}, books, led, past)
 
 
-def brought(title: str, found: dict[str, tuple[dict[str, Values], dict[str, Values]]]) -> None:
+def brought(title: str, found: dict[str, tuple[dict[str, Floats], dict[str, Floats]]]) -> None:
     """Print what each way brought, by its money and its book, and what more than each that stands above it."""
     count = len(next(iter(found.values()))[0]["net"])
     print(f"\n{title}: {count} greenhouses, EUR m-2 of a season (mean)")

@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.season_houses import BEFORE, START, Houses, Values
+from benchmarks.season_houses import BEFORE, START, Houses
 from benchmarks.strategies import beside
+from igrow.core.arrays import Floats
 from igrow.core.greenhouse import tomato
 from igrow.core.greenhouse.described import parameters_of
 from igrow.core.planner.objective import Outcome
@@ -28,7 +29,7 @@ class SimulatedHouses(Houses):
         self._crop = like(tomato.mature_crop(self._parameters, 1.0), len(numbers))
         self._state = [dict(MORNING) for _ in numbers]
 
-    def measured(self) -> dict[str, Values]:
+    def measured(self) -> dict[str, Floats]:
         """Return climate and crop by quantity, (rows,)."""
         climate = {name: np.array([state[name] for state in self._state]) for name in MORNING}
         grown = {
@@ -37,7 +38,7 @@ class SimulatedHouses(Houses):
         }
         return climate | grown
 
-    def advance(self, setpoints: Values, begin: np.datetime64) -> Outcome:
+    def advance(self, setpoints: Floats, begin: np.datetime64) -> Outcome:
         """Live a day; see `Houses`. As in `season.run_season` the simulator knows one leaf area, the crop its own."""
         weather = self.weather(int((begin - START) // DAY))
         parts = [

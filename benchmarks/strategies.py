@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from benchmarks.led_greenhouses import DAY, SITE, Greenhouses, Scenario
 from igrow.core.agronomy import Memory
+from igrow.core.arrays import Floats
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.economics import harvest_income, local_days
 from igrow.core.greenhouse import hourly_weather, recipe_by_hour
@@ -50,8 +51,6 @@ from igrow.edge.planning.make_plan import RECENT_DAYS
 from igrow.trainer.research.policies.policy import HOURS as POLICY_HOURS
 from igrow.trainer.research.policies.policy import OnnxPolicy
 
-Values = NDArray[np.float64]
-
 STARTS = ("2020-01-19T23:00:00", "2020-03-09T23:00:00", "2020-04-19T22:00:00")
 """Local midnights at which the weeks begin: winter, early spring, spring."""
 SETTLING = 6
@@ -69,10 +68,10 @@ class Situation:
 
     time: np.datetime64
     present: Mapping[str, float]
-    applied: Values
-    forecast: Values
+    applied: Floats
+    forecast: Floats
     """(HORIZON, 6)."""
-    recipe: Values
+    recipe: Floats
     """(HORIZON, 4)."""
     co2_before: float
     """kg m-2 since the beginning."""
@@ -83,10 +82,10 @@ class Situation:
     """What the crop has had, as its limits count it."""
 
 
-Day = tuple[dict[str, Values], dict[str, Values], tuple[float, float], tuple[float, float]]
+Day = tuple[dict[str, Floats], dict[str, Floats], tuple[float, float], tuple[float, float]]
 """What the simulator says of a day that has passed, what it used and grew, what drove its growth, and how warm the air
 was expected to be and was, degC."""
-Strategy = Callable[[Situation], Values]
+Strategy = Callable[[Situation], Floats]
 """Returns setpoints (HORIZON, 4)."""
 
 
@@ -94,13 +93,13 @@ Strategy = Callable[[Situation], Values]
 class Book:
     """What one strategy expected and obtained at each choice, EUR m-2, (houses,), by part of the balance."""
 
-    expected: dict[str, list[Values]] = field(default_factory=dict)
-    obtained: dict[str, list[Values]] = field(default_factory=dict)
-    harvest: list[Values] = field(default_factory=list)
+    expected: dict[str, list[Floats]] = field(default_factory=dict)
+    obtained: dict[str, list[Floats]] = field(default_factory=dict)
+    harvest: list[Floats] = field(default_factory=list)
     seconds: float = 0.0
 
 
-def note(column: dict[str, list[Values]], site: Site, time: np.datetime64, outcome: Outcome, co2: Values) -> None:
+def note(column: dict[str, list[Floats]], site: Site, time: np.datetime64, outcome: Outcome, co2: Floats) -> None:
     """Book what an outcome (M, N, H) is worth, by parts, where the crops have had `co2` kg m-2 (N,) before."""
     hours = time + np.arange(outcome.heat.shape[-1]) * np.timedelta64(3600, "s")
     worth = Objective(site, hours, co2).value(outcome)
@@ -206,7 +205,7 @@ def _past(weather: Telemetry, now: np.datetime64) -> Telemetry:
 def genetic(site: Site, ahead: int = HORIZON) -> Strategy:
     """Return the elitist genetic algorithm on the bundle's simulator, which looks so many hours ahead."""
 
-    def choose(now: Situation) -> Values:
+    def choose(now: Situation) -> Floats:
         state = PlanningState(
             now.time,
             now.present,
@@ -225,7 +224,7 @@ def policy_strategy(site: Site, policy: OnnxPolicy) -> Strategy:
     """Return the policy as a strategy."""
     day = slice(0, POLICY_HOURS)
 
-    def choose(now: Situation) -> Values:
+    def choose(now: Situation) -> Floats:
         chosen = policy.plan(site, now.present, now.forecast[day], now.time)
         return np.concatenate([chosen, now.recipe[POLICY_HOURS:]])
 
@@ -261,7 +260,7 @@ def table(title: str, books: Mapping[str, Sequence[Book]], days: int) -> dict[st
     print(f"{'':34s}" + "".join(f"{head:>9s}" for head in heads))
     result = {}
 
-    def daily(lists: Sequence[Sequence[Values]]) -> Values:
+    def daily(lists: Sequence[Sequence[Floats]]) -> Floats:
         """One value for each greenhouse and season."""
         return np.concatenate([np.sum(one, axis=0) for one in lists]) / days
 

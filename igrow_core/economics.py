@@ -12,33 +12,31 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from igrow.core.arrays import Floats, Mask, Times
 from igrow.core.local_time import hour_of_day, to_local
 from igrow.core.site import Prices
-
-Times = NDArray[np.datetime64]
-Values = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Balance:
     """Money per m2 of growing area, EUR m-2; each number may be an array over candidates."""
 
-    income: Values
-    plants: Values
-    upkeep: Values
-    electricity: Values
-    heat: Values
-    co2: Values
+    income: Floats
+    plants: Floats
+    upkeep: Floats
+    electricity: Floats
+    heat: Floats
+    co2: Floats
 
     @property
-    def costs(self) -> Values:
+    def costs(self) -> Floats:
         """All costs, EUR m-2."""
         return self.plants + self.upkeep + self.electricity + self.heat + self.co2
 
     @property
-    def net_profit(self) -> Values:
+    def net_profit(self) -> Floats:
         """Income less all costs, EUR m-2."""
         return self.income - self.costs
 
@@ -47,7 +45,7 @@ class Balance:
         return Balance(**{name: getattr(self, name) + getattr(other, name) for name in names})
 
 
-def product_price(prices: Prices, local_time: Times, brix: ArrayLike) -> Values:
+def product_price(prices: Prices, local_time: Times, brix: ArrayLike) -> Floats:
     """Return the price of class A in EUR kg-1 at local times and a quality in degree Brix.
 
     The price is linear in Brix, p = price + per_brix (brix - reference_brix). That it is linear between the two
@@ -61,7 +59,7 @@ def product_price(prices: Prices, local_time: Times, brix: ArrayLike) -> Values:
     return np.asarray(base + slope * (np.asarray(brix, dtype=np.float64) - prices.reference_brix))
 
 
-def is_peak(prices: Prices, hour: ArrayLike) -> NDArray[np.bool_]:
+def is_peak(prices: Prices, hour: ArrayLike) -> Mask:
     """Tell whether local hours (0 to 24) have the peak price; peak hours may run over midnight."""
     tariff = prices.electricity
     start = tariff.peak_start.hour + tariff.peak_start.minute / 60
@@ -72,13 +70,13 @@ def is_peak(prices: Prices, hour: ArrayLike) -> NDArray[np.bool_]:
     return np.asarray((hours >= start) | (hours < end))
 
 
-def electricity_price(prices: Prices, time: Times, time_zone: str) -> Values:
+def electricity_price(prices: Prices, time: Times, time_zone: str) -> Floats:
     """Return the price of electricity in EUR kWh-1 at UTC times."""
     peak = is_peak(prices, hour_of_day(time, time_zone))
     return np.where(peak, prices.electricity.peak, prices.electricity.off_peak)
 
 
-def co2_cost(prices: Prices, before: ArrayLike, used: ArrayLike) -> Values:
+def co2_cost(prices: Prices, before: ArrayLike, used: ArrayLike) -> Floats:
     """Return the cost in EUR m-2 of `used` kg m-2 of CO2 when the crop has had `before` kg m-2 already."""
     before = np.asarray(before, dtype=np.float64)
     after = before + np.asarray(used, dtype=np.float64)
@@ -95,9 +93,9 @@ def running_costs(
     prices: Prices,
     time_zone: str,
     time: Times,
-    heat: Values,
-    electricity: Values,
-    co2: Values,
+    heat: Floats,
+    electricity: Floats,
+    co2: Floats,
     stem_density: float,
     co2_before: ArrayLike = 0.0,
 ) -> Balance:
@@ -118,7 +116,7 @@ def running_costs(
     )
 
 
-def harvest_income(prices: Prices, local_time: Times, class_a: Values, class_b: Values, brix: ArrayLike) -> Values:
+def harvest_income(prices: Prices, local_time: Times, class_a: Floats, class_b: Floats, brix: ArrayLike) -> Floats:
     """Return the income in EUR m-2 of each harvest: local times, kg m-2 of class A and B, degree Brix."""
     return product_price(prices, local_time, brix) * (class_a + prices.class_b * class_b)
 

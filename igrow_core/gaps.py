@@ -3,31 +3,30 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Values = NDArray[np.float64]
+from igrow.core.arrays import Floats, Mask
 
 
-def interpolated(values: Values) -> Values:
+def interpolated(values: Floats) -> Floats:
     """Return a column with its gaps filled linearly, by the nearest value at either end, (n,); all NaN stays so."""
     known = np.flatnonzero(np.isfinite(values))
     if len(known) == 0:
         return np.array(values)
-    filled: Values = np.interp(np.arange(len(values)), known, values[known])
+    filled: Floats = np.interp(np.arange(len(values)), known, values[known])
     return filled
 
 
-def held(values: Values) -> Values:
+def held(values: Floats) -> Floats:
     """Return a column whose gaps hold the value before them, the first one at the beginning, (n,); all NaN stays so."""
     known = np.flatnonzero(np.isfinite(values))
     if len(known) == 0:
         return np.array(values)
     before = np.clip(np.searchsorted(known, np.arange(len(values)), side="right") - 1, 0, None)
-    filled: Values = values[known[before]]
+    filled: Floats = values[known[before]]
     return filled
 
 
-def short_gaps(values: Values, longest: int) -> NDArray[np.bool_]:
+def short_gaps(values: Floats, longest: int) -> Mask:
     """Tell which rows have a value or lie in a gap of at most `longest` rows between two values, (n,)."""
     good = np.isfinite(values)
     if not good.any():
@@ -37,5 +36,5 @@ def short_gaps(values: Values, longest: int) -> NDArray[np.bool_]:
     before = np.clip(np.searchsorted(known, rows, side="right") - 1, 0, None)
     after = np.clip(np.searchsorted(known, rows, side="left"), None, len(known) - 1)
     short = (known[after] - known[before] - 1 <= longest) & (rows >= known[0]) & (rows <= known[-1])
-    bridged: NDArray[np.bool_] = good | short
+    bridged: Mask = good | short
     return bridged

@@ -6,11 +6,9 @@ import datetime
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 import numpy as np
-from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats, Times
 from igrow.core.errors import IgrowError
-
-Times = NDArray[np.datetime64]
 
 # Offsets change on whole quarters of an hour of UTC in every zone since 1970.
 _QUARTER = np.timedelta64(900, "s")
@@ -66,10 +64,10 @@ def from_local(time: Times, time_zone: str) -> Times:
     return result
 
 
-def hour_of_day(time: Times, time_zone: str) -> NDArray[np.float64]:
+def hour_of_day(time: Times, time_zone: str) -> Floats:
     """Return the local hour of UTC times, 0 to 24."""
     local = to_local(time, time_zone)
-    seconds: NDArray[np.float64] = (local - local.astype("datetime64[D]")).astype(np.float64)
+    seconds: Floats = (local - local.astype("datetime64[D]")).astype(np.float64)
     return seconds / 3600.0
 
 

@@ -22,14 +22,11 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats, Times
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import QUANTITIES
 from igrow.core.whole_files import write_whole
-
-Times = NDArray[np.datetime64]
-Values = NDArray[np.float64]
 
 
 class TelemetryError(IgrowError):
@@ -45,7 +42,7 @@ class Telemetry:
 
     time: Times
     """UTC, datetime64[s], strictly increasing, shape (n,)."""
-    columns: Mapping[str, Values]
+    columns: Mapping[str, Floats]
     """Name of a quantity -> values in the unit of the registry, shape (n,), NaN where missing."""
 
     def __repr__(self) -> str:
@@ -59,7 +56,7 @@ class Telemetry:
         if time.ndim != 1 or np.isnat(time).any() or not (np.diff(time) > np.timedelta64(0, "s")).all():
             raise TelemetryError("the times of a telemetry table must strictly increase")
         time.flags.writeable = False
-        columns: dict[str, Values] = {}
+        columns: dict[str, Floats] = {}
         for name, values in self.columns.items():
             column = np.array(values, dtype=np.float64)
             if column.shape != time.shape:
@@ -69,7 +66,7 @@ class Telemetry:
         object.__setattr__(self, "time", time)
         object.__setattr__(self, "columns", MappingProxyType(columns))
 
-    def __getitem__(self, name: str) -> Values:
+    def __getitem__(self, name: str) -> Floats:
         """Return the column of one quantity, shape (n,); raises TelemetryError where the table lacks it."""
         try:
             return self.columns[name]
@@ -82,7 +79,7 @@ class Telemetry:
     def __len__(self) -> int:
         return len(self.time)
 
-    def __reduce__(self) -> tuple[type[Telemetry], tuple[Times, dict[str, Values]]]:
+    def __reduce__(self) -> tuple[type[Telemetry], tuple[Times, dict[str, Floats]]]:
         return Telemetry, (self.time, dict(self.columns))
 
     @property
@@ -98,7 +95,7 @@ class Telemetry:
         last = len(self.time) if end is None else int(np.searchsorted(self.time, end.astype("datetime64[s]")))
         return Telemetry(self.time[first:last], {name: column[first:last] for name, column in self.columns.items()})
 
-    def with_columns(self, columns: Mapping[str, Values]) -> Telemetry:
+    def with_columns(self, columns: Mapping[str, Floats]) -> Telemetry:
         """Return the same rows with these columns added, or put in the place of those with the same name."""
         return Telemetry(self.time, {**self.columns, **columns})
 
@@ -107,7 +104,7 @@ class Telemetry:
         return Telemetry(self.time, {name: self[name] for name in names})
 
 
-def from_rows(time: Times, columns: Mapping[str, Values]) -> Telemetry:
+def from_rows(time: Times, columns: Mapping[str, Floats]) -> Telemetry:
     """Build a table from rows in any order; rows of one time become one, in which later values win."""
     time = np.asarray(time, dtype="datetime64[s]")
     order = np.argsort(time, kind="stable")
@@ -115,7 +112,7 @@ def from_rows(time: Times, columns: Mapping[str, Values]) -> Telemetry:
     new = np.ones(len(time), dtype=bool)
     new[1:] = time[1:] > time[:-1]
     group = np.cumsum(new) - 1
-    merged: dict[str, Values] = {}
+    merged: dict[str, Floats] = {}
     for name, values in columns.items():
         ordered = np.asarray(values, dtype=np.float64)[order]
         column = np.full(int(new.sum()), np.nan)
@@ -154,13 +151,13 @@ def to_grid(telemetry: Telemetry, step_seconds: int) -> Telemetry:
     first, count = int(cell[0]), int(cell[-1] - cell[0]) + 1
     index = cell - first
 
-    def mean(values: Values) -> Values:
+    def mean(values: Floats) -> Floats:
         present = ~np.isnan(values)
         number = np.bincount(index[present], minlength=count)
         total = np.bincount(index[present], weights=values[present], minlength=count)
         return np.where(number > 0, total / np.maximum(number, 1), np.nan)
 
-    columns: dict[str, Values] = {}
+    columns: dict[str, Floats] = {}
     for name, values in telemetry.columns.items():
         if name in QUANTITIES and QUANTITIES[name].unit == "deg":
             angle = np.arctan2(mean(np.sin(np.radians(values))), mean(np.cos(np.radians(values))))
@@ -176,7 +173,7 @@ def read_csv(path: str | os.PathLike[str]) -> Telemetry:
     return from_rows(*read_rows(path))
 
 
-def read_rows(path: str | os.PathLike[str]) -> tuple[Times, dict[str, Values]]:
+def read_rows(path: str | os.PathLike[str]) -> tuple[Times, dict[str, Floats]]:
     """Read a telemetry file's rows in their own order: UTC times (n,), and columns by name, (n,) each.
 
     Raises TelemetryError as `read_csv` does.
@@ -265,7 +262,7 @@ def _cells(reader: Any, path: str | Path) -> tuple[list[str], list[Sequence[str]
     return header, columns, lines
 
 
-def parse_numbers(path: str | Path, name: str, cells: Sequence[str], lines: Sequence[int]) -> Values:
+def parse_numbers(path: str | Path, name: str, cells: Sequence[str], lines: Sequence[int]) -> Floats:
     """Return one column of cells as float64; empty cells and `nan` become NaN."""
     try:
         values = np.array([float(cell) if cell else np.nan for cell in cells], dtype=np.float64)

@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from igrow.core import sun
+from igrow.core.arrays import Floats
 from igrow.core.simulator import actuation
 from igrow.core.simulator.closed_loop import closed_run
 from igrow.core.simulator.hybrid import record as records
 from igrow.core.simulator.hybrid.nominal import nominal, site_record
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
-
-Floats = NDArray[np.float64]
 
 SITE = Site(name="virtual", latitude=52.0, longitude=4.5)
 START = np.datetime64("2020-02-01T00:00:00", "s")

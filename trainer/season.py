@@ -17,8 +17,8 @@ from typing import Any
 from zoneinfo import ZoneInfo
 
 import numpy as np
-from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats, Times
 from igrow.core.bundle import Bundle
 from igrow.core.errors import IgrowError
 from igrow.core.greenhouse import generate_weather, recipe_by_hour
@@ -33,7 +33,6 @@ from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry, to_grid
 
-Values = NDArray[np.float64]
 Report = Callable[[str], None]
 
 KNOTS = 6
@@ -132,7 +131,7 @@ def season_of(site: Site, bundle: Bundle, begins: datetime.date, weather: Teleme
     return Season(site, simulator, parameters_of(site), start, days, typical, STRETCH // 2, recipe)
 
 
-def _typical(site: Site, start: np.datetime64, days: int, log: Telemetry | None, say: Report) -> Values:
+def _typical(site: Site, start: np.datetime64, days: int, log: Telemetry | None, say: Report) -> Floats:
     """Return the typical days of all stretches, (2 S, 24, 6)."""
     stretches = range(0, days, STRETCH)
     climate = WeatherClimate(latitude=site.latitude, longitude=site.longitude)
@@ -153,7 +152,7 @@ def _typical(site: Site, start: np.datetime64, days: int, log: Telemetry | None,
     return np.concatenate(chosen)
 
 
-def _days(log: Telemetry, start: np.datetime64) -> tuple[NDArray[np.datetime64], Values]:
+def _days(log: Telemetry, start: np.datetime64) -> tuple[Times, Floats]:
     """Return the beginnings of the whole days of a log, as `start` is one, and their weather, (D, 24, 6)."""
     table = to_grid(log, 3600)
     offset = int((start - table.time[0]) / np.timedelta64(3600, "s")) % 24
@@ -167,7 +166,7 @@ def _days(log: Telemetry, start: np.datetime64) -> tuple[NDArray[np.datetime64],
     return table.time[rows][::24][whole], days[whole]
 
 
-def _of_dates(begins: NDArray[np.datetime64], days: Values, first: np.datetime64) -> Values:
+def _of_dates(begins: Times, days: Floats, first: np.datetime64) -> Floats:
     """Return the days of any year whose dates lie in the stretch that begins at `first`."""
     after = (begins - first) / np.timedelta64(1, "D") % 365.25
     return days[after < STRETCH]

@@ -13,13 +13,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats
 from igrow.core.language import N_
 from igrow.core.telemetry import Telemetry
 from igrow.edge.store import read_telemetry
 
-Values = NDArray[np.float64]
 PIECE = 21_600
 """Seconds of the log that are read at once."""
 OPEN = 7200.0
@@ -49,11 +48,11 @@ SPANS = {
 class Course:
     """One quantity over time; buckets without a value are left out."""
 
-    time: Values
+    time: Floats
     """Middle of each bucket, seconds since 1970 UTC, (n,)."""
-    low: Values
-    mean: Values
-    high: Values
+    low: Floats
+    mean: Floats
+    high: Floats
 
 
 def reduce(log: Telemetry, bucket: int) -> dict[str, Course]:

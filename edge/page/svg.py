@@ -13,11 +13,9 @@ from datetime import timedelta
 from html import escape
 
 import numpy as np
-from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats
 from igrow.edge.page.words import Words
-
-Values = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -26,11 +24,11 @@ class Line:
 
     label: str
     style: str
-    time: Values
-    value: Values
-    low: Values | None = None
+    time: Floats
+    value: Floats
+    low: Floats | None = None
     """With `high`: the least and greatest value around each point, drawn as a faint ribbon."""
-    high: Values | None = None
+    high: Floats | None = None
     stepped: bool = False
     """It holds until the next point, as setpoints do."""
     gap: float = math.inf
@@ -42,9 +40,9 @@ class Band:
     """What is allowed, over time; it holds until the next point."""
 
     label: str
-    time: Values
-    low: Values
-    high: Values
+    time: Floats
+    low: Floats
+    high: Floats
 
 
 @dataclass(frozen=True)
@@ -126,7 +124,7 @@ def chart(
     return "".join(parts)
 
 
-def spark(time: Values, value: Values) -> str:
+def spark(time: Floats, value: Floats) -> str:
     """Return a small line without axes; empty for fewer than two points."""
     width, height = 150, 34
     if len(time) < 2:
@@ -222,7 +220,7 @@ def _ahead(frame: Frame, size: Size, x: Place) -> Iterator[str]:
             yield f'<text class="present" x="{at + 4:.1f}" y="{TOP - 4}">{escape(frame.say.text("ahead"))}</text>'
 
 
-def _corners(time: Values, value: Values, end: float) -> list[tuple[float, float]]:
+def _corners(time: Floats, value: Floats, end: float) -> list[tuple[float, float]]:
     """Return the corners of a course that holds each value until the next."""
     ends = [*time[1:].tolist(), max(end, float(time[-1]))]
     return [

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import QUANTITIES, WEATHER
 from igrow.core.telemetry import Telemetry, to_grid
@@ -24,8 +24,6 @@ ANOMALY_HOURS = 12.0
 
 READ_SECONDS = 10.0
 """How long a plan waits for the forecast's file."""
-
-Values = NDArray[np.float64]
 
 
 def forecast_in_time(path: Path | None) -> tuple[tuple[Telemetry, ...], str]:
@@ -46,7 +44,7 @@ def forecast_in_time(path: Path | None) -> tuple[tuple[Telemetry, ...], str]:
     return (), f"planned with the weather of the last days, as there is no forecast: {problem}"
 
 
-def persistence(log: Telemetry, start: int, hours: int) -> Values:
+def persistence(log: Telemetry, start: int, hours: int) -> Floats:
     """Return the weather expected from `start` (seconds since 1970 UTC), hourly means, (hours, 6).
 
     The mean of the same hour of the last `DAYS` days, plus the difference of the last hours from it, which fades
@@ -75,7 +73,7 @@ def persistence(log: Telemetry, start: int, hours: int) -> Values:
     return np.asarray(np.clip(expected, low, high))
 
 
-def from_forecast(forecast: Telemetry, log: Telemetry, start: int, hours: int) -> Values:
+def from_forecast(forecast: Telemetry, log: Telemetry, start: int, hours: int) -> Floats:
     """Return the weather of a forecast as hourly means, (hours, 6), with persistence where it has gaps."""
     table = hourly(forecast, start, hours)
     if np.isfinite(table).all():
@@ -83,7 +81,7 @@ def from_forecast(forecast: Telemetry, log: Telemetry, start: int, hours: int) -
     return np.where(np.isfinite(table), table, persistence(log, start, hours))
 
 
-def hourly(telemetry: Telemetry, start: int, hours: int, names: Sequence[str] = NEEDED) -> Values:
+def hourly(telemetry: Telemetry, start: int, hours: int, names: Sequence[str] = NEEDED) -> Floats:
     """Return hourly means from `start` on, (hours, names), NaN where nothing is known."""
     begin = np.datetime64(start, "s")
     selected = telemetry.select(begin, begin + np.timedelta64(hours * HOUR, "s"))
@@ -98,7 +96,7 @@ def hourly(telemetry: Telemetry, start: int, hours: int, names: Sequence[str] = 
     return result
 
 
-def without_gaps(day: Values) -> Values:
+def without_gaps(day: Floats) -> Floats:
     """Return the hourly weather of a day, (24, 6), with gaps bridged and what no sensor measures estimated.
 
     Raises IgrowError where nothing is known of a quantity that cannot be estimated.
@@ -110,7 +108,7 @@ def without_gaps(day: Values) -> Values:
     return whole
 
 
-def _fill(name: str, typical: Values, column: int) -> Values:
+def _fill(name: str, typical: Floats, column: int) -> Floats:
     """Return a course of the day without gaps, (24,); raises IgrowError where nothing is known."""
     values = typical[:, column]
     present = np.flatnonzero(np.isfinite(values))

@@ -14,12 +14,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats
 from igrow.core.errors import IgrowError
 from igrow.core.telemetry import Telemetry, read_csv
-
-Values = NDArray[np.float64]
 
 COLUMNS = {
     "temperature_2m": "outdoor_temperature",
@@ -70,8 +68,8 @@ def _members(path: Path, content: Any) -> tuple[Telemetry, ...]:
     return tuple(_member(path, hourly, units, time, suffix) for suffix in chosen)
 
 
-def _member(path: Path, hourly: Mapping[str, Any], units: Mapping[str, Any], time: Values, suffix: str) -> Telemetry:
-    columns: dict[str, Values] = {}
+def _member(path: Path, hourly: Mapping[str, Any], units: Mapping[str, Any], time: Floats, suffix: str) -> Telemetry:
+    columns: dict[str, Floats] = {}
     for theirs, ours in COLUMNS.items():
         given = hourly.get(theirs + suffix)
         if given is None:
@@ -90,7 +88,7 @@ def _member(path: Path, hourly: Mapping[str, Any], units: Mapping[str, Any], tim
     return Telemetry(time.astype(np.int64).astype("datetime64[s]"), columns)
 
 
-def _in_our_unit(path: Path, name: str, values: Values, unit: str) -> Values:
+def _in_our_unit(path: Path, name: str, values: Floats, unit: str) -> Floats:
     if name == "wind_speed_10m":
         # Without a unit it is the default of Open-Meteo.
         if (unit or "km/h") not in SPEED:
@@ -104,7 +102,7 @@ def _in_our_unit(path: Path, name: str, values: Values, unit: str) -> Values:
     return values
 
 
-def _times(path: Path, given: Any, offset: Any) -> Values:
+def _times(path: Path, given: Any, offset: Any) -> Floats:
     """Return seconds since 1970 UTC."""
     if not isinstance(given, list) or not given:
         raise IgrowError(f"{path}: `hourly` lacks time")

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats, Integers, Mask
 from igrow.core.bundle import Bundle
 from igrow.core.telemetry import Telemetry
 
@@ -24,13 +24,11 @@ HORIZONS = (1, 24)
 JUDGED = {"air_temperature": 0.05, "air_humidity": 0.3, "air_co2": 3.0}
 """The quantities that are compared, each with the error below which differences say nothing (its own unit)."""
 
-Floats = NDArray[np.float64]
-
 
 class Predictor(Protocol):
     """Runs a bundle's simulator over a log."""
 
-    def predict(self, bundle: Bundle, log: Telemetry, origins: NDArray[np.int64], steps: int) -> Mapping[str, Floats]:
+    def predict(self, bundle: Bundle, log: Telemetry, origins: Integers, steps: int) -> Mapping[str, Floats]:
         """Return quantity -> free-run predictions (origins, steps).
 
         `log` lies on a regular grid. Entry [i, k] is for the row `origins[i] + k + 1`, starting from the climate
@@ -151,7 +149,7 @@ def hindcast_errors(
     return {f"{pair.quantity} {pair.horizon}_h": pair.candidate for pair in comparison.pairs if pair.count}
 
 
-def _origins(log: Telemetry, start: np.datetime64, end: np.datetime64, horizon: int) -> tuple[NDArray[np.int64], int]:
+def _origins(log: Telemetry, start: np.datetime64, end: np.datetime64, horizon: int) -> tuple[Integers, int]:
     """Return the rows at full hours from which a horizon fits into the window, and the horizon in rows."""
     if len(log) < 2:
         return np.empty(0, dtype=np.int64), 0
@@ -164,7 +162,7 @@ def _origins(log: Telemetry, start: np.datetime64, end: np.datetime64, horizon: 
     return np.flatnonzero(fits), steps
 
 
-def _mean_absolute(predicted: Floats, measured: Floats, usable: NDArray[np.bool_]) -> float:
+def _mean_absolute(predicted: Floats, measured: Floats, usable: Mask) -> float:
     """Return the mean absolute error; infinite where a prediction is not finite though it could be judged."""
     if not usable.any():
         return math.nan

@@ -9,18 +9,17 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 
 import numpy as np
-from numpy.typing import NDArray
 
 from igrow.core.agronomy.moment import Place, moment
+from igrow.core.arrays import Floats
 
-Values = NDArray[np.float64]
 _SLACK = 1e-6
 QUARTER = 900.0
 """Seconds by which rows are parted where a local day begins."""
 
 
 def violations(
-    place: Place, start: float, heating: Values, lamp: Values, co2: Values, sunlight: Values, step: float = 3600.0
+    place: Place, start: float, heating: Floats, lamp: Floats, co2: Floats, sunlight: Floats, step: float = 3600.0
 ) -> list[str]:
     """Return one sentence for each limit that a course leaves, in the order of time.
 
@@ -35,7 +34,7 @@ def violations(
 
     Nights and local days that the course does not hold as a whole are not judged by their sums.
     """
-    times: Values = start + step * np.arange(len(heating), dtype=np.float64)
+    times: Floats = start + step * np.arange(len(heating), dtype=np.float64)
     return [
         *_temperatures(place, times, heating, step),
         *_days(place, times, heating, lamp, sunlight, step),
@@ -45,7 +44,7 @@ def violations(
     ]
 
 
-def _temperatures(place: Place, times: Values, heating: Values, step: float) -> Iterator[str]:
+def _temperatures(place: Place, times: Floats, heating: Floats, step: float) -> Iterator[str]:
     limits = place.limits
     for row, (time, value) in enumerate(zip(times.tolist(), heating.tolist(), strict=True)):
         # The sun may rise or set while a row stands.
@@ -57,7 +56,7 @@ def _temperatures(place: Place, times: Values, heating: Values, step: float) -> 
             yield f"row {row}: {value - heating[row - 1]:+.3f} K at once"
 
 
-def _days(place: Place, times: Values, heating: Values, lamp: Values, sunlight: Values, step: float) -> Iterator[str]:
+def _days(place: Place, times: Floats, heating: Floats, lamp: Floats, sunlight: Floats, step: float) -> Iterator[str]:
     limits, mean = place.limits, place.limits.mean_temperature
     parts = max(1, round(step / QUARTER))
     fine = np.repeat(times, parts) + np.tile(step / parts * np.arange(parts), len(times))
@@ -78,7 +77,7 @@ def _days(place: Place, times: Values, heating: Values, lamp: Values, sunlight: 
             yield f"day {day}: {light:.2f} mol m-2, of them {lamps:.2f} from lamps"
 
 
-def _nights(place: Place, times: Values, lamp: Values, step: float) -> Iterator[str]:
+def _nights(place: Place, times: Floats, lamp: Floats, step: float) -> Iterator[str]:
     moments = [moment(place, time) for time in (*times.tolist(), float(times[-1]) + step)]
     for night, group in groupby(moments, key=lambda one: one.night):
         one = next(group)
@@ -95,7 +94,7 @@ def _nights(place: Place, times: Values, lamp: Values, step: float) -> Iterator[
             yield f"night {night}: dark for {longest:.2f} h, {needed:.2f} h are needed"
 
 
-def _people(place: Place, times: Values, co2: Values, step: float) -> Iterator[str]:
+def _people(place: Place, times: Floats, co2: Floats, step: float) -> Iterator[str]:
     limits = place.limits
     for row, (time, value) in enumerate(zip(times.tolist(), co2.tolist(), strict=True)):
         for clock in (moment(place, time).clock, moment(place, time + step - 1.0).clock):
@@ -105,7 +104,7 @@ def _people(place: Place, times: Values, co2: Values, step: float) -> Iterator[s
                 yield f"row {row}: {value:g} ppm with people inside"
 
 
-def _rests(place: Place, lamp: Values, step: float) -> Iterator[str]:
+def _rests(place: Place, lamp: Floats, step: float) -> Iterator[str]:
     rest = place.limits.rest.get("lamp_on")
     if rest is None:
         return

@@ -7,14 +7,11 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from igrow.core.agronomy.moment import Moment, Place, moment
-from igrow.core.arrays import Array
+from igrow.core.arrays import Array, Floats
 from igrow.core.sun import unix_seconds
 from igrow.core.telemetry import Telemetry, to_grid
-
-Values = NDArray[np.float64]
 
 SWITCHED = ("lamp_on", "irrigation_on")
 _BY_NAME = ("level", "since")
@@ -162,7 +159,7 @@ def remember(place: Place, log: Telemetry, until: float) -> Memory:
     return memory
 
 
-def _standing(values: Values) -> Values:
+def _standing(values: Floats) -> Floats:
     """Return values on a grid of `STEP` with each standing until the next, for an hour at most."""
     rows = np.arange(len(values))
     last = np.maximum.accumulate(np.where(np.isfinite(values), rows, -1))

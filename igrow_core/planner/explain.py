@@ -9,15 +9,13 @@ from itertools import pairwise
 from zoneinfo import ZoneInfo
 
 import numpy as np
-from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats, Integers
 from igrow.core.economics import Balance
 from igrow.core.planner.objective import Simulator
 from igrow.core.planner.optimise import PlanningState, PlanResult
 from igrow.core.planner.template import Setpoints, Template
 from igrow.core.quantities import QUANTITIES, SETPOINTS
-
-Values = NDArray[np.float64]
 
 PARTS = ("income", "heat", "electricity", "co2")
 WORDS = {"income": "growth", "heat": "heat", "electricity": "electricity", "co2": "CO2"}
@@ -88,7 +86,7 @@ class Explanation:
 def explain(
     simulator: Simulator,
     state: PlanningState,
-    forecast: Values,
+    forecast: Floats,
     result: PlanResult,
     horizon: int | None = None,
 ) -> Explanation:
@@ -132,7 +130,7 @@ def explain(
     return Explanation(_amounts(planned), _amounts(followed), _amount(gain), tuple(changes[:MOST]))
 
 
-def _stretches(template: Template, plan: Setpoints, recipe: Setpoints) -> Iterator[tuple[int, NDArray[np.int64]]]:
+def _stretches(template: Template, plan: Setpoints, recipe: Setpoints) -> Iterator[tuple[int, Integers]]:
     """Yield setpoints and the hours that follow one another in which the plan departs from the recipe."""
     for name in template.free:
         column = SETPOINTS.index(name)
@@ -144,8 +142,8 @@ def _stretches(template: Template, plan: Setpoints, recipe: Setpoints) -> Iterat
                 yield column, np.arange(first, last)
 
 
-def _part(balance: Balance, name: str) -> Values:
-    values: Values = getattr(balance, name)
+def _part(balance: Balance, name: str) -> Floats:
+    values: Floats = getattr(balance, name)
     return values
 
 
@@ -154,7 +152,7 @@ def _amounts(balance: Balance) -> dict[str, Amount]:
     return amounts | {"profit": _amount(balance.net_profit[:, 0])}
 
 
-def _amount(values: Values) -> Amount:
+def _amount(values: Floats) -> Amount:
     return Amount(float(values.mean()), float(values.std()))
 
 

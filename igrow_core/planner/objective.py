@@ -20,14 +20,12 @@ from dataclasses import dataclass, fields, replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from igrow.core.agronomy.cold import worth_of_growth
 from igrow.core.air import saturation_pressure
+from igrow.core.arrays import Floats, Times
 from igrow.core.economics import Balance, local_days, product_price, running_costs
 from igrow.core.site import Site
-
-Values = NDArray[np.float64]
 
 HARM_PER_DEGREE_HOUR = 0.002
 """EUR m-2 for each kelvin and hour outside the crop's bounds, and each % of humidity and hour above its bound."""
@@ -46,25 +44,25 @@ class Outcome:
     A simulator without an ensemble has M = 1. Amounts belong to the hour, they are not cumulative.
     """
 
-    air_temperature: Values
+    air_temperature: Floats
     """degC, mean of the hour or its end."""
-    air_humidity: Values
+    air_humidity: Floats
     """%."""
-    air_co2: Values
+    air_co2: Floats
     """ppm."""
-    heat: Values
+    heat: Floats
     """MJ m-2."""
-    electricity: Values
+    electricity: Floats
     """kWh m-2."""
-    co2: Values
+    co2: Floats
     """kg m-2 dosed."""
-    net_growth: Values
+    net_growth: Floats
     """kg m-2 of dry matter."""
-    fruit_fresh_weight: Values
+    fruit_fresh_weight: Floats
     """kg m-2 harvested."""
-    leaf_area_index: Values
+    leaf_area_index: Floats
     """m2 m-2 of the leaves that grew it."""
-    outside: Values
+    outside: Floats
     """How far the hour lies outside the training data, in widths of its range; 0 inside."""
 
     def first(self, hours: int) -> Outcome:
@@ -79,7 +77,7 @@ class Outcome:
 class Simulator(Protocol):
     """Anything that says what setpoints do: a bundle's graph, a model in numpy, the mechanistic greenhouse."""
 
-    def simulate(self, initial: dict[str, float], weather: Values, setpoints: Values, start: np.datetime64) -> Outcome:
+    def simulate(self, initial: dict[str, float], weather: Floats, setpoints: Floats, start: np.datetime64) -> Outcome:
         """Return what candidates do.
 
         Args:
@@ -93,7 +91,7 @@ class Simulator(Protocol):
 class Worth(Protocol):
     """Says what outcomes are worth to the crop."""
 
-    def income(self, outcome: Outcome, time: NDArray[np.datetime64]) -> Values:
+    def income(self, outcome: Outcome, time: Times) -> Floats:
         """Return EUR m-2 over the horizon, (M, B); `time` are the UTC starts of its hours, (H,)."""
 
 
@@ -103,18 +101,18 @@ class Valuation:
 
     balance: Balance
     """Income is the value of growth."""
-    harm: Values
+    harm: Floats
     """Penalty for climate that harms the crop."""
-    outside: Values
+    outside: Floats
     """Penalty for leaving the range of the training data."""
 
     @property
-    def profit(self) -> Values:
+    def profit(self) -> Floats:
         """Value of growth less costs, (M, B); penalties are not money and stay out of it."""
         return self.balance.net_profit
 
     @property
-    def score(self) -> Values:
+    def score(self) -> Floats:
         """Profit less penalties, (M, B)."""
         return self.profit - self.harm - self.outside
 
@@ -124,9 +122,9 @@ class Objective:
     """The value of outcomes at one site over one stretch of hours."""
 
     site: Site
-    time: NDArray[np.datetime64]
+    time: Times
     """UTC starts of the hours, (H,)."""
-    co2_before: Values | float = 0.0
+    co2_before: Floats | float = 0.0
     """kg m-2 of CO2 that the crop has had before; one value, or one for each candidate, (B,)."""
     worth: Worth | None = None
     """What the crop's growth is worth; None takes the average price of the days on which fruit now growing ripens."""
@@ -155,13 +153,13 @@ class Objective:
             outside=OUTSIDE_PENALTY * np.sum(outcome.outside, axis=-1) / 24.0,
         )
 
-    def _income(self, outcome: Outcome) -> Values:
+    def _income(self, outcome: Outcome) -> Floats:
         crop = self.site.crop
         believed = outcome.net_growth * np.clip(1.0 - DISBELIEF * outcome.outside, 0.0, 1.0)
         fresh = believed * (crop.fruit_share / crop.dry_matter_fraction)
         return np.asarray(np.sum(fresh * by_day(outcome.air_temperature) * self.growth_price(), axis=-1))
 
-    def growth_price(self) -> Values:
+    def growth_price(self) -> Floats:
         """Return what fresh fruit growing in each hour will earn on average, EUR kg-1, (H,)."""
         site, crop = self.site, self.site.crop
         day = local_days(self.time, site.time_zone)
@@ -172,7 +170,7 @@ class Objective:
             price = np.where(ripe <= np.datetime64(crop.end_date), price, 0.0)
         return np.asarray(price.mean(axis=1) * (1.0 - site.planning.discount))
 
-    def _harm(self, outcome: Outcome) -> Values:
+    def _harm(self, outcome: Outcome) -> Floats:
         crop, air = self.site.crop, outcome.air_temperature
         hot = np.maximum(air - crop.temperature_high, 0.0)
         cold = np.maximum(crop.temperature_low - air, 0.0)
@@ -181,7 +179,7 @@ class Objective:
         return np.asarray(harm)
 
 
-def by_day(air_temperature: Values) -> Values:
+def by_day(air_temperature: Floats) -> Floats:
     """Return for each hour (..., H) what the growth of its day is worth at that day's mean temperature, 0 to 1."""
     worth = np.empty_like(air_temperature)
     for first in range(0, air_temperature.shape[-1], 24):
@@ -190,7 +188,7 @@ def by_day(air_temperature: Values) -> Values:
     return worth
 
 
-def damp_hours(outcome: Outcome, site: Site) -> Values:
+def damp_hours(outcome: Outcome, site: Site) -> Floats:
     """Return how many hours of the worst day are expected to be damp, mean over the ensemble, (B,)."""
     crop = site.crop
     deficit = saturation_pressure(np, outcome.air_temperature) * (1.0 - outcome.air_humidity / 100.0) * 1e-3
@@ -199,7 +197,7 @@ def damp_hours(outcome: Outcome, site: Site) -> Values:
     return np.asarray(np.max(np.stack(days), axis=0).mean(axis=0))
 
 
-def cautious(valuation: Valuation, reference: Valuation, caution: float) -> tuple[Values, Values]:
+def cautious(valuation: Valuation, reference: Valuation, caution: float) -> tuple[Floats, Floats]:
     """Return what the candidates gain over the reference, taking doubt off, and the doubt itself; both (B,).
 
     The members of an ensemble err together on much that plan and reference share, so the doubt is the standard

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from igrow.core.agronomy import Memory
+from igrow.core.arrays import Floats, Times
 from igrow.core.errors import IgrowError
 from igrow.core.planner.evolution import WORST, Generation, NumpyGeneration, draw
 from igrow.core.planner.objective import Objective, Outcome, Simulator, Valuation, Worth, cautious, damp_hours
@@ -17,7 +18,6 @@ from igrow.core.planner.template import Setpoints, Template, for_site
 from igrow.core.quantities import SETPOINTS, WEATHER
 from igrow.core.site import Site
 
-Values = NDArray[np.float64]
 RADIATION = WEATHER.index("global_radiation")
 NOT_ADMITTED = -1e6
 """Fitness of a candidate that leaves a limit of the climate, EUR m-2 for one at the limit."""
@@ -57,7 +57,7 @@ class PlanResult:
 
     setpoints: Setpoints
     """(H, 4), one row an hour, in the order of `quantities.SETPOINTS`."""
-    time: NDArray[np.datetime64]
+    time: Times
     """UTC starts of the hours, (H,)."""
     expected_profit: float
     """EUR m-2 over the horizon, mean over the ensemble, without penalties and doubt."""
@@ -101,7 +101,7 @@ def optimise(
     simulator: Simulator,
     site: Site,
     state: PlanningState,
-    forecast: Values,
+    forecast: Floats,
     recipe: Setpoints,
     rng: np.random.Generator,
     budget: Budget | None = None,

@@ -14,14 +14,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats
 from igrow.core.planner.objective import Outcome, Simulator
 from igrow.core.simulator.growth import Count, GrowthBalance, GrowthDays, GrowthFit, regress, warmth
 from igrow.core.site import Crop, Greenhouse, Site
 from igrow.core.telemetry import Telemetry
-
-Values = NDArray[np.float64]
 
 SCALED = ("heat", "electricity", "co2")
 """What plans are charged for."""
@@ -35,7 +33,7 @@ _WARMEST = 1.0
 """Largest difference of the air's temperature, K: what a cold day costs doubles within it."""
 
 
-def factors(expected: Mapping[str, Values], used: Mapping[str, Values]) -> dict[str, float]:
+def factors(expected: Mapping[str, Floats], used: Mapping[str, Floats]) -> dict[str, float]:
     """Return the factor of each of `SCALED`: what was used over what was expected, drawn towards one.
 
     Args:
@@ -52,7 +50,7 @@ def factors(expected: Mapping[str, Values], used: Mapping[str, Values]) -> dict[
     return result
 
 
-def warmer(expected: Values, measured: Values) -> float:
+def warmer(expected: Floats, measured: Floats) -> float:
     """Return by how much the air was warmer than expected, K, by means of days (days,), drawn towards nothing.
 
     The PLC's control leaves an offset that is alike from day to day, and what a cold day costs hangs on tenths of it.
@@ -62,7 +60,7 @@ def warmer(expected: Values, measured: Values) -> float:
     return float(np.clip(difference, -_WARMEST, _WARMEST))
 
 
-def totals(outcome: Outcome) -> dict[str, Values]:
+def totals(outcome: Outcome) -> dict[str, Floats]:
     """Return the totals of an outcome by `SCALED` and ``net_growth``, mean over the ensemble, (B,)."""
     return {name: getattr(outcome, name).sum(axis=-1).mean(axis=0) for name in (*SCALED, "net_growth")}
 
@@ -102,10 +100,10 @@ def used_in(log: Telemetry, greenhouse: Greenhouse) -> dict[str, float]:
     hours = whole * float((log.time[-1] - log.time[0]) / np.timedelta64(1, "s")) / 3600.0 if len(log) > 1 else np.nan
     nothing = np.full(len(log), np.nan)
 
-    def column(name: str) -> Values:
+    def column(name: str) -> Floats:
         return log.columns.get(name, nothing)
 
-    def total(values: Values) -> float:
+    def total(values: Floats) -> float:
         known = np.isfinite(values)
         return float(values[known].mean()) * hours if known.sum() > 0.5 * len(values) else float("nan")
 
@@ -150,7 +148,7 @@ class Corrected:
     warmer: float = 0.0
     """K by which the air is warmer; growth was counted at the simulator's own temperatures, and stays there."""
 
-    def simulate(self, initial: dict[str, float], weather: Values, setpoints: Values, start: np.datetime64) -> Outcome:
+    def simulate(self, initial: dict[str, float], weather: Floats, setpoints: Floats, start: np.datetime64) -> Outcome:
         """Return what candidates do; see `objective.Simulator`."""
         outcome = self.simulator.simulate(initial, weather, setpoints, start)
         changes = {name: self.factor[name] * getattr(outcome, name) for name in SCALED}
@@ -160,7 +158,7 @@ class Corrected:
         return replace(outcome, **changes)
 
 
-def regrown(outcome: Outcome, balance: GrowthBalance, growth: GrowthFit) -> Values:
+def regrown(outcome: Outcome, balance: GrowthBalance, growth: GrowthFit) -> Floats:
     """Return net growth (M, B, H) as it is with the fitted conversion and maintenance, one draw for each member."""
     pairs = growth.draws(len(outcome.net_growth))[:, :, None, None]
     assimilated = balance.assimilated(outcome.net_growth, outcome.air_temperature)

@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats
 from igrow.core.planner.objective import Outcome, Simulator
-
-Values = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -18,10 +16,10 @@ class WeatherEnsemble:
     """Runs candidates under each of W courses of weather; its ensemble is that of the simulator under each, (W M)."""
 
     simulator: Simulator
-    courses: Sequence[Values]
+    courses: Sequence[Floats]
     """Each (H, 6), hourly means."""
 
-    def simulate(self, initial: dict[str, float], weather: Values, setpoints: Values, start: np.datetime64) -> Outcome:
+    def simulate(self, initial: dict[str, float], weather: Floats, setpoints: Floats, start: np.datetime64) -> Outcome:
         """Return what candidates do; see `objective.Simulator`. `weather` is not read: the courses stand for it."""
         outcomes = [self.simulator.simulate(initial, course, setpoints, start) for course in self.courses]
         return Outcome(

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from igrow.core.arrays import Array
+from igrow.core.arrays import Array, Floats, Integers
 from igrow.core.effects.definition import Values
 from igrow.core.quantities import SETPOINTS
 from igrow.core.simulator import actuation
@@ -15,14 +14,12 @@ from igrow.core.simulator.hybrid import climate, measurement
 from igrow.core.simulator.hybrid.climate import ActiveEffects
 from igrow.core.simulator.hybrid.record import SUBSTEP, Record
 
-Floats = NDArray[np.float64]
-
 
 def closed_run(
     record: Record,
     states: Mapping[str, Floats],
     setpoints: Mapping[str, Floats],
-    starts: Sequence[int] | NDArray[np.int64],
+    starts: Sequence[int] | Integers,
     steps: int,
     parameters: Values,
     effects: ActiveEffects,

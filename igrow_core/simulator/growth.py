@@ -17,12 +17,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats
 from igrow.core.simulator.crop import CropStages
 from igrow.core.site import Crop
 
-Values = NDArray[np.float64]
 PRIOR = (0.30, 1.0)
 """Standard deviations of conversion and maintenance over their values before a crop was counted: the greenhouses of
 the benchmarks, and a foreign model (0.88 of the growth, less 7 g m-2 d-1), lie within them."""
@@ -36,9 +35,9 @@ TOLD = 0.7
 class GrowthDays:
     """What drives growth, by whole days that follow one another."""
 
-    assimilated: Values
+    assimilated: Floats
     """CO2 that the canopy took up, kg m-2, (D,); NaN where it is not known."""
-    warmth: Values
+    warmth: Floats
     """Sum over the day's hours of exp(0.0693 (T - 20)), h, (D,)."""
 
 
@@ -65,7 +64,7 @@ class GrowthFit:
     """kg of dry matter per kg of CO2."""
     maintenance: float
     """kg m-2 h-1 of dry matter at 20 degC."""
-    covariance: Values
+    covariance: Floats
     """Of the two, (2, 2)."""
     counts: int
     """How many counts told of them."""
@@ -90,7 +89,7 @@ class GrowthFit:
             return f"{self.counts} counts of growth tell the {self.told[0]} alone"
         return f"{self.counts} counts of growth tell conversion and maintenance"
 
-    def draws(self, members: int) -> Values:
+    def draws(self, members: int) -> Floats:
         """Return as many pairs of conversion and maintenance, (M, 2): the mean first, the others about it.
 
         The same each time; none is negative.
@@ -111,7 +110,7 @@ class GrowthBalance:
 
     conversion: float
     maintenance: float
-    covariance: Values
+    covariance: Floats
     """Of the two, (2, 2)."""
 
     @classmethod
@@ -125,17 +124,17 @@ class GrowthBalance:
         covariance = np.diag(spread**2) if given is None else np.asarray(given, dtype=np.float64)
         return cls(conversion, maintenance, covariance)
 
-    def assimilated(self, net_growth: Values, air_temperature: Values) -> Values:
+    def assimilated(self, net_growth: Floats, air_temperature: Floats) -> Floats:
         """Return the CO2 taken up in each hour, kg m-2, behind a net growth in kg m-2."""
         return (net_growth + self.maintenance * warmth(air_temperature)) / self.conversion
 
 
-def warmth(air_temperature: Values) -> Values:
+def warmth(air_temperature: Floats) -> Floats:
     """Return the hours at 20 degC that an hour at another temperature in degC counts for in maintenance."""
     return np.asarray(np.exp(0.0693147 * (air_temperature - 20.0)))
 
 
-def prior_of(stages: CropStages) -> Values:
+def prior_of(stages: CropStages) -> Floats:
     """Return the covariance of conversion and maintenance, (2, 2): what the stages carry, else `PRIOR`."""
     if stages.covariance is not None:
         return np.asarray(stages.covariance, dtype=np.float64)
@@ -143,7 +142,7 @@ def prior_of(stages: CropStages) -> Values:
 
 
 def fit_growth(
-    days: GrowthDays, counts: Sequence[Count], stages: CropStages, crop: Crop, prior: Values | None = None
+    days: GrowthDays, counts: Sequence[Count], stages: CropStages, crop: Crop, prior: Floats | None = None
 ) -> tuple[CropStages, GrowthFit]:
     """Return stages with conversion and maintenance as counted, and how well they are known.
 
@@ -160,7 +159,7 @@ def fit_growth(
     return replace(stages, conversion=fit.conversion, maintenance=fit.maintenance, covariance=fit.covariance), fit
 
 
-def regress(days: GrowthDays, counts: Sequence[Count], crop: Crop, mean: Values, prior: Values) -> GrowthFit:
+def regress(days: GrowthDays, counts: Sequence[Count], crop: Crop, mean: Floats, prior: Floats) -> GrowthFit:
     """Return the posterior of conversion and maintenance (2,) from a prior mean and covariance; see `fit_growth`."""
     rows = [(_row(days, count, crop), count) for count in counts]
     usable = [(row, count) for row, count in rows if np.isfinite(row).all() and np.isfinite(count.amount)]
@@ -193,7 +192,7 @@ def regress(days: GrowthDays, counts: Sequence[Count], crop: Crop, mean: Values,
     )
 
 
-def _posterior(design: Values, target: Values, mean: Values, prior: Values) -> tuple[Values, Values]:
+def _posterior(design: Floats, target: Floats, mean: Floats, prior: Floats) -> tuple[Floats, Floats]:
     """Return mean (2,) and covariance (2, 2) of a linear model with errors of one; in units of the prior's spread."""
     scale = np.sqrt(np.diag(prior))
     unit = design * scale
@@ -203,7 +202,7 @@ def _posterior(design: Values, target: Values, mean: Values, prior: Values) -> t
     return mean + scale * step, covariance * np.outer(scale, scale)
 
 
-def _row(days: GrowthDays, count: Count, crop: Crop) -> Values:
+def _row(days: GrowthDays, count: Count, crop: Crop) -> Floats:
     """Return what one unit of conversion and of maintenance adds to a count, (2,); NaN where days are missing."""
     if not 0 <= count.first < count.last <= len(days.assimilated):
         return np.full(2, np.nan)

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from igrow.core import gaps
+from igrow.core.arrays import Floats, Integers, Times
 from igrow.core.bundle import Bundle, BundleError, open_session
 from igrow.core.simulator.hybrid.measurement import PREDICTED
 from igrow.core.simulator.hybrid.record import Record, make_record
 from igrow.core.telemetry import Telemetry
-
-Floats = NDArray[np.float64]
 
 SETTLING = 86_400.0
 """Seconds before the origin in which floor and memories follow the measured climate."""
@@ -72,7 +70,7 @@ class SimulatorSettings:
             leaf_area_index=self.leaf_area_index,
         )
 
-    def day(self, time: NDArray[np.datetime64]) -> Floats:
+    def day(self, time: Times) -> Floats:
         """Return days since the reference time."""
         return (time - self.reference_time).astype("timedelta64[s]").astype(np.float64) / 86_400.0
 
@@ -90,7 +88,7 @@ class Hindcast:
             [[self.settings.parameters[name]] for name in tensors["parameters"]], dtype=np.float32
         )
 
-    def run(self, record: Record, origins: NDArray[np.int64], steps: int) -> dict[str, Floats]:
+    def run(self, record: Record, origins: Integers, steps: int) -> dict[str, Floats]:
         """Return quantity -> free-run predictions (origins, steps); NaN where the record lacks what is needed.
 
         Entry [i, k] is for the row `origins[i] + k + 1`, started from the climate measured at row `origins[i]`.
@@ -118,7 +116,7 @@ class Hindcast:
                         result[name][chosen] = shown[:, column].T
         return result
 
-    def _run(self, record: Record, filled: Mapping[str, Floats], origins: NDArray[np.int64], steps: int) -> Any:
+    def _run(self, record: Record, filled: Mapping[str, Floats], origins: Integers, steps: int) -> Any:
         settling = min(round(SETTLING / record.step), int(origins.max()))
         rows = np.clip(origins[None, :] + np.arange(-settling, steps)[:, None], 0, None)
         inputs = np.stack([record.inputs[name][rows] for name in self._inputs], axis=1)
@@ -145,7 +143,7 @@ class HindcastPredictor:
     def __init__(self) -> None:
         self._open: dict[str, Hindcast] = {}
 
-    def predict(self, bundle: Bundle, log: Telemetry, origins: NDArray[np.int64], steps: int) -> dict[str, Floats]:
+    def predict(self, bundle: Bundle, log: Telemetry, origins: Integers, steps: int) -> dict[str, Floats]:
         """Return quantity -> free-run predictions (origins, steps); see `Hindcast.run`.
 
         `log` lies on a regular grid of its own step. Raises BundleError for a bundle without a usable hindcast.

@@ -9,11 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow.core.arrays import Array
+from igrow.core.arrays import Array, Floats, Integers
 from igrow.core.simulator.leaf_picking import pick
 from igrow.core.simulator.network import HOURS, NetworkSimulator, Stage, advance, initial_memory
-
-Values = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -42,7 +40,7 @@ def known_inputs(simulator: NetworkSimulator) -> tuple[str, ...]:
     return tuple(name for name in names if name != "leaf_area_index")
 
 
-def day_ends(hours: int) -> NDArray[np.int64]:
+def day_ends(hours: int) -> Integers:
     """Return the last row of each day of 24 rows, the last day cut where the run ends."""
     return np.minimum(np.arange(HOURS, hours + HOURS, HOURS), hours) - 1
 
@@ -111,7 +109,7 @@ def run_harvest(xp: Any, stage: Stage, state: Array, memory: Array, means: Mappi
     return advance(xp, stage, state, drivers, memory)
 
 
-def begin(simulator: NetworkSimulator, known: Mapping[str, Values]) -> Carried:
+def begin(simulator: NetworkSimulator, known: Mapping[str, Floats]) -> Carried:
     """Return where runs stand at their first hour; `known` is name -> (runs, hours), see `free_run`."""
     light = simulator.light.par(np, known["global_radiation"][:, 0], known["lamp_on"][:, 0])
     zero = np.zeros((light.size, 1), dtype=np.float32)
@@ -130,7 +128,7 @@ def begin(simulator: NetworkSimulator, known: Mapping[str, Values]) -> Carried:
     )  # fmt: skip
 
 
-def free_run(simulator: NetworkSimulator, known: Mapping[str, Values], hour: Values) -> dict[str, Values]:
+def free_run(simulator: NetworkSimulator, known: Mapping[str, Floats], hour: Floats) -> dict[str, Floats]:
     """Run whole seasons from their first hour on nothing but weather and setpoints.
 
     Parameters
@@ -159,8 +157,8 @@ def free_run(simulator: NetworkSimulator, known: Mapping[str, Values], hour: Val
 
 
 def free_growth(
-    simulator: NetworkSimulator, climate: Mapping[str, Values], start: Mapping[str, float], hour: Values
-) -> dict[str, Values]:
+    simulator: NetworkSimulator, climate: Mapping[str, Floats], start: Mapping[str, float], hour: Floats
+) -> dict[str, Floats]:
     """Run growth alone from the first hour under a climate that is known.
 
     Parameters
@@ -188,9 +186,9 @@ def _run_rows(
     step: Callable[..., tuple[Carried, dict[str, Array]]],
     simulator: NetworkSimulator,
     carried: Carried,
-    drivers: Mapping[str, Values],
-    hour: Values,
-    result: Mapping[str, Values],
+    drivers: Mapping[str, Floats],
+    hour: Floats,
+    result: Mapping[str, Floats],
 ) -> None:
     """Fill `result` (runs, hours) from its second row on with what `run_hour` or `grow_hour` gives, hour by hour."""
     columns = {name: values.astype(np.float32)[..., None] for name, values in drivers.items()}
@@ -207,7 +205,7 @@ def _columns(stage: Stage, state: Array) -> dict[str, Array]:
     return {name: state[..., column : column + 1] for column, name in enumerate(stage.states)}
 
 
-def daily_drivers(names: Sequence[str], columns: Mapping[str, Values]) -> Values:
+def daily_drivers(names: Sequence[str], columns: Mapping[str, Floats]) -> Floats:
     """Return the mean of each named column (runs, hours) over each day of 24 rows, (runs, days, n)."""
     hours = columns[names[0]].shape[1]
     ends = day_ends(hours)
@@ -217,8 +215,8 @@ def daily_drivers(names: Sequence[str], columns: Mapping[str, Values]) -> Values
 
 
 def _harvest(
-    simulator: NetworkSimulator, result: Mapping[str, Values], known: Mapping[str, Values]
-) -> dict[str, Values]:
+    simulator: NetworkSimulator, result: Mapping[str, Floats], known: Mapping[str, Floats]
+) -> dict[str, Floats]:
     stage = simulator.harvest
     drivers = daily_drivers(stage.drivers, result).astype(np.float32)
     state = np.stack([known[name][:, 0] for name in stage.states], axis=-1).astype(np.float32)
@@ -233,7 +231,7 @@ def _harvest(
             for index, name in enumerate(stage.states)}  # fmt: skip
 
 
-def _held(values: Values, first: Values, ends: NDArray[np.int64], hours: int) -> Values:
+def _held(values: Floats, first: Floats, ends: Integers, hours: int) -> Floats:
     day = np.searchsorted(ends, np.arange(hours), side="left")
     at_end = np.arange(hours) == ends[day]
     before = np.concatenate([first[:, None], values], axis=1)[:, day]

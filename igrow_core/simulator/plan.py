@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from igrow.core import sun
+from igrow.core.arrays import Floats, Times
 from igrow.core.bundle import Bundle, BundleError, open_session
 from igrow.core.errors import IgrowError
 from igrow.core.planner.objective import Outcome
@@ -16,8 +16,6 @@ from igrow.core.simulator.growth import GrowthBalance
 from igrow.core.simulator.hindcast import SimulatorSettings
 from igrow.core.simulator.hybrid.measurement import PREDICTED
 from igrow.core.site import Greenhouse
-
-Floats = NDArray[np.float64]
 
 STEPS_PER_HOUR = 2
 """Steps of the climate and the actuation stage in an hour."""
@@ -143,7 +141,7 @@ class BundleSimulator:
                 columns.append(np.full(len(weather), _ABSENT_WEATHER[name]))
         return np.stack(columns, axis=1)
 
-    def _clock(self, time: NDArray[np.datetime64]) -> Floats:
+    def _clock(self, time: Times) -> Floats:
         middle = sun.unix_seconds(time) + 1800.0
         return np.stack(sun.position(np, middle, self.settings.latitude, self.settings.longitude), axis=1)
 

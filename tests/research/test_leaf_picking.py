@@ -6,19 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats
 from igrow.core.simulator.leaf_picking import LeafPicking, pick
 from igrow.trainer.research.network.leaf_picking import CERTAIN, FADED, fit_picking, followed, picked_area, smooth
 
 HOURS = 60 * 24
 HOUR = np.arange(HOURS, dtype=np.float64) % 24.0
-Values = NDArray[np.float64]
 READY = np.array([50, 150, 260, 370, 480], dtype=np.float32)
 RULE = LeafPicking(12.0, 3.0, 4.0, READY, np.full(5, 0.3, dtype=np.float32), certain=1e3, faded=2e3)
 
 
-def run(rule: LeafPicking, thermal: Values, growth: float) -> Values:
+def run(rule: LeafPicking, thermal: Floats, growth: float) -> Floats:
     """Grow leaves at a constant pace and pick by `rule`: (runs, hours)."""
     area, count, rows = np.full(len(thermal), 1.0), np.zeros(len(thermal)), []
     for step in range(HOURS):
@@ -31,7 +30,7 @@ def run(rule: LeafPicking, thermal: Values, growth: float) -> Values:
 
 
 @pytest.fixture
-def thermal() -> Values:
+def thermal() -> Floats:
     """Thermal time of twelve seasons between 12 and 26 degC."""
     temperature = np.linspace(12, 26, 12)[:, None] + 2 * np.sin(np.arange(HOURS) / 200)[None]
     return np.asarray(np.cumsum(temperature, axis=1) / 24)
@@ -55,7 +54,7 @@ def test_pickings_fade_when_their_days_can_no_longer_be_told() -> None:
     np.testing.assert_allclose(gone, [1.2, 0.6, 0.0])
 
 
-def test_the_rule_is_found_in_seasons_that_were_run_by_it(thermal: Values) -> None:
+def test_the_rule_is_found_in_seasons_that_were_run_by_it(thermal: Floats) -> None:
     area = run(RULE, thermal, 0.008)
     found = fit_picking(area, thermal, HOUR)
     assert found is not None
@@ -66,7 +65,7 @@ def test_the_rule_is_found_in_seasons_that_were_run_by_it(thermal: Values) -> No
     assert np.abs(again - area).mean() < 0.25 * np.abs(area - smooth(area)).mean()
 
 
-def test_seasons_in_which_nobody_picks_have_no_rule(thermal: Values) -> None:
+def test_seasons_in_which_nobody_picks_have_no_rule(thermal: Floats) -> None:
     assert fit_picking(np.cumsum(np.full(thermal.shape, 0.001), axis=1), thermal, HOUR) is None
 
 

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
+from igrow.core.arrays import Floats, Times
 from igrow.core.errors import IgrowError
 from igrow.core.local_time import to_local
-from igrow.core.telemetry import Times, Values, concatenate
+from igrow.core.telemetry import concatenate
 from igrow.trainer.data.cells import Cells, read_cells
 from igrow.trainer.data.mapping import ColumnMapping, ExportMapping, TimeColumn
 from igrow.trainer.data.number_texts import number
@@ -219,7 +220,7 @@ def times(table: ExportTable, mapping: ExportMapping) -> Times:
     return result
 
 
-def numbers(table: ExportTable, name: str, mapping: ExportMapping, words: Mapping[str, float], ours: str) -> Values:
+def numbers(table: ExportTable, name: str, mapping: ExportMapping, words: Mapping[str, float], ours: str) -> Floats:
     """Return one column as numbers, NaN where it says that there is none; raises IgrowError with the line.
 
     Args:
@@ -247,7 +248,7 @@ def numbers(table: ExportTable, name: str, mapping: ExportMapping, words: Mappin
     return values
 
 
-def quantity(ours: str, table: ExportTable, rule: ColumnMapping, mapping: ExportMapping, time: Times) -> Values:
+def quantity(ours: str, table: ExportTable, rule: ColumnMapping, mapping: ExportMapping, time: Times) -> Floats:
     """Return one of our quantities from the columns that a rule names, in the registry's unit."""
     total = numbers(table, rule.column, mapping, rule.words, ours)
     for further in rule.add:
@@ -257,7 +258,7 @@ def quantity(ours: str, table: ExportTable, rule: ColumnMapping, mapping: Export
     return total * rule.scale + rule.offset
 
 
-def _rates(amounts: Values, kind: str, time: Times, time_zone: str) -> Values:
+def _rates(amounts: Floats, kind: str, time: Times, time_zone: str) -> Floats:
     """Return amounts per second over the interval that ends at each row, in the rows' own order."""
     rates = np.full(len(amounts), np.nan)
     order = np.argsort(time, kind="stable")
@@ -283,7 +284,7 @@ def _read_long(table: ExportTable, mapping: ExportMapping) -> Merged:
     names, values = np.array(table[mapping.long.name]), table[mapping.long.value]
     when = times(table, mapping)
     time = np.unique(when[~np.isnat(when)])
-    columns: dict[str, Values] = {}
+    columns: dict[str, Floats] = {}
     for ours, rule in mapping.columns.items():
         total = np.zeros(len(time))
         for name in (rule.column, *rule.add):

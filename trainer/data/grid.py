@@ -8,11 +8,11 @@ between its rows.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from igrow.core import gaps
+from igrow.core.arrays import Floats, Mask, Times
 from igrow.core.quantities import ACTUATORS, SETPOINTS
-from igrow.core.telemetry import Telemetry, Times, Values, to_grid
+from igrow.core.telemetry import Telemetry, to_grid
 
 WORKING_STEP = 900.0
 """Seconds: the pace of a greenhouse's air; the working step lies as near to it as the log allows."""
@@ -83,7 +83,7 @@ def on_grid(telemetry: Telemetry) -> Telemetry:
     return _with_slow_columns_filled(_snapped(telemetry, step) if divides else _between_rows(telemetry, step))
 
 
-def interval_means(values: Values, counted: NDArray[np.bool_], rows: int) -> tuple[Values, NDArray[np.bool_]]:
+def interval_means(values: Floats, counted: Mask, rows: int) -> tuple[Floats, Mask]:
     """Return the means over intervals of `rows` rows along the last axis, of the rows that count, and which count.
 
     An interval counts from half of its rows on; else its mean is 0.
@@ -99,7 +99,7 @@ def interval_means(values: Values, counted: NDArray[np.bool_], rows: int) -> tup
     cut = np.broadcast_to(values, present.shape[:-2] + values.shape[-1:])[..., : whole * rows].reshape(present.shape)
     number = present.sum(axis=-1)
     enough = number >= HALF * rows
-    means: Values = np.where(enough, np.where(present, cut, 0.0).sum(axis=-1) / np.maximum(number, 1), 0.0)
+    means: Floats = np.where(enough, np.where(present, cut, 0.0).sum(axis=-1) / np.maximum(number, 1), 0.0)
     return means, enough
 
 
@@ -129,7 +129,7 @@ def _between_rows(telemetry: Telemetry, step: float) -> Telemetry:
     first = np.ceil(seconds[0] / wide) * wide
     grid = np.arange(first, seconds[-1] + 1.0, wide)
     minutes = grid[:, None] + np.arange(0.0, wide, 60.0)
-    columns: dict[str, Values] = {}
+    columns: dict[str, Floats] = {}
     for name, values in telemetry.columns.items():
         there = np.isfinite(values)
         known, given = seconds[there], values[there]
@@ -150,7 +150,7 @@ def _between_rows(telemetry: Telemetry, step: float) -> Telemetry:
 
 def _with_slow_columns_filled(table: Telemetry) -> Telemetry:
     """Return the table with columns that were written at a slower pace, of an hour at most, filled between."""
-    filled: dict[str, Values] = {}
+    filled: dict[str, Floats] = {}
     step = table.step
     for name, values in table.columns.items():
         known = np.flatnonzero(np.isfinite(values))

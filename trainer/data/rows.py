@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from igrow.core.telemetry import Telemetry, Times, Values, from_rows
+from igrow.core.arrays import Floats, Times
+from igrow.core.telemetry import Telemetry, from_rows
 from igrow.trainer.data.fault import DataFault
 
 COMPARED = ("air_temperature", "outdoor_temperature", "air_humidity", "air_co2", "global_radiation")
@@ -30,7 +30,7 @@ class Merged:
     faults: tuple[DataFault, ...] = ()
 
 
-def merge(time: Times, columns: Mapping[str, Values]) -> Merged:
+def merge(time: Times, columns: Mapping[str, Floats]) -> Merged:
     """Return rows in any order as a table in time, with what had to be done for it.
 
     Of rows with one time a later one wins, as in the telemetry format; several columns' readings in rows of their own
@@ -86,7 +86,7 @@ def without_strays(telemetry: Telemetry) -> tuple[Telemetry, tuple[str, ...]]:
     return table, (f"{len(lost)} rows stand months away from all others ({when}): set aside",)
 
 
-def _contradiction(time: Times, columns: Mapping[str, Values], table: Telemetry) -> str | None:
+def _contradiction(time: Times, columns: Mapping[str, Floats], table: Telemetry) -> str | None:
     """Return how rows of one time differ, where they do so by far more than a row does from the next."""
     order = np.argsort(time, kind="stable")
     same = np.flatnonzero(np.diff(time[order].astype(np.int64)) == 0)
@@ -114,7 +114,7 @@ _RESOLUTION = {
 """Differences below are nothing, whatever the pace of the log."""
 
 
-def _median_step(values: NDArray[np.float64]) -> float | None:
+def _median_step(values: Floats) -> float | None:
     steps = np.abs(np.diff(values))
     steps = steps[np.isfinite(steps)]
     return float(np.median(steps)) if len(steps) else None

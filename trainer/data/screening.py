@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats, Mask, Times
 from igrow.core.quantities import QUANTITIES
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data.fault import DataFault
-
-Floats = NDArray[np.float64]
 
 STUCK_HOURS: Mapping[str, float] = {
     "air_temperature": 6.0,
@@ -117,7 +115,7 @@ def screen(telemetry: Telemetry) -> Screening:
     return Screening(Telemetry(telemetry.time, columns), tuple(found), tuple(faults), tuple(notes))
 
 
-def outage_rows(telemetry: Telemetry) -> NDArray[np.bool_]:
+def outage_rows(telemetry: Telemetry) -> Mask:
     """Tell in which rows every climate sensor that the log has reads exactly 0, at least two of them, (n,)."""
     rows = np.ones(len(telemetry), dtype=bool)
     zeros = np.zeros(len(telemetry), dtype=np.int64)
@@ -126,7 +124,7 @@ def outage_rows(telemetry: Telemetry) -> NDArray[np.bool_]:
             values = telemetry[name]
             rows &= ~(np.abs(values) > 0.0)
             zeros += values == 0.0
-    found: NDArray[np.bool_] = rows & (zeros >= 2)
+    found: Mask = rows & (zeros >= 2)
     return found
 
 
@@ -138,7 +136,7 @@ def _sentence(name: str, reason: str, count: int, stretches: Sequence[Screened])
     return f"{name}: {count} reading{'s' * (count > 1)} {when} UTC set aside: {reason}"
 
 
-def _spikes(values: Floats, size: float) -> NDArray[np.bool_]:
+def _spikes(values: Floats, size: float) -> Mask:
     rows = np.zeros(len(values), dtype=bool)
     if len(values) > 2:
         before, after = values[1:-1] - values[:-2], values[1:-1] - values[2:]
@@ -154,7 +152,7 @@ def _resolution(values: Floats) -> float:
     return float(np.quantile(change, 0.02)) if len(change) else 0.0
 
 
-def _stuck(time: NDArray[np.datetime64], values: Floats, hours: float, *, saturated: bool) -> NDArray[np.bool_]:
+def _stuck(time: Times, values: Floats, hours: float, *, saturated: bool) -> Mask:
     rows = np.zeros(len(values), dtype=bool)
     known = np.flatnonzero(np.isfinite(values))
     if len(known) < 2:
@@ -168,6 +166,6 @@ def _stuck(time: NDArray[np.datetime64], values: Floats, hours: float, *, satura
     return rows & np.isfinite(values)
 
 
-def _stretches(rows: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def _stretches(rows: Mask) -> list[tuple[int, int]]:
     edges = np.flatnonzero(np.diff(np.concatenate([[0], rows.astype(np.int8), [0]])))
     return [(int(first), int(end) - 1) for first, end in zip(edges[::2], edges[1::2], strict=True)]

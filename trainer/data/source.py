@@ -5,21 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
+from igrow.core.arrays import Floats, Times
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data.fault import DataFault
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class DailyTable:
     """A small table of local calendar days."""
 
-    day: NDArray[np.datetime64]
+    day: Times
     """datetime64[D], strictly increasing, (n,)."""
     columns: Mapping[str, Floats]
     """By name, (n,), NaN where missing."""

@@ -9,12 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from igrow.core import sun
+from igrow.core.arrays import Integers, Mask, Times
 from igrow.core.simulator.hybrid.record import Record
-
-Mask = NDArray[np.bool_]
 
 PERIOD, HELD_OUT = 8, 2
 _FIRST = 3
@@ -25,9 +23,9 @@ _FIRST = 3
 class DaySplit:
     """Days of a record."""
 
-    day: NDArray[np.int64]
+    day: Integers
     """Index of the local solar day of each row, from 0, (n,)."""
-    fit: NDArray[np.bool_]
+    fit: Mask
     """Days for fitting, (days,)."""
 
     @property
@@ -36,9 +34,9 @@ class DaySplit:
         return len(self.fit)
 
     @property
-    def fit_rows(self) -> NDArray[np.bool_]:
+    def fit_rows(self) -> Mask:
         """Rows that may be fitted, (n,)."""
-        rows: NDArray[np.bool_] = self.fit[self.day]
+        rows: Mask = self.fit[self.day]
         return rows
 
 
@@ -63,13 +61,13 @@ class WeekSplit:
     held_out: Mask
 
 
-def weeks(time: NDArray[np.datetime64]) -> NDArray[np.int64]:
+def weeks(time: Times) -> Integers:
     """Return the week of each row counted from the first row, (n,)."""
-    number: NDArray[np.int64] = (time - time[0]).astype("timedelta64[s]").astype(np.int64) // 604_800
+    number: Integers = (time - time[0]).astype("timedelta64[s]").astype(np.int64) // 604_800
     return number
 
 
-def alternate_weeks(time: NDArray[np.datetime64]) -> WeekSplit:
+def alternate_weeks(time: Times) -> WeekSplit:
     """Return every fourth week held out and the one before it for selection, for logs of few weeks."""
     phase = weeks(time) % 4
     held_out, selection = phase == 3, phase == 2

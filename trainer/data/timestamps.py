@@ -12,8 +12,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from igrow.core.arrays import Times
 from igrow.core.local_time import from_local
-from igrow.core.telemetry import Times
 from igrow.trainer.data.vocabulary import folded, month_names, weekday_names
 from igrow.trainer.data.zone_abbreviations import ahead_of_utc, split
 

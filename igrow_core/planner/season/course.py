@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats
 from igrow.core.economics import Balance, harvest_income, local_days, running_costs
 from igrow.core.greenhouse import tomato
 from igrow.core.greenhouse.parameters import GreenhouseParameters
@@ -18,7 +19,6 @@ from igrow.core.planner.template import Setpoints, Template, for_site
 from igrow.core.quantities import WEATHER
 from igrow.core.site import Site
 
-Values = NDArray[np.float64]
 DAY = np.timedelta64(86_400, "s")
 STRETCH = 10
 """Days whose weather is lived as two typical days, each for half of them."""
@@ -40,7 +40,7 @@ class Season:
     start: np.datetime64
     """UTC of the first day's local midnight."""
     days: int
-    weather: Values
+    weather: Floats
     """Of typical days, (T, 24, 6): the first stands for the first `every` days, and so on."""
     every: int
     """Days for which a typical one stands; the last for those that are left."""
@@ -60,13 +60,13 @@ class SeasonOutcome:
     """What B strategies bring, EUR m-2; net profit counts only fruit that was ripe and harvested."""
 
     balance: Balance
-    harvest: Values
+    harvest: Floats
     """kg m-2, (B,)."""
-    penalty: Values
+    penalty: Floats
     """For leaving the range of the training data, EUR m-2, (B,)."""
     crop: Crop
     """At the end."""
-    used: dict[str, Values]
+    used: dict[str, Floats]
     """heat (MJ m-2), electricity (kWh m-2), co2 and net_growth (kg m-2), (B,)."""
     crops: tuple[Crop, ...]
     """Where each typical day's stretch begins."""
@@ -123,7 +123,7 @@ def run_season(season: Season, strategy: Strategy, genes: NDArray[np.float32], c
     return SeasonOutcome(total, fresh(p, plants) - planted, penalty, plants, used, tuple(crops))
 
 
-def typical_days(days: Values) -> Values:
+def typical_days(days: Floats) -> Floats:
     """Return the typical cold and the typical mild one of days (D, 24, 6), (2, 24, 6).
 
     Heat is needed on cold days alone, so that a mean day needs less than days do on the mean. Days are halved by their
@@ -135,21 +135,21 @@ def typical_days(days: Values) -> Values:
     return np.stack([_nearest(days[order[:half]]), _nearest(days[order[-half:]])])
 
 
-def _nearest(days: Values) -> Values:
+def _nearest(days: Floats) -> Floats:
     """Return the one of days (D, 24, 6) that is nearest to their mean in warmth, sun and wind, (24, 6)."""
     means = days.mean(axis=1)
     away = ((means - means.mean(axis=0)) / np.maximum(means.std(axis=0), 1e-9))[:, [OUTDOOR, RADIATION, WIND]]
-    day: Values = days[int(np.argmin((away**2).sum(axis=1)))]
+    day: Floats = days[int(np.argmin((away**2).sum(axis=1)))]
     return day
 
 
-def believed(outcome: Outcome) -> Values:
+def believed(outcome: Outcome) -> Floats:
     """Return the net growth (B, H) of the first member, less of it outside of the training data."""
     return np.asarray(outcome.net_growth[0] * np.clip(1.0 - DISBELIEF * outcome.outside[0], 0.0, 1.0))
 
 
 def _typical_day(
-    season: Season, strategy: Strategy, genes: NDArray[np.float32], day: int, start: np.datetime64, weather: Values
+    season: Season, strategy: Strategy, genes: NDArray[np.float32], day: int, start: np.datetime64, weather: Floats
 ) -> Outcome:
     # The day before is like it: the night that ends in the morning has had its dark hours, or has not, and air and
     # floor begin as warm as the strategy leaves them. A morning that is the same for all gives to a cool strategy, for
@@ -162,7 +162,7 @@ def _typical_day(
 
 
 def asked(
-    strategy: Strategy, genes: NDArray[np.float32], day: float, template: Template, weather: Values, recipe: Setpoints
+    strategy: Strategy, genes: NDArray[np.float32], day: float, template: Template, weather: Floats, recipe: Setpoints
 ) -> Setpoints:
     """Return what strategies ask of a day, (B, 24, 4), whose hours are the first 24 of a template."""
     moments = template.moments[:24]

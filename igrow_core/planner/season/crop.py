@@ -7,13 +7,11 @@ that may be full and fruit that may be young: `igrow.core.greenhouse.tomato`, in
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats
 from igrow.core.greenhouse import tomato
 from igrow.core.greenhouse.parameters import GreenhouseParameters
 from igrow.core.greenhouse.tomato import Crop
-
-Values = NDArray[np.float64]
 
 HOURS = 3
 """Hours of a step."""
@@ -26,7 +24,7 @@ REFERENCE_LEAF_AREA = 3.0
 """Leaf area index of the crop whose maintenance a simulator's growth has paid."""
 
 
-def supplied(p: GreenhouseParameters, net_growth: Values, air_temperature: Values) -> Values:
+def supplied(p: GreenhouseParameters, net_growth: Floats, air_temperature: Floats) -> Floats:
     """Return the carbohydrate that the reference crop took up behind a net growth in kg m-2 an hour, (B, H).
 
     What it kept, what its maintenance took, and what growing cost.
@@ -44,7 +42,7 @@ def supplied(p: GreenhouseParameters, net_growth: Values, air_temperature: Value
     return np.asarray(np.maximum((1.0 + GROWTH_COST) * (net_growth + maintenance), 0.0))
 
 
-def live(p: GreenhouseParameters, crop: Crop, supply: Values, air_temperature: Values, leaf_area: Values) -> Crop:
+def live(p: GreenhouseParameters, crop: Crop, supply: Floats, air_temperature: Floats, leaf_area: Floats) -> Crop:
     """Return the crops (B,) after hours with a supply, an air temperature and a leaf area index of (B, H) each.
 
     The leaves are those with which a simulator gave the supply: a crop of more takes up more light than they did.
@@ -58,12 +56,12 @@ def live(p: GreenhouseParameters, crop: Crop, supply: Values, air_temperature: V
     return crop
 
 
-def intercepted(leaf_area: Values) -> Values:
+def intercepted(leaf_area: Floats) -> Floats:
     """Return which part of the light a canopy of a leaf area index takes, 0 to 1."""
     return np.asarray(1.0 - np.exp(-INTERCEPTION * leaf_area))
 
 
-def _step(p: GreenhouseParameters, crop: Crop, full: Values, temperature: Values, seconds: float) -> Crop:
+def _step(p: GreenhouseParameters, crop: Crop, full: Floats, temperature: Floats, seconds: float) -> Crop:
     """Return the crops after a step in which a canopy that takes all light would take up `full`, kg m-2."""
     light = intercepted(tomato.leaf_area_index(p, crop))
     assimilated = full * light * tomato.assimilation_share(np, crop)
@@ -83,13 +81,13 @@ def _step(p: GreenhouseParameters, crop: Crop, full: Values, temperature: Values
 def like(crop: Crop, count: int) -> Crop:
     """Return `count` crops equal to one."""
 
-    def one(value: object) -> NDArray[np.float64]:
+    def one(value: object) -> Floats:
         array = np.asarray(value, dtype=np.float64)
         return np.repeat(array.reshape(*array.shape[: array.ndim], 1), count, axis=-1)
 
     return Crop(*(one(value) for value in crop))
 
 
-def fresh(p: GreenhouseParameters, crop: Crop) -> Values:
+def fresh(p: GreenhouseParameters, crop: Crop) -> Floats:
     """Return the fresh fruit harvested so far, kg m-2, (B,)."""
     return np.asarray(crop.harvested / p.fruit_dry_matter)

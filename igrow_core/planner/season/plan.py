@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats
 from igrow.core.bundle import Bundle, BundleError
 from igrow.core.greenhouse import tomato
 from igrow.core.greenhouse.described import parameters_of
@@ -25,7 +26,6 @@ from igrow.core.planner.season.worth import CropWorth, MarginalValues, marginal_
 from igrow.core.planner.template import Setpoints, Template
 from igrow.core.site import Site
 
-Values = NDArray[np.float64]
 Genes = NDArray[np.float32]
 
 SEASON_FILE = "season.json"
@@ -50,7 +50,7 @@ class SeasonPlan:
     values: tuple[MarginalValues, ...]
     crops: tuple[Crop, ...]
     """As they are expected, one crop each: floats, and (STAGES,) for fruit."""
-    weather: Values
+    weather: Floats
     """Of each date's typical day, a cold and a mild one in turn, hourly means in the registry's order, (D, 24, 6)."""
 
     @property
@@ -71,7 +71,7 @@ class SeasonPlan:
         said = self.strategy.numbers(self.genes[None], self.day_of(time))
         return {name: float(value[0]) for name, value in said.items()}
 
-    def setpoints(self, template: Template, weather: Values, recipe: Setpoints, time: np.datetime64) -> Setpoints:
+    def setpoints(self, template: Template, weather: Floats, recipe: Setpoints, time: np.datetime64) -> Setpoints:
         """Return what the strategy asks of a horizon of whole days from a UTC time on, (H, 4), before any limit.
 
         Args:
@@ -89,7 +89,7 @@ class SeasonPlan:
             days.append(self.strategy.setpoints(self.genes[None], day, clock, sun_up, weather[hours], recipe[hours])[0])
         return np.concatenate(days)
 
-    def typical_weather(self, time: np.datetime64, hours: int) -> Values:
+    def typical_weather(self, time: np.datetime64, hours: int) -> Floats:
         """Return the weather that is usual from a UTC time on, (hours, 6): the mean of the stretch's two days."""
         ahead = time + np.arange(hours) * np.timedelta64(3600, "s")
         since = ((ahead - self.start) / np.timedelta64(3600, "s")).astype(np.int64)

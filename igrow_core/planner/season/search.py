@@ -7,25 +7,25 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats
 from igrow.core.greenhouse.tomato import Crop
 from igrow.core.planner.evolution import WORST, EvolutionSettings, NumpyGeneration, draw
 from igrow.core.planner.season.course import Season, run_season
 from igrow.core.planner.season.strategy import Strategy
 
-Values = NDArray[np.float64]
 Genes = NDArray[np.float32]
 SETTINGS = EvolutionSettings(parents=24, offspring=48)
 GENERATIONS = 36
 """Of 48 simulated seasons each; in twice as many the best strategy gained less than one percent."""
 NEAR = 0.1
 """Standard deviation of the first candidates about what is known, as part of a gene's range."""
-Search = Callable[[Callable[[Genes], Values], int, int, int, Genes | None], tuple[Genes, list[float]]]
+Search = Callable[[Callable[[Genes], Floats], int, int, int, Genes | None], tuple[Genes, list[float]]]
 
 
-def worth_of(season: Season, strategy: Strategy, crop: Crop) -> Callable[[Genes], Values]:
+def worth_of(season: Season, strategy: Strategy, crop: Crop) -> Callable[[Genes], Floats]:
     """Return what candidates (B, G) of a strategy are worth in a season from a crop on, EUR m-2, (B,)."""
 
-    def value(genes: Genes) -> Values:
+    def value(genes: Genes) -> Floats:
         outcome = run_season(season, strategy, genes, crop)
         return np.asarray(outcome.balance.net_profit - outcome.penalty)
 
@@ -33,7 +33,7 @@ def worth_of(season: Season, strategy: Strategy, crop: Crop) -> Callable[[Genes]
 
 
 def genetic(
-    value: Callable[[Genes], Values], genes: int, generations: int, seed: int, first: Genes | None = None
+    value: Callable[[Genes], Floats], genes: int, generations: int, seed: int, first: Genes | None = None
 ) -> tuple[Genes, list[float]]:
     """Return the best genes (G,) by the elitist genetic algorithm, and the best value after each generation."""
     rng, step = np.random.default_rng(seed), NumpyGeneration(SETTINGS)

@@ -12,10 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats, Mask
 from igrow.core.planner.template import Setpoints
 from igrow.core.quantities import SETPOINTS, WEATHER
-
-Values = NDArray[np.float64]
 
 RANGES = {
     "day_temperature": (17.0, 24.0),
@@ -58,7 +57,7 @@ class Strategy:
         """Number of genes."""
         return len(RANGES) * self.knots + self.ends
 
-    def numbers(self, genes: NDArray[np.float32], day: float) -> dict[str, Values]:
+    def numbers(self, genes: NDArray[np.float32], day: float) -> dict[str, Floats]:
         """Return the numbers of `RANGES` by name on a day counted from the season's first, (B,) each."""
         knots = genes[:, : len(RANGES) * self.knots].astype(np.float64).reshape(len(genes), len(RANGES), self.knots)
         place = min(max(day / max(self.days - 1, 1), 0.0), 1.0) * (self.knots - 1)
@@ -85,9 +84,9 @@ class Strategy:
         self,
         genes: NDArray[np.float32],
         day: float,
-        local_hour: Values,
-        sun_up: NDArray[np.bool_],
-        weather: Values,
+        local_hour: Floats,
+        sun_up: Mask,
+        weather: Floats,
         recipe: Setpoints,
     ) -> Setpoints:
         """Return a day's setpoints (B, H, 4), before any limit.

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats, Times
 from igrow.core.economics import local_days, product_price
 from igrow.core.greenhouse.parameters import GreenhouseParameters
 from igrow.core.greenhouse.tomato import STAGES, Crop
@@ -21,7 +22,6 @@ from igrow.core.planner.season.crop import fresh, like, live, supplied
 from igrow.core.planner.season.strategy import Strategy
 from igrow.core.site import Site
 
-Values = NDArray[np.float64]
 STEP = 0.1
 """Relative step of the differences; a pool that is empty takes a gram."""
 LEAST = 1e-3
@@ -33,7 +33,7 @@ class MarginalValues:
 
     buffer: float
     leaf: float
-    fruit: Values
+    fruit: Floats
     """By stage from the youngest on, (20,)."""
 
 
@@ -64,7 +64,7 @@ class CropWorth:
     """As it stands when the horizon begins."""
     values: MarginalValues
 
-    def income(self, outcome: Outcome, time: NDArray[np.datetime64]) -> Values:
+    def income(self, outcome: Outcome, time: Times) -> Floats:
         """Return EUR m-2 over the horizon, (M, B)."""
         members, count, hours = outcome.net_growth.shape
         grown = outcome.net_growth * np.clip(1.0 - DISBELIEF * outcome.outside, 0.0, 1.0)

@@ -6,14 +6,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats, Times
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.core.simulator.hybrid.record import Record, make_record
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
-
-Floats = NDArray[np.float64]
 
 _REFERENCE = Site(name="reference", latitude=0.0, longitude=0.0).greenhouse
 """The greenhouse that the values of `PARAMETERS` were written down for."""
@@ -65,7 +63,7 @@ def _within_bounds(values: Mapping[str, float]) -> dict[str, float]:
     return {name: float(np.clip(value, PARAMETERS[name].low, PARAMETERS[name].high)) for name, value in values.items()}
 
 
-def leaf_area_curve(site: Site, time: NDArray[np.datetime64]) -> Floats:
+def leaf_area_curve(site: Site, time: Times) -> Floats:
     """Return an estimate of the leaf area index over time, (n,), from the species and the planting date.
 
     A logistic rise; a planting date that the log does not follow within a year counts as a full canopy.

@@ -10,17 +10,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from igrow.core import gaps, sun
-from igrow.core.arrays import Array
+from igrow.core.arrays import Array, Floats, Integers, Mask, Times
 from igrow.core.effects import EFFECTS
 from igrow.core.effects.definition import Values
 from igrow.core.simulator.hybrid import climate, measurement
 from igrow.core.simulator.hybrid.climate import ActiveEffects, memory_name
 from igrow.core.telemetry import Telemetry, to_grid
-
-Floats = NDArray[np.float64]
 
 LONGEST_FILL = 1800.0
 """Inputs are bridged over gaps of at most this many seconds; longer ones make their rows unusable."""
@@ -57,14 +54,14 @@ _SKY_BELOW_AIR = 12.0
 class Record:
     """A log on a regular grid of n rows."""
 
-    time: NDArray[np.datetime64]
+    time: Times
     step: float
     """Seconds between rows."""
     inputs: Mapping[str, Floats]
     """What drives the balances and the effects from each row to the next, by name, (n,), without gaps."""
     measured: Mapping[str, Floats]
     """`measurement.PREDICTED` by name, (n,), NaN where missing."""
-    usable: NDArray[np.bool_]
+    usable: Mask
     """The inputs of this row were measured, or bridged over a short gap, (n,)."""
     missing: tuple[str, ...]
     """Inputs that the log lacks."""
@@ -198,7 +195,7 @@ def observe(record: Record, parameters: Values, effects: ActiveEffects) -> dict[
 def free_run(
     record: Record,
     states: Mapping[str, Floats],
-    starts: Sequence[int] | NDArray[np.int64],
+    starts: Sequence[int] | Integers,
     steps: int,
     parameters: Values,
     effects: ActiveEffects,
@@ -250,7 +247,7 @@ def free_run(
     return {name: np.stack(np.broadcast_arrays(*values)) for name, values in shown.items()}
 
 
-def complete_starts(record: Record, steps: int, every: int) -> NDArray[np.int64]:
+def complete_starts(record: Record, steps: int, every: int) -> Integers:
     """Return the rows, `every` apart, from which `steps` rows can be run on usable inputs.
 
     The climate must have been measured in the start row itself.
@@ -260,7 +257,7 @@ def complete_starts(record: Record, steps: int, every: int) -> NDArray[np.int64]
     starts = np.arange(0, len(record) - steps, every)
     whole = bad[starts + steps] - bad[starts] == 0
     measured_at_start = np.all([np.isfinite(values[starts]) for values in _given(record)], axis=0)
-    chosen: NDArray[np.int64] = starts[whole & measured_at_start]
+    chosen: Integers = starts[whole & measured_at_start]
     return chosen
 
 
@@ -278,7 +275,7 @@ def _corrected(
     return measurement.correct_inputs(np, inputs, drivers, state, effects)
 
 
-def _at_rows(effects: ActiveEffects, rows: NDArray[np.int64], count: int) -> ActiveEffects:
+def _at_rows(effects: ActiveEffects, rows: Integers, count: int) -> ActiveEffects:
     """Pick the rows of values that are functions of time."""
     return {
         effect: {
@@ -293,7 +290,7 @@ def _present(table: Telemetry, name: str) -> bool:
     return name in table and bool(np.isfinite(table[name]).any())
 
 
-def _bridge(values: Floats, longest: int, *, smooth: bool) -> tuple[Floats, NDArray[np.bool_]]:
+def _bridge(values: Floats, longest: int, *, smooth: bool) -> tuple[Floats, Mask]:
     """Fill gaps (linearly or by the last value) and tell which rows were measured or lay in a gap of <= longest."""
     return (gaps.interpolated if smooth else gaps.held)(values), gaps.short_gaps(values, longest)
 

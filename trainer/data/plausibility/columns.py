@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import numpy as np
-from numpy.typing import NDArray
 
 from igrow.core import sun
+from igrow.core.arrays import Floats, Integers
 from igrow.core.quantities import difference_with_unit
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data.fault import DataFault, Remedy
-
-Floats = NDArray[np.float64]
 
 SWAPPED_ALIKE = 3.0
 """K by which the nights outside are warmer than those inside, in columns that stand in each other's place."""
@@ -71,7 +69,7 @@ def _inside_out(telemetry: Telemetry, site: Site) -> list[DataFault]:
     return []
 
 
-def _by_day(day: NDArray[np.int64], values: Floats) -> Floats:
+def _by_day(day: Integers, values: Floats) -> Floats:
     """Return the mean of each day, (days,), NaN without a reading."""
     if len(day) == 0:
         return np.empty(0)

@@ -7,16 +7,14 @@ warmer than the air below it, a pipe at rest that is far warmer than its greenho
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from igrow.core import sun
+from igrow.core.arrays import Floats
 from igrow.core.quantities import difference_with_unit, with_unit
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data.fault import DataFault, Remedy
 from igrow.trainer.data.plausibility.units import FAHRENHEIT, LEAST_VALUES, PIPES, RELATIVE_IN_PER_CENT, changed
-
-Floats = NDArray[np.float64]
 
 LAG_DAYS = 30
 """By which the seasons of the air follow the sun."""

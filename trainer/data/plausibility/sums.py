@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from igrow.core.telemetry import Telemetry, Times
+from igrow.core.arrays import Floats, Times
+from igrow.core.telemetry import Telemetry
 from igrow.trainer.data.fault import DataFault
 
 RATES = ("co2_dosing", "irrigation")
 
 
-def running_sum(time: Times, values: NDArray[np.float64]) -> Literal["day", "total"] | None:
+def running_sum(time: Times, values: Floats) -> Literal["day", "total"] | None:
     """Return ``day`` for a sum that starts anew about once a day, ``total`` for one that never does, else None.
 
     A sum hardly ever falls, and where it does it falls to about nothing.

@@ -14,14 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from igrow.core import sun
+from igrow.core.arrays import Floats, Integers, Mask, Times
 from igrow.core.local_time import from_local, to_local
 from igrow.core.site import Site
-from igrow.core.telemetry import Telemetry, Times
+from igrow.core.telemetry import Telemetry
 from igrow.trainer.data.fault import DataFault, Remedy
 from igrow.trainer.data.grid import own_step
 from igrow.trainer.data.plausibility.sums import running_sum
-
-Floats = NDArray[np.float64]
 
 CLOCK = ("clock", "local_time", "no_daylight")
 """Faults after which nothing can be said of day and night."""
@@ -52,7 +51,7 @@ _ZONES = ("Europe/Amsterdam", "America/New_York", "Australia/Sydney", "America/S
 class _Daylight:
     """Radiation by complete days."""
 
-    day: NDArray[np.int64]
+    day: Integers
     """Local mean solar day, from 1970, (d,)."""
     vector: NDArray[np.complex128]
     """Sum of the radiation, each row at the angle of its solar hour, (d,)."""
@@ -61,12 +60,12 @@ class _Daylight:
     length: Floats
     """Of the mean vector of what would come without air, (d,)."""
 
-    def offset(self, chosen: NDArray[np.bool_] | None = None) -> float:
+    def offset(self, chosen: Mask | None = None) -> float:
         """Return the hours by which noon comes late by the log's clock, -12 to 12."""
         vector = self.vector if chosen is None else self.vector[chosen]
         return float(np.angle(-vector.sum()) * 12.0 / np.pi)
 
-    def error(self, chosen: NDArray[np.bool_] | None = None) -> float:
+    def error(self, chosen: Mask | None = None) -> float:
         """Return the standard error of the offset over days, weighted as the offset is."""
         vector = self.vector if chosen is None else self.vector[chosen]
         whole = vector.sum()
@@ -123,7 +122,7 @@ def _daylight(time: Times, values: Floats, site: Site) -> _Daylight:
     return _Daylight(first + np.flatnonzero(whole), vector[whole], total[whole], length)
 
 
-def _complex_sum(index: NDArray[np.int64], values: NDArray[np.complex128], count: int) -> NDArray[np.complex128]:
+def _complex_sum(index: Integers, values: NDArray[np.complex128], count: int) -> NDArray[np.complex128]:
     return np.asarray(
         np.bincount(index, weights=values.real, minlength=count)
         + 1j * np.bincount(index, weights=values.imag, minlength=count)

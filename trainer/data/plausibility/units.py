@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats
 from igrow.core.quantities import QUANTITIES
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data.fault import DataFault, Remedy
-
-Floats = NDArray[np.float64]
 
 TEMPERATURES = ("air_temperature", "outdoor_temperature", "sky_temperature", "heating_setpoint")
 PIPES = ("rail_pipe_temperature", "grow_pipe_temperature")

@@ -11,13 +11,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats, Times
 from igrow.core.errors import IgrowError
 from igrow.trainer.data.public import challenge, excel_tables
 from igrow.trainer.data.source import DailyTable, Source
-
-Floats = NDArray[np.float64]
 
 _CLIMATE = ("Greenhouse_climate", "GreenhouseClimate")
 _LAMP_POWER = 117.0
@@ -58,7 +56,7 @@ def read(folder: Path, compartment: str | None = None) -> Source:
     return Source(f"agc2018 {name}", telemetry, _harvests(folder / name), _resources(folder / name), site, tuple(notes))
 
 
-def _setpoints(folder: Path, local: NDArray[np.datetime64], columns: dict[str, Floats]) -> list[str]:
+def _setpoints(folder: Path, local: Times, columns: dict[str, Floats]) -> list[str]:
     path = excel_tables.find(folder, "vip")
     if path is None:
         return ["no setpoints are known"]

@@ -14,13 +14,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats, Times
 from igrow.core.errors import IgrowError
 from igrow.trainer.data.public import challenge, excel_tables, traps
 from igrow.trainer.data.source import DailyTable, Source
-
-Floats = NDArray[np.float64]
 
 _CLIMATE = ("GreenhouseClimate", "Greenhouse_climate")
 _HPS_POWER = 81.0
@@ -70,7 +68,7 @@ def read(folder: Path, compartment: str | None = None) -> Source:
     return Source(f"agc2019 {name}", telemetry, harvests, resources, site, notes)
 
 
-def _lamps_and_doses(table: Any, local: NDArray[np.datetime64]) -> dict[str, Floats]:
+def _lamps_and_doses(table: Any, local: Times) -> dict[str, Floats]:
     columns: dict[str, Floats] = {}
     hps = excel_tables.column(table, "AssimLight")
     if hps is not None:
@@ -92,7 +90,7 @@ def _lamps_and_doses(table: Any, local: NDArray[np.datetime64]) -> dict[str, Flo
     return columns
 
 
-def _rate(since_midnight: Floats, local: NDArray[np.datetime64]) -> Floats:
+def _rate(since_midnight: Floats, local: Times) -> Floats:
     """Return what each row adds to a sum that starts anew every midnight."""
     before = np.concatenate([[0.0], since_midnight[:-1]])
     same_day = np.concatenate([[False], local[1:].astype("datetime64[D]") == local[:-1].astype("datetime64[D]")])

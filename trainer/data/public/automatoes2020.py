@@ -12,11 +12,9 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats, Times
 from igrow.core.errors import IgrowError
-
-Values = NDArray[np.float64]
 
 WORKBOOK = "HarvestAndIncomeAutomatoes.xlsx"
 SIMULATED = "Automatoes_wursimres.csv"
@@ -27,11 +25,11 @@ _PROFIT_COLUMN = 12
 class Champion:
     """Cumulative net profit of the champion's crop by day, EUR m-2."""
 
-    day: NDArray[np.datetime64]
+    day: Times
     """(days,) datetime64[D]."""
-    measured: Values
+    measured: Floats
     """By the books of the challenge, plants included, (days,)."""
-    simulated: Values
+    simulated: Floats
     """Wageningen's simulator on the champion's settings, plants not included, (days,)."""
 
 

@@ -8,17 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from igrow.core.air import STEFAN_BOLTZMANN
+from igrow.core.arrays import Floats, Mask, Times
 from igrow.core.errors import IgrowError
 from igrow.core.local_time import from_local
 from igrow.core.site import Site, load_site
 from igrow.core.telemetry import Telemetry, from_rows
 from igrow.trainer.data.public import excel_tables, traps
 from igrow.trainer.data.source import DailyTable
-
-Floats = NDArray[np.float64]
 
 TIME_ZONE = "Europe/Amsterdam"
 STEP = 300.0
@@ -103,7 +101,7 @@ def climate(frame: Any) -> dict[str, Floats]:
     return columns
 
 
-def to_telemetry(local: NDArray[np.datetime64], columns: Mapping[str, Floats], empty: NDArray[np.bool_]) -> Telemetry:
+def to_telemetry(local: Times, columns: Mapping[str, Floats], empty: Mask) -> Telemetry:
     """Return telemetry in UTC of rows in wall time; rows that are `empty` or at times that never were are dropped."""
     time = from_local(local, TIME_ZONE)
     keep = ~np.isnat(time) & ~empty

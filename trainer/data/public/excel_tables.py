@@ -7,11 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats, Times
 from igrow.core.errors import IgrowError
-
-Floats = NDArray[np.float64]
 
 _ENDINGS = (".csv.gz", ".csv", ".parquet")
 _EPOCH = np.datetime64("1899-12-30T00:00:00", "s")
@@ -64,7 +62,7 @@ def column(frame: Any, *names: str) -> Floats | None:
     return None
 
 
-def excel_times(serial: Floats, path: Path) -> NDArray[np.datetime64]:
+def excel_times(serial: Floats, path: Path) -> Times:
     """Return Excel days as wall time, datetime64[s], rounded to 5 minutes."""
     if not np.isfinite(serial).all():
         line = int(np.flatnonzero(~np.isfinite(serial))[0]) + 2
@@ -72,9 +70,7 @@ def excel_times(serial: Floats, path: Path) -> NDArray[np.datetime64]:
     return _EPOCH + (np.round(serial * 288.0) * 300.0).astype("timedelta64[s]")
 
 
-def excel_days(serial: Floats) -> NDArray[np.datetime64]:
+def excel_days(serial: Floats) -> Times:
     """Return Excel days as calendar days, datetime64[D]."""
-    days: NDArray[np.datetime64] = (_EPOCH + (np.floor(serial + 1e-6) * 86_400.0).astype("timedelta64[s]")).astype(
-        "datetime64[D]"
-    )
+    days: Times = (_EPOCH + (np.floor(serial + 1e-6) * 86_400.0).astype("timedelta64[s]")).astype("datetime64[D]")
     return days

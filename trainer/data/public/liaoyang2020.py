@@ -12,11 +12,9 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats, Times
 from igrow.core.errors import IgrowError
-
-Values = NDArray[np.float64]
 
 AREA = 667.0
 """m2 of each greenhouse."""
@@ -33,11 +31,11 @@ _QUANTITIES = {"AirT": "air_temperature", "AirRH": "air_humidity", "AirCO2": "ai
 class Pilot:
     """What seven greenhouses gave and cost, per m2 of greenhouse."""
 
-    day: NDArray[np.datetime64]
+    day: Times
     """(days,) datetime64[D]."""
-    production: Mapping[str, Values]
+    production: Mapping[str, Floats]
     """Greenhouse -> (days,) kg m-2 d-1 fresh weight."""
-    income: Mapping[str, Values]
+    income: Mapping[str, Floats]
     """Greenhouse -> (days,) EUR m-2 d-1."""
     costs: Mapping[str, Mapping[str, float]]
     """Greenhouse -> energy, labour and fixed costs of the season, EUR m-2."""
@@ -69,7 +67,7 @@ def read(folder: Path) -> Pilot:
     )
 
 
-def read_climate_pair(folder: Path, experiment: int, control: int) -> tuple[dict[str, Values], dict[str, Values]]:
+def read_climate_pair(folder: Path, experiment: int, control: int) -> tuple[dict[str, Floats], dict[str, Floats]]:
     """Return the climate (hours,) of an experimental and of a control greenhouse over the hours that both have.
 
     Raises IgrowError where the pair is not published.
@@ -86,7 +84,7 @@ def read_climate_pair(folder: Path, experiment: int, control: int) -> tuple[dict
     return parts[0], parts[1]
 
 
-def _by_day(path: Path) -> tuple[NDArray[np.datetime64], dict[str, Values]]:
+def _by_day(path: Path) -> tuple[Times, dict[str, Floats]]:
     try:
         table = pd.read_csv(path)
     except (OSError, ValueError) as error:

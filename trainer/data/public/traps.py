@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats
 from igrow.core.quantities import QUANTITIES
-
-Floats = NDArray[np.float64]
 
 _JUMPS = {"air_temperature": 5.0, "air_humidity": 18.0, "air_co2": 350.0}
 """A reading further than this from the median of its neighbours, in the quantity's unit, is a spike."""

@@ -14,15 +14,14 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats, Integers, Mask, Times
 from igrow.core.errors import IgrowError
 from igrow.trainer.research.network.leaf_picking import smooth
 
 FAULTY_DAYS = (15, 75)
 """Days of 24 rows, counted from 0, on which the settings that worked differ from the requested ones."""
 
-Values = NDArray[np.float64]
 
 NEEDED = (
     "global_radiation", "outdoor_temperature", "outdoor_humidity", "wind_speed", "sky_temperature",
@@ -41,21 +40,21 @@ class Seasons:
     """Seasons of equal length on one clock."""
 
     names: tuple[str, ...]
-    time: NDArray[np.datetime64]
+    time: Times
     """(hours,) the simulator's own clock."""
-    columns: Mapping[str, Values]
+    columns: Mapping[str, Floats]
     """Quantity -> (seasons, hours)."""
-    valid: NDArray[np.bool_]
+    valid: Mask
     """(hours,) false on the days that the paper drops."""
 
     @property
-    def hour(self) -> Values:
+    def hour(self) -> Floats:
         """Hour of the day, (hours,)."""
         since_midnight = self.time - self.time.astype("datetime64[D]")
-        hours: Values = since_midnight.astype("timedelta64[s]").astype(np.float64) / 3600.0
+        hours: Floats = since_midnight.astype("timedelta64[s]").astype(np.float64) / 3600.0
         return hours
 
-    def select(self, rows: Sequence[int] | NDArray[np.int64]) -> Seasons:
+    def select(self, rows: Sequence[int] | Integers) -> Seasons:
         """Return the seasons at `rows`."""
         index = np.asarray(rows, dtype=np.int64)
         columns = {name: values[index] for name, values in self.columns.items()}

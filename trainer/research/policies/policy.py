@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats
 from igrow.core.bundle import open_session
 from igrow.core.errors import IgrowError
 from igrow.core.planner.objective import Objective
@@ -29,10 +30,8 @@ OBSERVATIONS = HOURS * len(FORECAST) + len(PRESENT) + 1
 ACTIONS = HOURS * len(SETPOINTS)
 """96: hour by hour, -1 for the lower limit of a setpoint and 1 for the upper one."""
 
-Values = NDArray[np.float64]
 
-
-def observe(site: Site, present: Mapping[str, Values], forecast: Values, start: np.datetime64) -> NDArray[np.float32]:
+def observe(site: Site, present: Mapping[str, Floats], forecast: Floats, start: np.datetime64) -> NDArray[np.float32]:
     """Return what the policy sees, (B, 76).
 
     Args:
@@ -88,7 +87,7 @@ class OnnxPolicy:
         (actions,) = self._session.run(["action"], {"observation": observations})
         return np.asarray(actions, dtype=np.float32)
 
-    def plan(self, site: Site, present: Mapping[str, float], forecast: Values, start: np.datetime64) -> Setpoints:
+    def plan(self, site: Site, present: Mapping[str, float], forecast: Floats, start: np.datetime64) -> Setpoints:
         """Return setpoints (H, 4) for a forecast (H, 6): day by day, the state as it is now."""
         days = -(-len(forecast) // HOURS)
         padded = np.concatenate([forecast, forecast[-1:].repeat(days * HOURS - len(forecast), axis=0)])
