@@ -39,7 +39,7 @@ class Place:
     @classmethod
     def of(cls, site: Site) -> Place:
         """Return that of a site."""
-        house, limits = site.greenhouse, site.crop.agronomy
+        greenhouse, limits = site.greenhouse, site.crop.agronomy
         slew = site.limits.heating_setpoint.slew
         return cls(
             limits=limits,
@@ -47,8 +47,8 @@ class Place:
             longitude=site.longitude,
             time_zone=site.time_zone,
             drift=min(limits.temperature_drift, math.inf if slew is None else slew),
-            transmissivity=house.cover_transmissivity,
-            lamp_light=house.lamps.power * house.lamps.efficacy * 3.6e-3 if house.lamps else 0.0,
+            transmissivity=greenhouse.cover_transmissivity,
+            lamp_light=greenhouse.lamps.power * greenhouse.lamps.efficacy * 3.6e-3 if greenhouse.lamps else 0.0,
         )
 
     def sunlight(self, radiation: float) -> float:

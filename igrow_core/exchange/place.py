@@ -19,7 +19,7 @@ class Entry:
 
 
 class Place(Protocol):
-    """Files under names such as `house/segments/x.zip`. Every call may take long, and raises ExchangeError.
+    """Files under names such as `greenhouse/segments/x.zip`. Every call may take long, and raises ExchangeError.
 
     A file appears whole or not at all. Names that begin with a dot are the place's own.
     """

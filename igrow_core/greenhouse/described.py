@@ -15,17 +15,17 @@ def parameters_of(site: Site) -> GreenhouseParameters:
 
     A site's cover figures describe what a calibrated model sees, not the plant's own cover, and stay out of it.
     """
-    house = site.greenhouse
+    greenhouse = site.greenhouse
     return GreenhouseParameters(
         latitude=site.latitude,
         longitude=site.longitude,
-        air_height=house.mean_height,
-        lamp_capacity=house.lamps.power if house.lamps else 0.0,
-        lamp_photons=house.lamps.efficacy if house.lamps else 1.24,
-        leakage=house.leakage,
-        rail_exchange=house.rail_pipe_heat_transfer,
-        grow_exchange=house.grow_pipe_heat_transfer,
-        boiler_capacity=house.heating_capacity,
+        air_height=greenhouse.mean_height,
+        lamp_capacity=greenhouse.lamps.power if greenhouse.lamps else 0.0,
+        lamp_photons=greenhouse.lamps.efficacy if greenhouse.lamps else 1.24,
+        leakage=greenhouse.leakage,
+        rail_exchange=greenhouse.rail_pipe_heat_transfer,
+        grow_exchange=greenhouse.grow_pipe_heat_transfer,
+        boiler_capacity=greenhouse.heating_capacity,
         stem_density=site.crop.stem_density,
     )
 

@@ -16,7 +16,7 @@ from igrow.core.arrays import Array
 Value = TypeVar("Value")
 
 
-class Floats:
+class FloatNamespace:
     """What `numpy` offers to the equations, on python floats."""
 
     exp = staticmethod(math.exp)
@@ -46,7 +46,7 @@ class Floats:
 
 def namespace(count: int | None) -> Any:
     """Return the namespace for one greenhouse on floats (None) or for a batch of `count` on arrays."""
-    return Floats if count is None else np
+    return FloatNamespace if count is None else np
 
 
 def clip(xp: Any, value: Array, low: Array, high: Array) -> Array:

@@ -162,7 +162,7 @@ _DEFINITIONS = (
         ("hour", "outdoor_temperature"),
         ("heat",),
         _buried_main,
-        "a heating main for other houses runs under the floor",
+        "a heating main for other greenhouses runs under the floor",
     ),
     _effect(
         "rotting_leaves",

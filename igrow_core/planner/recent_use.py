@@ -110,7 +110,7 @@ def used_in(log: Telemetry, greenhouse: Greenhouse) -> dict[str, float]:
     rail, grow = (
         np.maximum(column(f"{name}_pipe_temperature") - column("air_temperature"), 0.0) for name in ("rail", "grow")
     )
-    # A house without a grow pipe reports none.
+    # A greenhouse without a grow pipe reports none.
     grow = np.where(np.isfinite(grow), grow, 0.0)
     pipes = greenhouse.rail_pipe_heat_transfer * rail + greenhouse.grow_pipe_heat_transfer * grow
     grown = column("net_growth")

@@ -174,9 +174,9 @@ def for_site(
     """Return the template of a horizon of `hours` from `start` (UTC), in blocks or hours of the site's local day.
 
     Each local day has genes of its own but the last, which is like the one before it. A last day of its own, whose
-    night is never seen to end, burns its lamps until the horizon does and lets the house cool down towards it: a gain
-    that is not there, for which the days before are spoiled. `radiation` (H,) is the global radiation to be expected,
-    W m-2; without it the sun counts nothing in the crop's light.
+    night is never seen to end, burns its lamps until the horizon does and lets the greenhouse cool down towards it:
+    a gain that is not there, for which the days before are spoiled. `radiation` (H,) is the global radiation to be
+    expected, W m-2; without it the sun counts nothing in the crop's light.
     """
     time = start.astype("datetime64[s]") + np.arange(hours) * np.timedelta64(3600, "s")
     local = to_local(time, site.time_zone)

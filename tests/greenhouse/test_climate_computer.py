@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from igrow.core.greenhouse.climate_computer import ClimateComputer, Control, Readings, at_rest, control
-from igrow.core.greenhouse.namespace import Floats
+from igrow.core.greenhouse.namespace import FloatNamespace
 from igrow.core.greenhouse.parameters import GreenhouseParameters
 
 MILD = Readings(
@@ -19,7 +19,7 @@ def settle(seen: Readings, minutes: int = 120, **setpoints: float) -> Control:
     state = at_rest(1.0)
     for _ in range(minutes):
         state = control(
-            Floats, ClimateComputer(), GreenhouseParameters(), state, {**SETPOINTS, **setpoints}, seen, 60.0
+            FloatNamespace, ClimateComputer(), GreenhouseParameters(), state, {**SETPOINTS, **setpoints}, seen, 60.0
         )
     return state
 
@@ -96,8 +96,8 @@ def test_irrigation_comes_in_pulses_by_radiation_and_only_when_permitted() -> No
         state, litres, count, before = at_rest(1.0), 0.0, 0, 0.0
         for _ in range(24 * 60):
             state = control(
-                Floats, ClimateComputer(), GreenhouseParameters(), state, {**SETPOINTS, "irrigation_on": permitted},
-                MILD._replace(global_radiation=radiation), 60.0,
+                FloatNamespace, ClimateComputer(), GreenhouseParameters(), state,
+                {**SETPOINTS, "irrigation_on": permitted}, MILD._replace(global_radiation=radiation), 60.0,
             )  # fmt: skip
             litres += state.irrigation / 60.0
             count += state.irrigation > 0.0 and before == 0.0

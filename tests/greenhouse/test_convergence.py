@@ -32,7 +32,7 @@ def test_half_the_step_gives_the_same_day(season: str, request: pytest.FixtureRe
 
 def test_the_error_of_the_climate_step_is_of_second_order(winter: Telemetry) -> None:
     from igrow.core.greenhouse.climate import Conditions, advance, initial
-    from igrow.core.greenhouse.namespace import Floats
+    from igrow.core.greenhouse.namespace import FloatNamespace
 
     conditions = Conditions(
         outdoor_temperature=2.0, outdoor_vapour=0.004, outdoor_co2=7.6e-4, wind_speed=4.0, sky_temperature=-8.0,
@@ -42,9 +42,9 @@ def test_the_error_of_the_climate_step_is_of_second_order(winter: Telemetry) -> 
     )  # fmt: skip
 
     def after_half_an_hour(seconds: float) -> float:
-        state = initial(Floats, 19.0, 75.0, 600.0, 2.0)
+        state = initial(FloatNamespace, 19.0, 75.0, 600.0, 2.0)
         for _ in range(round(1800 / seconds)):
-            state, _ = advance(Floats, GreenhouseParameters(), state, conditions, seconds)
+            state, _ = advance(FloatNamespace, GreenhouseParameters(), state, conditions, seconds)
         return float(state.air)
 
     exact = after_half_an_hour(2.5)
@@ -55,9 +55,9 @@ def test_the_error_of_the_climate_step_is_of_second_order(winter: Telemetry) -> 
 @pytest.mark.parametrize("wind", [0.0, 40.0])
 def test_no_weather_makes_the_step_unstable(wind: float) -> None:
     from igrow.core.greenhouse.climate import Conditions, advance, initial
-    from igrow.core.greenhouse.namespace import Floats
+    from igrow.core.greenhouse.namespace import FloatNamespace
 
-    state = initial(Floats, 19.0, 75.0, 600.0, -20.0)
+    state = initial(FloatNamespace, 19.0, 75.0, 600.0, -20.0)
     conditions = Conditions(
         outdoor_temperature=-20.0, outdoor_vapour=0.0009, outdoor_co2=7.9e-4, wind_speed=wind, sky_temperature=-40.0,
         energy_closure=0.0, blackout_closure=0.0, vent_exchange=0.03 * wind, air_exchange=0.01 * wind,
@@ -65,6 +65,6 @@ def test_no_weather_makes_the_step_unstable(wind: float) -> None:
         lamp_long_wave=0.0, heat=0.0, vapour=0.0, co2=0.0, rail_heat=0.0, grow_heat=0.0,
     )  # fmt: skip
     for _ in range(300):
-        state, _ = advance(Floats, GreenhouseParameters(), state, conditions, 60.0)
+        state, _ = advance(FloatNamespace, GreenhouseParameters(), state, conditions, 60.0)
         assert -40.0 < state.air < 20.0
         assert state.vapour > 0.0

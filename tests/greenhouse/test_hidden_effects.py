@@ -12,7 +12,7 @@ from igrow.core.errors import IgrowError
 from igrow.core.greenhouse import GreenhouseParameters, HiddenEffect, recipe, simulate_many
 from igrow.core.greenhouse.disturbances import QUIET
 from igrow.core.greenhouse.hidden import REFERENCE_DRIVERS, EffectBank
-from igrow.core.greenhouse.namespace import Floats
+from igrow.core.greenhouse.namespace import FloatNamespace
 from igrow.core.greenhouse.sensors import EXACT
 from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
 from igrow.core.telemetry import Telemetry
@@ -65,7 +65,7 @@ def test_a_sensor_fault_is_in_the_measurement_and_the_plc_follows_it(spring: Tel
 
 
 def evaluate(effect: HiddenEffect, now: float = 0.0, repeat: int = 1, **drivers: float) -> float:
-    bank = EffectBank(Floats, [effect], None, 0.0)
+    bank = EffectBank(FloatNamespace, [effect], None, 0.0)
     memory: list[Any] = []
     for _ in range(repeat):
         result = bank.evaluate({**REFERENCE_DRIVERS, **drivers}, now, 60.0, memory)

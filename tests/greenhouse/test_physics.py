@@ -9,7 +9,7 @@ from igrow.core.greenhouse import tomato
 from igrow.core.greenhouse.canopy import photosynthesis, stomatal_resistance, vapour_conductance
 from igrow.core.greenhouse.light import canopy_absorption, distribute
 from igrow.core.greenhouse.linear import solve
-from igrow.core.greenhouse.namespace import Floats
+from igrow.core.greenhouse.namespace import FloatNamespace
 from igrow.core.greenhouse.parameters import GreenhouseParameters
 from igrow.core.greenhouse.sky import sky_temperature
 from igrow.core.greenhouse.ventilation import leakage, past_screens, through_vents
@@ -18,10 +18,10 @@ P = GreenhouseParameters()
 
 
 def test_light_is_shared_without_loss() -> None:
-    parts = canopy_absorption(Floats, 0.7, 0.07, 0.5, 2.5)
+    parts = canopy_absorption(FloatNamespace, 0.7, 0.07, 0.5, 2.5)
     assert sum(parts) == pytest.approx(1.0)
     assert 0.75 < parts[0] < 0.95
-    light = distribute(Floats, P, 0.0, 81.0, 2.5, 0.0, 0.0, 0.0)
+    light = distribute(FloatNamespace, P, 0.0, 81.0, 2.5, 0.0, 0.0, 0.0)
     assert light.canopy + light.floor + light.lamp_air + light.lamp_long_wave + light.lamp_out == pytest.approx(81.0)
     # The challenge's lamps: 100 umol m-2 s-1.
     assert light.par == pytest.approx(100.0, rel=0.01)
@@ -29,7 +29,7 @@ def test_light_is_shared_without_loss() -> None:
 
 def test_screens_and_losses_dim_the_light() -> None:
     def par(energy: float, blackout: float, loss: float) -> float:
-        return float(distribute(Floats, P, 500.0, 0.0, 2.5, energy, blackout, loss).par)
+        return float(distribute(FloatNamespace, P, 500.0, 0.0, 2.5, energy, blackout, loss).par)
 
     clear = par(0.0, 0.0, 0.0)
     assert par(1.0, 0.0, 0.0) == pytest.approx(0.75 * clear)
@@ -39,7 +39,7 @@ def test_screens_and_losses_dim_the_light() -> None:
 
 def test_wind_and_buoyancy_drive_the_vents() -> None:
     def flow(lee: float, wind_side: float, wind: float, difference: float) -> float:
-        return float(through_vents(Floats, P, lee, wind_side, wind, difference))
+        return float(through_vents(FloatNamespace, P, lee, wind_side, wind, difference))
 
     assert flow(0.0, 0.0, 8.0, 10.0) < 1e-6
     assert flow(0.5, 0.0, 8.0, 1.0) > 1.8 * flow(0.5, 0.0, 4.0, 1.0)
@@ -50,20 +50,20 @@ def test_wind_and_buoyancy_drive_the_vents() -> None:
 
 
 def test_a_closed_screen_keeps_the_airs_apart() -> None:
-    opened, closed = (past_screens(Floats, P, closure, 0.0, 6.0) for closure in (0.0, 1.0))
+    opened, closed = (past_screens(FloatNamespace, P, closure, 0.0, 6.0) for closure in (0.0, 1.0))
     assert opened > 50.0 * closed
-    assert past_screens(Floats, P, 1.0, 1.0, 6.0) < closed
+    assert past_screens(FloatNamespace, P, 1.0, 1.0, 6.0) < closed
 
 
 def test_leakage_is_a_few_tenths_of_an_air_change() -> None:
-    assert 0.1 < leakage(Floats, P, 4.0) * 3600.0 / P.air_height < 0.8
+    assert 0.1 < leakage(FloatNamespace, P, 4.0) * 3600.0 / P.air_height < 0.8
 
 
 def test_stomata_close_in_the_dark_and_transpiration_has_the_right_size() -> None:
-    day = stomatal_resistance(Floats, P, 300.0, 800.0, 500.0, 1.0)
-    night = stomatal_resistance(Floats, P, 0.0, 600.0, 300.0, 1.0)
+    day = stomatal_resistance(FloatNamespace, P, 300.0, 800.0, 500.0, 1.0)
+    night = stomatal_resistance(FloatNamespace, P, 0.0, 600.0, 300.0, 1.0)
     assert night > 3.0 * day
-    assert stomatal_resistance(Floats, P, 300.0, 800.0, 500.0, 0.2) > 2.0 * day
+    assert stomatal_resistance(FloatNamespace, P, 300.0, 800.0, 500.0, 0.2) > 2.0 * day
     # A sunny hour, 1 kPa of deficit: 150 to 500 g m-2 h-1 (Stanghellini 1987, chapter 5).
     grams = vapour_conductance(P, 3.0, day) * 1000.0 / (461.5 * 295.0) * 3.6e6
     assert 150.0 < grams < 500.0
@@ -71,7 +71,7 @@ def test_stomata_close_in_the_dark_and_transpiration_has_the_right_size() -> Non
 
 def test_photosynthesis_saturates_with_light_and_rises_with_co2() -> None:
     def gross(par: float, co2: float, temperature: float = 22.0) -> float:
-        return float(photosynthesis(Floats, P, par, co2, temperature, 3.0)) * 1e6
+        return float(photosynthesis(FloatNamespace, P, par, co2, temperature, 3.0)) * 1e6
 
     assert gross(0.0, 800.0) == 0.0
     assert gross(1200.0, 800.0) < 2.5 * gross(400.0, 800.0)
@@ -90,8 +90,8 @@ def test_fruits_appear_wait_and_are_harvested() -> None:
     crop, days = tomato.young_crop(P, 1.0)._replace(temperature_sum=0.0), 0
     while crop.harvested < 0.01 and days < 120:
         for _ in range(24):
-            rate = tomato.rates(Floats, P, crop, 20.0)
-            crop = tomato.grow(Floats, P, crop, rate, 0.0011, 20.0, 3600.0)
+            rate = tomato.rates(FloatNamespace, P, crop, 20.0)
+            crop = tomato.grow(FloatNamespace, P, crop, rate, 0.0011, 20.0, 3600.0)
         days += 1
     assert 35 <= days <= 70
     assert np.all(crop.fruits >= 0.0)
@@ -100,7 +100,7 @@ def test_fruits_appear_wait_and_are_harvested() -> None:
 
 def test_deleafing_moves_carbohydrate_and_makes_none() -> None:
     crop = tomato.mature_crop(P, 1.0, leaf_area_index=4.0)
-    picked = tomato.deleaf(Floats, P, crop)
+    picked = tomato.deleaf(FloatNamespace, P, crop)
     assert tomato.leaf_area_index(P, picked) == pytest.approx(P.leaf_area_maximum)
     assert tomato.stored_carbohydrate(picked) == pytest.approx(tomato.stored_carbohydrate(crop))
 

@@ -14,8 +14,8 @@ from igrow.trainer.service.forwarding import forward
 from igrow.trainer.service.recalibration import utc_now
 
 EXAMPLE = (
-    "igrow-trainer collect house --exchange /srv/igrow --state state\n"
-    "  igrow-trainer diagnose state/archive/telemetry/site=house --site site.yaml --out diagnosis"
+    "igrow-trainer collect north --exchange /srv/igrow --state state\n"
+    "  igrow-trainer diagnose state/archive/telemetry/site=north --site site.yaml --out diagnosis"
 )
 
 

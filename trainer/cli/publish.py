@@ -11,7 +11,7 @@ from igrow.trainer.publishing import publish, refresh, repository_of
 
 EXAMPLE = (
     "igrow-trainer publish out/bundle --keys keys --exchange /srv/igrow\n"
-    "  igrow-trainer publish --refresh house --keys keys --exchange /srv/igrow"
+    "  igrow-trainer publish --refresh north --keys keys --exchange /srv/igrow"
 )
 
 

@@ -29,22 +29,22 @@ def nominal(site: Site) -> dict[str, float]:
     What the description leaves at its default keeps the value of `PARAMETERS`; what it changes scales it.
     """
     values = {name: parameter.value for name, parameter in PARAMETERS.items()}
-    house = site.greenhouse
+    greenhouse = site.greenhouse
 
     def scale(name: str, given: float, reference: float) -> None:
         values[name] *= given / reference if reference > 0.0 else 1.0
 
-    loss = house.cover_heat_transfer * house.cover_area_ratio
+    loss = greenhouse.cover_heat_transfer * greenhouse.cover_area_ratio
     scale("cover_heat_transfer", loss, _REFERENCE.cover_heat_transfer * _REFERENCE.cover_area_ratio)
-    scale("transmissivity", house.cover_transmissivity, _REFERENCE.cover_transmissivity)
-    scale("leakage_wind", house.leakage / house.mean_height, _REFERENCE.leakage / _REFERENCE.mean_height)
+    scale("transmissivity", greenhouse.cover_transmissivity, _REFERENCE.cover_transmissivity)
+    scale("leakage_wind", greenhouse.leakage / greenhouse.mean_height, _REFERENCE.leakage / _REFERENCE.mean_height)
     for name in ("vent_wind", "vent_stack"):
-        scale(name, house.vent_area_ratio, _REFERENCE.vent_area_ratio)
-    scale("rail_pipe_heat_transfer", house.rail_pipe_heat_transfer, _REFERENCE.rail_pipe_heat_transfer)
-    scale("grow_pipe_heat_transfer", house.grow_pipe_heat_transfer, _REFERENCE.grow_pipe_heat_transfer)
+        scale(name, greenhouse.vent_area_ratio, _REFERENCE.vent_area_ratio)
+    scale("rail_pipe_heat_transfer", greenhouse.rail_pipe_heat_transfer, _REFERENCE.rail_pipe_heat_transfer)
+    scale("grow_pipe_heat_transfer", greenhouse.grow_pipe_heat_transfer, _REFERENCE.grow_pipe_heat_transfer)
     for name, screen, reference in (
-        ("energy_screen_saving", house.energy_screen, _REFERENCE.energy_screen),
-        ("blackout_screen_saving", house.blackout_screen, _REFERENCE.blackout_screen),
+        ("energy_screen_saving", greenhouse.energy_screen, _REFERENCE.energy_screen),
+        ("blackout_screen_saving", greenhouse.blackout_screen, _REFERENCE.blackout_screen),
     ):
         if screen is not None and reference is not None:
             scale(name, screen.saving, reference.saving)
@@ -97,16 +97,16 @@ def site_record(telemetry: Telemetry, site: Site, step: float) -> Record:
         leaf_area_index=_CANOPIES.get(site.crop.species.lower(), _CANOPIES["tomato"])[0],
     )
     missing = (*record.missing, "leaf_area_index") if estimated else record.missing
-    house = site.greenhouse
-    # A house that cannot dose needs no column to say that it did not; the same of all equipment.
+    greenhouse = site.greenhouse
+    # A greenhouse that cannot dose needs no column to say that it did not; the same of all equipment.
     equipped = {
-        "rail_pipe_temperature": house.rail_pipe_heat_transfer > 0.0,
-        "grow_pipe_temperature": house.grow_pipe_heat_transfer > 0.0,
-        "vent_lee": house.vent_area_ratio > 0.0,
-        "vent_wind": house.vent_area_ratio > 0.0,
-        "co2_dosing": house.co2_dosing_capacity > 0.0,
-        "lamp_power": house.lamps is not None,
-        "energy_screen": house.energy_screen is not None,
-        "blackout_screen": house.blackout_screen is not None,
+        "rail_pipe_temperature": greenhouse.rail_pipe_heat_transfer > 0.0,
+        "grow_pipe_temperature": greenhouse.grow_pipe_heat_transfer > 0.0,
+        "vent_lee": greenhouse.vent_area_ratio > 0.0,
+        "vent_wind": greenhouse.vent_area_ratio > 0.0,
+        "co2_dosing": greenhouse.co2_dosing_capacity > 0.0,
+        "lamp_power": greenhouse.lamps is not None,
+        "energy_screen": greenhouse.energy_screen is not None,
+        "blackout_screen": greenhouse.blackout_screen is not None,
     }
     return replace(record, missing=tuple(name for name in missing if equipped.get(name, True)))
