@@ -218,6 +218,7 @@ class Daemon:
                 bundle=plan.bundle,
                 expected_profit=plan.expected_profit,
                 recipe_profit=plan.recipe_profit,
+                co2_before=plan.co2_before,
                 leaves_range=plan.leaves_range,
                 note=plan.note,
             )

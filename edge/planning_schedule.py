@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from zoneinfo import ZoneInfo
 
+from igrow.core.co2_count import CO2Count
+from igrow.core.errors import IgrowError
 from igrow.edge.image import Image
 from igrow.edge.ports import ActiveBundle, PlanningService, PlanRequest, Store
 from igrow.edge.sensors.consequences import usable_for_planning
@@ -133,4 +135,13 @@ class PlanningSchedule:
             bundle=bundle.folder,
             forecast=rules.forecast,
             seed=seed,
+            co2_counted=self._co2_counted(),
         )
+
+    def _co2_counted(self) -> CO2Count | None:
+        """Return what the newest plan has written down of the CO2 before it, also one of an earlier run."""
+        try:
+            return CO2Count.of_plan(self._store.newest_event("plan"))
+        except IgrowError:
+            # A ledger that cannot be read says so in the store's health; it does not cost the plan.
+            return None

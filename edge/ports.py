@@ -15,8 +15,9 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
+from igrow.core.co2_count import CO2Count
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 from igrow.edge.image import Value
@@ -59,6 +60,12 @@ class Store(Protocol):
         Raises LateError and StoreError; it may take long, so this one is not for the control cycle.
         """
 
+    def newest_event(self, kind: str) -> Mapping[str, Any] | None:
+        """Return the detail of the newest event of one kind, None where there is none.
+
+        Raises StoreError; it may take long, so this one is not for the control cycle.
+        """
+
     @property
     def health(self) -> str:
         """Empty when all is well, else one line that says what is not."""
@@ -87,6 +94,8 @@ class PlanRequest:
     forecast: Path | None = None
     """File with the weather over the horizon; without one, or while it cannot be read, that of the last days."""
     seed: int = 0
+    co2_counted: CO2Count | None = None
+    """What the crop had had of CO2 when the plan before this one began; None before the first."""
 
 
 @dataclass(frozen=True)
@@ -108,6 +117,8 @@ class Plan:
     """EUR m-2 over the horizon, by the bundle's simulator."""
     recipe_profit: float = float("nan")
     """EUR m-2 over the horizon if the recipe were followed, by the same simulator."""
+    co2_before: float = 0.0
+    """kg m-2 of CO2 that the crop has probably had when the plan begins, which decides on its price."""
     leaves_range: bool = False
     """The plan visits states or actions that the simulator was not trained on."""
     note: str = ""

@@ -8,6 +8,7 @@ from datetime import datetime
 from pathlib import Path
 from zoneinfo import ZoneInfo
 
+from igrow.core.co2_count import CO2Count
 from igrow.core.errors import IgrowError
 from igrow.core.planner.explain import WORDS, limits_in_force
 from igrow.core.quantities import QUANTITIES
@@ -16,7 +17,7 @@ from igrow.edge.configuration import Configuration
 from igrow.edge.planning.make_plan import make_plan
 from igrow.edge.ports import Plan, PlanRequest
 from igrow.edge.sources.recipe import recipe_course
-from igrow.edge.store import read_telemetry
+from igrow.edge.store import read_event, read_telemetry
 from igrow.edge.updates.state import load_state
 
 EXAMPLE = "igrow-edge plan /etc/igrow/daemon.yaml --explain"
@@ -61,6 +62,7 @@ def compute(configuration: Configuration, bundle: Path | None, at: str | None) -
         bundle=folder,
         forecast=configuration.forecast_file,
         seed=settings.seed,
+        co2_counted=CO2Count.of_plan(read_event(configuration.store_folder, "plan")),
     )
     return make_plan(site, request)
 

@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from igrow.core.co2_count import CO2Count, co2_since_planting
 from igrow.core.economics import running_costs
 from igrow.core.language import N_
-from igrow.core.planner.recent_use import co2_since_planting, used_in
+from igrow.core.planner.recent_use import used_in
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 from igrow.edge.page.words import Words
@@ -85,10 +86,10 @@ class Spent:
         return sum(known) if known else math.nan
 
 
-def spent(site: Site, log: Telemetry, now: float, zone: tzinfo) -> Spent:
+def spent(site: Site, log: Telemetry, now: float, zone: tzinfo, counted: CO2Count | None = None) -> Spent:
     """Return what the whole hours of the local day have cost, told from the actuators as plans are charged.
 
-    `log` holds that day at least; what it holds of the days before tells which price of CO2 is reached.
+    `log` holds that day at least; `counted`, and what it holds since, tells which price of CO2 is reached.
     """
     midnight = datetime.fromtimestamp(now, zone).replace(hour=0, minute=0, second=0, microsecond=0).timestamp()
     starts = np.arange(midnight, now - 3600.0 + 1.0, 3600.0)
@@ -97,7 +98,7 @@ def spent(site: Site, log: Telemetry, now: float, zone: tzinfo) -> Spent:
     amounts = {name: np.array([hour[name] for hour in used], dtype=np.float64) for name in KINDS}
     known = {name: np.isfinite(values) for name, values in amounts.items()}
     heat, electricity, co2 = (np.where(known[name], amounts[name], 0.0) for name in KINDS)
-    before = co2_since_planting(site, log, int(now))
+    before = max(co2_since_planting(site, log, int(now), counted) - float(co2.sum()), 0.0)
     balance = running_costs(
         site.prices, site.time_zone, times, heat, electricity, co2, stem_density=0.0, co2_before=before
     )

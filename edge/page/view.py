@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from igrow.core.co2_count import CO2Count
 from igrow.core.language import ENGLISH, N_
 from igrow.core.quantities import QUANTITIES
 from igrow.core.telemetry import Telemetry, from_rows
@@ -127,7 +128,7 @@ def _planned(known: Known, state: Mapping[str, Any], say: Words) -> dict[str, An
     shown: dict[str, Any] = {
         "panels": panels.panels(known.courses, state, site, SPANS[known.span], time, say),
         "area": say.language.amount(area, "m2", 4),
-        "spent": _spent(known, say),
+        "spent": _spent(known, made, say),
         "plan": None,
     }
     if made is None:
@@ -157,12 +158,14 @@ def _planned(known: Known, state: Mapping[str, Any], say: Words) -> dict[str, An
     }
 
 
-def _spent(known: Known, say: Words) -> list[tuple[str, str]]:
+def _spent(known: Known, made: Mapping[str, Any] | None, say: Words) -> list[tuple[str, str]]:
     """Return what today has cost so far, by kind; empty where the log says nothing."""
     log = as_log(known.day)
     if not len(log):
         return []
-    found = money.spent(known.configuration.site, log, known.time, say.zone)
+    had = None if made is None else made.get("co2_before")
+    counted = None if made is None or had is None else CO2Count(made["start"], had)
+    found = money.spent(known.configuration.site, log, known.time, say.zone, counted)
     if not found.hours or not np.isfinite(found.total):
         return []
     titles = dict(money.ROWS)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from igrow.core.agronomy import Place, remember
 from igrow.core.bundle import Bundle, read_bundle
+from igrow.core.co2_count import co2_since_planting
 from igrow.core.errors import IgrowError
 from igrow.core.planner import Budget, PlanningState, PlanResult, Simulator, optimise
 from igrow.core.planner.explain import explain, limits_in_force
@@ -19,7 +20,6 @@ from igrow.core.planner.onnx_generation import OnnxGeneration
 from igrow.core.planner.recent_use import (
     SCALED,
     Corrected,
-    co2_since_planting,
     factors,
     grown_days,
     growth_of_days,
@@ -73,7 +73,7 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
         time=np.datetime64(start, "s"),
         initial=present(request.telemetry, start),
         applied=present(request.telemetry.only(name for name in SETPOINTS if name in request.telemetry), start),
-        co2_before=co2_since_planting(site, request.telemetry, start),
+        co2_before=co2_since_planting(site, request.telemetry, start, request.co2_counted),
         memory=remember(Place.of(site), request.telemetry, start),
     )
     corrected = recently(simulator, simulator.growth, site, request.telemetry, start)
@@ -115,6 +115,7 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
         bundle=bundle.label,
         expected_profit=expected_profit,
         recipe_profit=recipe_profit,
+        co2_before=state.co2_before,
         leaves_range=result.leaves_range,
         note=_note(result, binding, corrected),
         problem=problem,

@@ -11,7 +11,7 @@ over, and the fact is recorded; with a full or read-only disk records wait in me
 
 from igrow.edge.store.aside import StoreAside
 from igrow.edge.store.maintenance import backup, export, restore
-from igrow.edge.store.store import SqliteStore, StoreError, StoreLimits, read_records, read_telemetry
+from igrow.edge.store.store import SqliteStore, StoreError, StoreLimits, read_event, read_records, read_telemetry
 
 __all__ = [
     "SqliteStore",
@@ -20,6 +20,7 @@ __all__ = [
     "StoreLimits",
     "backup",
     "export",
+    "read_event",
     "read_records",
     "read_telemetry",
     "restore",

@@ -11,6 +11,7 @@ import contextlib
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from pathlib import Path
+from typing import Any
 
 from igrow.core.telemetry import Telemetry
 from igrow.edge.earlier import Earlier
@@ -18,7 +19,7 @@ from igrow.edge.hand_off import PATIENCE, SHARE, HandOff, LateError
 from igrow.edge.image import Value
 from igrow.edge.records import AlarmRecord, WriteRecord
 from igrow.edge.store.packing import pack
-from igrow.edge.store.store import SqliteStore, StoreError, StoreLimits, read_telemetry
+from igrow.edge.store.store import SqliteStore, StoreError, StoreLimits, read_event, read_telemetry
 
 CLOSE_SECONDS = 3.0
 """How long the stop waits for what is still to be written."""
@@ -84,6 +85,13 @@ class StoreAside:
         """
         self.flush()
         return read_telemetry(self.folder, start, end)
+
+    def newest_event(self, kind: str) -> Mapping[str, Any] | None:
+        """Return the detail of the newest event of one kind, None where there is none.
+
+        Raises StoreError. May wait for long: not for the control cycle.
+        """
+        return read_event(self.folder, kind)
 
     @property
     def health(self) -> str:

@@ -114,6 +114,12 @@ def read_newest(path: Path, category: str, after: int = 0) -> list[Record]:
         return list(newest_in(connection, category, after))
 
 
+def read_newest_event(path: Path, kind: str) -> Record | None:
+    """Read the newest event of one kind of a ledger file that another process may be writing; raises sqlite3.Error."""
+    with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=5.0)) as connection:
+        return next((one for one in newest_in(connection, "event") if one.body["kind"] == kind), None)
+
+
 def read_after(path: Path, after: int, most: int) -> list[Record]:
     """Read the first `most` records with a sequence number above `after`, oldest first; raises sqlite3.Error."""
     query = "SELECT sequence, category, time, body FROM records WHERE sequence > ? ORDER BY sequence LIMIT ?"

@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from igrow.core.errors import IgrowError
 from igrow.core.telemetry import Telemetry, concatenate
@@ -18,7 +18,7 @@ from igrow.edge.records import AlarmRecord, WriteRecord
 from igrow.edge.sentences import log_event
 from igrow.edge.store.database import Synchronous, describe
 from igrow.edge.store.ledger import NAMES, RESERVE_BYTES, Ledger
-from igrow.edge.store.ledger_file import Record, read_after, read_newest, read_newest_sequence
+from igrow.edge.store.ledger_file import Record, read_after, read_newest, read_newest_event, read_newest_sequence
 from igrow.edge.store.packing import Row, pack
 from igrow.edge.store.telemetry_file import TelemetryFile, read_file, read_first_time, to_telemetry
 
@@ -241,6 +241,13 @@ def read_records(folder: Path, category: str, *, after: int = 0) -> list[Record]
     Only records with a sequence number above `after`. Raises StoreError where neither file can be read.
     """
     return _from_either(folder, lambda path: read_newest(path, category, after))
+
+
+def read_event(folder: Path, kind: str) -> Mapping[str, Any] | None:
+    """Read the detail of the newest event of one kind, None where there is none; raises StoreError."""
+    found = _from_either(folder, lambda path: read_newest_event(path, kind))
+    detail: Any = None if found is None else found.body["detail"]
+    return detail if isinstance(detail, Mapping) else None
 
 
 def read_records_after(folder: Path, after: int, most: int) -> list[Record]:

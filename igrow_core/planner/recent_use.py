@@ -18,7 +18,7 @@ import numpy as np
 from igrow.core.arrays import Floats
 from igrow.core.planner.objective import Outcome, Simulator
 from igrow.core.simulator.growth import Count, GrowthBalance, GrowthDays, GrowthFit, regress, warmth
-from igrow.core.site import Crop, Greenhouse, Site
+from igrow.core.site import Crop, Greenhouse
 from igrow.core.telemetry import Telemetry
 
 SCALED = ("heat", "electricity", "co2")
@@ -121,17 +121,6 @@ def used_in(log: Telemetry, greenhouse: Greenhouse) -> dict[str, float]:
         "co2": total(column("co2_dosing")),
         "net_growth": whole * float(grown[-1] - grown[0]) if counted else float("nan"),
     }
-
-
-def co2_since_planting(site: Site, log: Telemetry, start: int) -> float:
-    """Return how much CO2 the crop has probably had, kg m-2, which decides on the price of the next kilogram.
-
-    The log reaches back some days only; the days before it since planting count as those that it holds.
-    """
-    dosing = log.columns.get("co2_dosing", np.empty(0))
-    known = dosing[np.isfinite(dosing)]
-    days = (np.datetime64(start, "s") - np.datetime64(site.crop.planting_date)) / np.timedelta64(1, "D")
-    return float(known.mean() * 24.0 * max(days, 0.0)) if len(known) else 0.0
 
 
 @dataclass(frozen=True)

@@ -102,6 +102,9 @@ class MemoryStore:
     def telemetry(self, start: float, end: float) -> Telemetry:
         return Telemetry(np.array([], dtype="datetime64[s]"), {})
 
+    def newest_event(self, kind: str) -> Mapping[str, Any] | None:
+        return next((detail for one, detail in reversed(self.events) if one == kind), None)
+
     def close(self) -> None:
         return
 

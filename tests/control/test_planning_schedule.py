@@ -5,18 +5,21 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from zoneinfo import ZoneInfo
 
 import numpy as np
 import pytest
 
+from igrow.core.co2_count import CO2Count
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 from igrow.edge.image import Image, Quality, Value
 from igrow.edge.planning_schedule import ESSENTIAL, PlanningRules, PlanningSchedule
 from igrow.edge.ports import ActiveBundle, Plan, PlanRequest
 from igrow.edge.sources import FreshPlan, PlanKeeper, Recipe
+from igrow.edge.store import StoreError
 from tests.control.control_fakes import MemoryStore
 
 T0 = 1_772_323_200.0
@@ -188,3 +191,30 @@ def test_the_forecast_is_left_to_the_process_to_read(tmp_path):
     schedule, planning = make(forecast=path)
     assert schedule.tick(image(), BUNDLE)
     assert planning.requests[0].forecast == path
+
+
+@pytest.mark.parametrize("started_anew", [False, True])
+def test_a_plan_goes_on_from_what_the_one_before_it_counted_of_co2(started_anew):
+    """Also after a restart or a reload: what was counted stands in the ledger, and not in a schedule."""
+    schedule, planning = make()
+    schedule.tick(image(), BUNDLE)
+    assert planning.requests[0].co2_counted is None
+    if started_anew:
+        before = schedule
+        schedule, planning = make()
+        schedule._store = before._store
+    begun = datetime.fromtimestamp(T0, UTC).isoformat()
+    schedule._store.record_event(T0, "plan", {"start": begun, "co2_before": 4.2})
+    schedule.tick(image(5.5), BUNDLE)
+    assert planning.requests[-1].co2_counted == CO2Count(T0, 4.2)
+
+
+def test_a_ledger_that_cannot_be_read_costs_no_plan():
+    class Unreadable(LogStore):
+        def newest_event(self, kind):
+            raise StoreError("the ledger cannot be read")
+
+    schedule, planning = make()
+    schedule._store = Unreadable()
+    assert schedule.tick(image(), BUNDLE)
+    assert planning.requests[0].co2_counted is None

@@ -122,7 +122,7 @@ def plan(**changes: Any) -> dict[str, Any]:
     co2 = np.where((clock >= 1) & (clock < 17), 900.0, 400.0)
     return {
         "created": NOW, "start": NOW, "step_seconds": 3600.0, "valid_until": NOW + 86_400.0,
-        "bundle": "hillside-3-20260314-3f2a9c1d", "expected_profit": 0.214, "recipe_profit": 0.176,
+        "bundle": "hillside-3-20260314-3f2a9c1d", "expected_profit": 0.214, "recipe_profit": 0.176, "co2_before": 21.0,
         "leaves_range": False, "note": "", "problem": "",
         "setpoints": {
             "heating_setpoint": heating.tolist(), "co2_setpoint": co2.tolist(), "lamp_on": lamps.tolist(),

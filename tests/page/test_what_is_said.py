@@ -11,6 +11,7 @@ from zoneinfo import ZoneInfo
 import numpy as np
 import pytest
 
+from igrow.core.co2_count import CO2Count
 from igrow.core.language import ENGLISH
 from igrow.core.site import load_site
 from igrow.edge.configuration import load_configuration
@@ -253,6 +254,9 @@ def test_what_today_has_cost_is_told_from_the_actuators(site):
     assert found.costs["electricity"] == pytest.approx(0.1 * 1000 * (7 * 0.04 + 9 * 0.08), rel=0.01)
     # The crop had 0.24 kg m-2 a day for 88 days, so that the dearer tier is reached.
     assert found.costs["co2"] == pytest.approx(0.01 * 16 * 1000 * 0.20, rel=0.01)
+    # Yet a count from plan to plan says that it dosed less before.
+    cheap = money.spent(site, log, NOW, ZONE, CO2Count(NOW - 86_400.0, 5.0))
+    assert cheap.costs["co2"] == pytest.approx(0.01 * 16 * 1000 * 0.08, rel=0.01)
     assert money.spent(site, as_log({}), NOW, ZONE).total != found.total
 
 

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from igrow.core.bundle import default_bundle_folder
+from igrow.core.co2_count import CO2Count, co2_since_planting
 from igrow.core.planner import Budget, Outcome, PlanResult, optimise
-from igrow.core.planner.recent_use import co2_since_planting
 from igrow.core.quantities import SETPOINTS
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
@@ -141,6 +141,26 @@ def test_the_co2_that_the_crop_has_had_follows_from_the_log_s_days_and_those_sin
     assert co2_since_planting(site, log(), START) == 0.0
     later = replace(site, crop=replace(site.crop, planting_date=datetime.date(2027, 1, 1)))
     assert co2_since_planting(later, dosed, START) == 0.0
+
+
+def test_what_doses_more_since_last_week_has_not_done_so_since_planting() -> None:
+    """A count goes on from plan to plan: a leak of today makes neither the CO2 of the past nor its price dearer."""
+    planted = np.datetime64(START, "s") - np.timedelta64(60, "D")
+    site = replace(SITE, crop=replace(SITE.crop, planting_date=planted.astype("datetime64[D]").astype(object)))
+    leaking = log().with_columns({"co2_dosing": np.full(len(log()), 0.015)})
+    assert co2_since_planting(site, leaking, START) > 20.0
+    counted = CO2Count(START - 86_400.0, 5.0)
+    assert co2_since_planting(site, leaking, START, counted) == pytest.approx(5.0 + 0.015 * 24)
+    # A daemon that stood still for a while counts on by what it has seen since.
+    assert co2_since_planting(site, leaking, START, CO2Count(START - 10 * 86_400.0, 5.0)) == pytest.approx(8.6)
+    # The count of the crop before is none of this one's.
+    another = CO2Count(START - 80 * 86_400.0, 30.0)
+    assert co2_since_planting(site, leaking, START, another) == co2_since_planting(site, leaking, START)
+    assert co2_since_planting(site, log(), START, counted) == 5.0
+
+    known = make_plan(site, replace(request(), telemetry=leaking, co2_counted=counted))
+    assert known.co2_before == pytest.approx(5.36)
+    assert make_plan(site, replace(request(), telemetry=leaking)).recipe_profit < known.recipe_profit
 
 
 def test_a_plan_is_explained_and_names_the_limits_that_bind() -> None:

@@ -14,7 +14,17 @@ from hypothesis import strategies as st
 from igrow.core.telemetry import read_csv
 from igrow.edge.image import Quality, Value
 from igrow.edge.records import AlarmRecord
-from igrow.edge.store import SqliteStore, StoreError, StoreLimits, backup, export, read_records, read_telemetry, restore
+from igrow.edge.store import (
+    SqliteStore,
+    StoreAside,
+    StoreError,
+    StoreLimits,
+    backup,
+    export,
+    read_records,
+    read_telemetry,
+    restore,
+)
 from igrow.edge.store.packing import pack, unpack_good
 from igrow.edge.store.store import TELEMETRY_FILE
 from igrow.edge.store.telemetry_file import TelemetryFile
@@ -191,6 +201,15 @@ def test_only_records_after_a_sequence_number_are_read(tmp_path: Path) -> None:
         store.record_event(START, "test", {"number": number})
     store.close()
     assert [record.sequence for record in read_records(tmp_path, "event", after=3)] == [5, 4]
+
+
+def test_the_newest_event_of_a_kind_is_found_among_others(tmp_path: Path) -> None:
+    store = StoreAside(tmp_path)
+    assert store.newest_event("plan") is None
+    for number, kind in enumerate(("plan", "plan", "adopted")):
+        store.record_event(1.7e9 + number, kind, {"number": number})
+    assert store.newest_event("plan") == {"number": 1}
+    store.close()
 
 
 def test_a_restore_refuses_a_damaged_backup_and_a_store_in_the_way(tmp_path: Path) -> None:
