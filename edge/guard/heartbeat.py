@@ -25,6 +25,8 @@ END_READINGS = 4
 """Readings in a row of one number, though others were written, after which the register may end there."""
 LEAST_END = 127
 """The smallest number at which a register may be believed to end: seven bits."""
+NARROW = (0xFF, 0x7F, 0x7FFF)
+"""What PLCs keep of a number that they put into a smaller variable."""
 HABIT = 3
 """So often a register is cleared, with nothing else changed, until that is the PLC's way of watching it."""
 HABIT_BEATS = 500
@@ -125,10 +127,11 @@ class BeatCount:
             self._beat = min(max(0, number), self._highest)
         self._same = self._same + self._arrived_since if number == before else 0
         self._shown, self._arrived_since = number, False
-        self._newer = number != before and number in self._ours
-        self._strange = 0 if number in (0, before) or number in self._ours else self._strange + 1
-        if number in self._ours:
-            while self._ours[0] != number:
+        ours = number in self._ours or self._is_an_end(number) or self._is_cut_off(number)
+        self._newer = number != before and ours
+        self._strange = 0 if number in (0, before) or ours else self._strange + 1
+        if ours:
+            while number in self._ours and self._ours[0] != number:
                 self._ours.popleft()
             self._kept, self._keeps, self._kept_before, self._starting = True, True, False, False
             return False
@@ -140,6 +143,18 @@ class BeatCount:
         self._kept = False
         self._kept_before = self._kept_before and not self._sure and not cleared
         return cleared and not (number == 0 and self._is_habit())
+
+    def _is_an_end(self, number: int) -> bool:
+        """Tell whether a smaller register ends there, which newer numbers have reached; a start hardly brings it."""
+        return number in NARROW and self._keeps and number < self._beat
+
+    def _is_cut_off(self, number: int) -> bool:
+        """Tell whether it is what a smaller variable keeps of one of ours; from then on none is counted beyond it."""
+        for most in NARROW:
+            if number and self._keeps and any(one > most and one & most == number for one in self._ours):
+                self._highest = min(self._highest, most)
+                return True
+        return False
 
     def _is_habit(self) -> bool:
         self._idle = self._idle + 1 if self._since_cleared <= HABIT_BEATS else 1

@@ -4,7 +4,7 @@ import pytest
 
 from igrow.edge.bus.errors import NoAnswerError
 from igrow.edge.bus.plc import Reading
-from igrow.edge.guard.heartbeat import HABIT, HABIT_BEATS, HEARTBEAT, LATE_BEATS, BeatCount
+from igrow.edge.guard.heartbeat import END_READINGS, HABIT, HABIT_BEATS, HEARTBEAT, LATE_BEATS, BeatCount
 from tests.control.control_fakes import FixedSource
 from tests.control.stubborn_plc import SAFE, make_stubborn_bench
 
@@ -100,6 +100,55 @@ def test_a_register_that_ends_before_its_type_does_is_counted_to_its_end():
     assert not count.problem
     assert 1.0 in numbers
     assert numbers[-1] < 32_760.0
+
+
+def test_a_register_that_ended_in_a_silence_was_not_cleared():
+    count = BeatCount()
+    count.was_cleared(32_750.0)
+    beaten(count)
+    assert not count.was_cleared(32_751.0)
+    beaten(count, 3 * LATE_BEATS)
+    assert not count.was_cleared(32_767.0)
+    for _ in range(END_READINGS + 2):
+        beaten(count)
+        shown = min(count._beat, 32_767)
+        assert not count.was_cleared(shown)
+    assert shown == 2
+    assert not count.problem
+
+
+def test_a_register_that_ends_there_shows_its_end_after_a_start_and_that_is_no_other_start():
+    before = beaten(kept(32_760.0), 3)
+    assert not before.was_cleared(before._beat)
+    count = BeatCount()
+    count.recall(before.note())
+    count.was_cleared(32_767.0)
+    beaten(count, 4)
+    assert not count.was_cleared(32_767.0)
+    beaten(count)
+    assert count.was_cleared(0.0)
+    beaten(count)
+    assert not count.was_cleared(32_767.0)
+
+
+@pytest.mark.parametrize("most", [127, 255, 32_767])
+def test_a_register_that_keeps_only_the_low_bits_is_counted_to_their_end(most):
+    count, starts = BeatCount(), 0
+    count.was_cleared(most - 5.0)
+    for _ in range(600):
+        beaten(count)
+        starts += count.was_cleared(count._beat & most)
+        assert not count.problem
+    assert starts == 1, "the first zero alone"
+    assert count._beat <= most
+
+
+def test_another_gateways_numbers_are_none_of_ours():
+    count = kept(5000.0)
+    for number in range(100, 120):
+        beaten(count)
+        count.was_cleared(number)
+    assert "another gateway" in count.problem
 
 
 async def test_a_gateway_that_answers_for_a_plc_that_is_gone_is_told_and_the_fallback_is_no_hand():
