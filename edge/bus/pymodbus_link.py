@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import secrets
 from collections.abc import Callable
 from typing import cast
 
@@ -85,7 +86,8 @@ class PymodbusLink(asyncio.Protocol):
         self._what: object = None
         self._waiter: asyncio.Future[bytes] | None = None
         self._timer: asyncio.TimerHandle
-        self._transaction = 0
+        # A gateway that mixes up the answers of its clients would else give us those of one that began when we did.
+        self._transaction = secrets.randbelow(0x10000)
         self._unanswered = 0
         self._last_byte = 0.0
         self._opened = asyncio.Event()

@@ -62,6 +62,7 @@ class Questions:
         """Put the changed points in question whose unit has not been read as a whole since the last of them was seen.
 
         A reading of the same sweep does not count: one half of it may lie before a PLC's start, the other after it.
+        What was seen changed is read again as well: one word of a number may have been read before the other was set.
         What has changed in a unit is judged together, as it may have one cause.
         """
         self._since = {name: self._since.get(name, looks[name].at) for name in changed}
@@ -97,7 +98,7 @@ class Questions:
     def _missing(self, unit: str, since: Mapping[str, float], image: Image) -> set[str]:
         last = max(since.values())
         others = {other for other in (*self._decided, HEARTBEAT, FALLBACK) if self._units.get(other, "") == unit}
-        return {other for other in others if since.get(other) != last and not _is_newer(other, last, image)}
+        return {other for other in others if not _is_newer(other, last, image)}
 
 
 def disturbed(points: Mapping[str, PointMemory], image: Image) -> set[str]:

@@ -162,6 +162,27 @@ def test_a_device_that_hangs_up_after_each_answer_is_read_and_beaten_in_every_cy
     run(played())
 
 
+def test_a_gateway_that_gives_us_the_answers_of_another_client_is_not_believed() -> None:
+    """Both count their requests from one, as most programs do, and ask for as much."""
+
+    async def played() -> None:
+        loop, asked = asyncio.get_running_loop(), [0]
+
+        def mixes(transport: asyncio.Transport, request: bytes) -> None:
+            asked[0] += 1
+            transport.write(asked[0].to_bytes(2, "big") + bytes((0, 0, 0, 7, 1, 3, 4, 0, 9, 0, 9)) + right(request))
+
+        await loop.create_server(lambda: Odd(mixes), "127.0.0.1", 502)
+        bus = ModbusBus(BusSettings("line", Transport.TCP, host="127.0.0.1", timeout=0.5), monotonic=loop.time)
+        bus.start()
+        await asyncio.sleep(0.1)
+        for _ in range(20):
+            assert await bus.read(ReadRequest(1, Function.HOLDING, 0, 2), Priority.CONTROL) == (4, 4)
+        await bus.close()
+
+    run(played())
+
+
 def test_what_words_in_another_order_show_is_neither_believed_nor_a_hand() -> None:
     """New firmware has turned the order of a number's words: most of its numbers read as no value."""
 
