@@ -23,6 +23,7 @@ class Level(StrEnum):
 
 _BY_KIND = {
     "link": Level.CRITICAL,
+    "registers": Level.CRITICAL,
     "heartbeat": Level.CRITICAL,
     "bus": Level.CRITICAL,
     "write": Level.CRITICAL,

@@ -11,8 +11,7 @@ import math
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 
-from igrow.core.separating_tests.definition import SOURCE
-from igrow.edge.bus.errors import RefusedError
+from igrow.edge.bus.errors import RefusedError, SenselessUnitError
 from igrow.edge.clock import Clock
 from igrow.edge.cycle_result import CycleResult, ReadablePlc
 from igrow.edge.guard import (
@@ -31,10 +30,11 @@ from igrow.edge.guard.findings import moved_and_stood
 from igrow.edge.guard.heartbeat import HEARTBEAT
 from igrow.edge.guard.memory import note, recall
 from igrow.edge.heart import Heart
-from igrow.edge.image import Image, Quality, Value
+from igrow.edge.held import Held
+from igrow.edge.image import Image, Quality
 from igrow.edge.journal import Journal
 from igrow.edge.sensors import ImageBuilder, RawReading
-from igrow.edge.setpoint_statuses import setpoint_statuses
+from igrow.edge.setpoint_statuses import marks_of_tests, setpoint_statuses
 from igrow.edge.sources import Decision, Source, decide
 from igrow.edge.stopping import LOOK_SECONDS, STOP_SECONDS, StopReport, furthest_first, look_after, write_at_once
 
@@ -86,6 +86,7 @@ class ControlCycle:
         """Points to be read in the next cycle although they are not due, since they wait to be written."""
         self._reading: asyncio.Future[Mapping[str, RawReading]] | None = None
         self._seen = self._giving_way = False
+        self.held = Held()
         self._heart = Heart(writer, readback, journal)
         self.unknown_until = -math.inf
         """Monotonic seconds until which it is not known what hands have set before a restart; all is left alone."""
@@ -98,6 +99,11 @@ class ControlCycle:
         self._giving_way = True
         if self._reading is not None:
             self._reading.cancel()
+
+    @property
+    def _breaks_off(self) -> bool:
+        """Tell whether nothing may be written any more in this cycle: the stop comes, or it began too long ago."""
+        return self._giving_way or self.held.too_long
 
     def carry_over(self, before: ControlCycle, same: Collection[str]) -> None:
         """Go on where the cycle before a reload stood; `same` are the points that mean the same register as before."""
@@ -119,12 +125,13 @@ class ControlCycle:
     async def run(self, names: Collection[str] | None = None) -> CycleResult:
         """Run one cycle. `names` None reads what is due."""
         began = time.perf_counter()
+        self.held.begin()
         image = await self._read(names)
         decision = decide(self.sources, image, self._setpoints)
         requests = {name: Request(choice.value, choice.source) for name, choice in decision.choices.items()}
         verdict = await self._guard_and_write(requests, image)
         self._log(image, decision, verdict)
-        if not self._giving_way:
+        if not self._breaks_off:
             await self._heart.beat(image)
         everything = dict.fromkeys(self._rules.points, self._respect_hand)
         held = everything if self._manual else self.readback.held(image.monotonic)
@@ -161,11 +168,15 @@ class ControlCycle:
         held = {**self._hands(image.monotonic)[0], **self.readback.held(image.monotonic)}
         verdict = guard({}, shown, held, image, before, self._rules, stopping=True, manual=self._manual)
         self.state = verdict.state
-        writes = furthest_first(verdict.writes, shown)
+        writes = furthest_first([write for write in verdict.writes if image.makes_sense(write.point)], shown)
         self._about_to_write(writes, image)
         left = until - asyncio.get_running_loop().time()
         outcomes = await write_at_once(self._writer, writes, left)
         self._written(outcomes, before)
+        for write in verdict.writes:
+            if not image.makes_sense(write.point):
+                self.state = never_sent(self.state, before, write.point)
+                outcomes.append(WriteOutcome(write, SenselessUnitError("the numbers of its unit make no sense")))
         self._remember(image)  # that which never left, too
         self._journal.ledger(verdict.clamps, outcomes, ())
         return outcomes
@@ -220,7 +231,7 @@ class ControlCycle:
         self._about_to_write(writes, image)
         outcomes: list[WriteOutcome] = []
         for position, write in enumerate(writes):
-            if self._giving_way:
+            if self._breaks_off:
                 for unsent in writes[position:]:
                     self._never_sent(unsent, before)
                 break
@@ -294,10 +305,4 @@ class ControlCycle:
             self._source = decision.source
         self._journal.sensors(image)
         self._journal.interlocks(verdict.engaged, self._rules.points)
-        self._journal.telemetry(image, self._marks(decision, verdict) if self._marks_tests else {})
-
-    def _marks(self, decision: Decision, verdict: Verdict) -> Mapping[str, Value]:
-        """Return what tells a separating test in the log: its course, and the way back from it."""
-        moves = any(choice.source == SOURCE for choice in decision.choices.values())
-        returns = any(memory.taken_by == SOURCE for memory in verdict.state.points.values())
-        return {SOURCE: Value(float(moves or returns), Quality.GOOD, 0.0)}
+        self._journal.telemetry(image, marks_of_tests(decision.choices, verdict.state) if self._marks_tests else {})

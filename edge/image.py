@@ -54,6 +54,16 @@ MISSING = Value(None, Quality.MISSING, float("inf"), "never read")
 
 
 @dataclass(frozen=True, slots=True)
+class Senseless:
+    """A unit whose numbers make no sense."""
+
+    points: frozenset[str]
+    """All that it holds."""
+    told_by: tuple[str, ...]
+    """Those that show it."""
+
+
+@dataclass(frozen=True, slots=True)
 class Image:
     """All values of one cycle by point name; a point that is not there reads as missing through `value_of`."""
 
@@ -69,10 +79,21 @@ class Image:
     interrupted: Mapping[str, frozenset[str]] = field(default_factory=lambda: MappingProxyType({}))
     """The units that did not answer each of these requests, or none, each with its points."""
 
+    senseless: Mapping[str, Senseless] = field(default_factory=lambda: MappingProxyType({}))
+    """The units whose numbers make no sense, so that nothing may be written there."""
+
     def value_of(self, name: str) -> Value:
         """Return the value of a point, `MISSING` for a point that this plant does not have."""
         return self.values.get(name, MISSING)
 
-    def reaches(self, name: str) -> bool:
+    def answers(self, name: str) -> bool:
         """Tell whether the unit that holds a point answers."""
         return self.link_ok and not any(name in points for points in self.silent.values())
+
+    def makes_sense(self, name: str) -> bool:
+        """Tell whether what the unit that holds a point says can be understood."""
+        return not any(name in unit.points for unit in self.senseless.values())
+
+    def reaches(self, name: str) -> bool:
+        """Tell whether the unit that holds a point answers and is understood: whether it may be written to."""
+        return self.answers(name) and self.makes_sense(name)

@@ -49,6 +49,7 @@ class Journal:
         self._standing: dict[str, tuple[str, str, float | None]] = {}
         """By point: the clamp (kind, source, request) that was last written down and still stands."""
         self._silent_cycles: dict[str, int] = {}
+        self._senseless: set[str] = set()
         self._bus_alarms: set[str] = set()
         self._forces: set[str] = set()
         self._time: float | None = None
@@ -81,16 +82,29 @@ class Journal:
     def sensors(self, image: Image) -> None:
         """Raise an alarm for each value that control cannot use, and clear those that are well again.
 
-        A unit that does not answer is one alarm, and not one for each of its points.
+        A unit that does not answer, or makes no sense, is one alarm, and not one for each of its points.
         """
         for name, value in image.values.items():
             usable = CONSEQUENCES[value.quality].control or value.in_doubt
             text = "" if usable or not image.reaches(name) else f"{name} is {value.quality.value}: {value.why}"
             self.alarm(f"sensor {name}", text, calm=SENSOR_CALM)
         self._links(image)
+        self._understood(image)
+
+    def _understood(self, image: Image) -> None:
+        """Raise an alarm for each unit whose numbers make no sense."""
+        self._senseless |= image.senseless.keys()
+        for unit in self._senseless:
+            lost, text = image.senseless.get(unit), ""
+            if lost is not None:
+                text = (
+                    f"the numbers of unit {unit} make no sense ({', '.join(lost.told_by)}), so nothing is written to "
+                    "it, no heartbeat either: has its program changed its addresses, scales or order of words?"
+                )
+            self.alarm(f"registers {unit}".strip(), text)
 
     def _links(self, image: Image) -> None:
-        nobody = not any(image.reaches(name) for name in image.values)
+        nobody = not any(image.answers(name) for name in image.values)
         silent = {"": frozenset(image.values)} if nobody else image.silent
         self._silent_cycles = dict.fromkeys(self._silent_cycles, 0) | {
             unit: self._silent_cycles.get(unit, 0) + 1 for unit in silent

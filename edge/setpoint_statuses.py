@@ -8,7 +8,7 @@ from dataclasses import replace
 from igrow.core.quantities import with_unit
 from igrow.core.separating_tests.definition import SOURCE
 from igrow.edge.guard import GuardState, Verdict
-from igrow.edge.image import Image
+from igrow.edge.image import Image, Quality, Value
 from igrow.edge.ports import SetpointStatus
 from igrow.edge.sources import Choice
 
@@ -47,3 +47,10 @@ def setpoint_statuses(
             )
         statuses[name] = status
     return statuses
+
+
+def marks_of_tests(choices: Mapping[str, Choice], state: GuardState) -> Mapping[str, Value]:
+    """Return what tells a separating test in the log: its course, and the way back from it."""
+    moves = any(choice.source == SOURCE for choice in choices.values())
+    returns = any(memory.taken_by == SOURCE for memory in state.points.values())
+    return {SOURCE: Value(float(moves or returns), Quality.GOOD, 0.0)}

@@ -80,6 +80,19 @@ class NoValueError(BusError):
     """The unit answered that it has no value at present (a sensor that is off or broken)."""
 
 
+class TurnedWordsError(NoValueError):
+    """The registers hold what tells that they mean something else, such as a number with its words reversed."""
+
+    def __init__(self, message: str, number: float) -> None:
+        super().__init__(message)
+        self.number = number
+        """What they may mean."""
+
+
+class SenselessUnitError(BusError):
+    """What the unit shows makes no sense, so neither would what is written. Nothing was sent: correct the map."""
+
+
 class ValueDoesNotFitError(BusError):
     """The register cannot hold the value. Nothing was sent: correct the value, or the map's type and scale."""
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from igrow.edge.bus.block_reader import BlockReader
-from igrow.edge.bus.errors import BusError, NoValueError, UnknownPointError, ValueDoesNotFitError
+from igrow.edge.bus.errors import BusError, NoValueError, TurnedWordsError, UnknownPointError, ValueDoesNotFitError
 from igrow.edge.bus.modbus_bus import ModbusBus
 from igrow.edge.bus.protocol import Bus, Priority, WriteRequest
-from igrow.edge.registers.codec import NotEncodableError, decode, encode
+from igrow.edge.registers.codec import NotEncodableError, decode, encode, turned
 from igrow.edge.registers.model import BusSettings, Device, Point, RegisterMap
 
 
@@ -149,8 +149,17 @@ class RegisterPlc:
             if content is not None:
                 value = decode(point, content)
                 if value is None:
-                    error = NoValueError(f"{point.name}: the device says that it has no value")
+                    error = _no_value(point, content)
             readings[point.name] = Reading(value, error, at)
+
+
+def _no_value(point: Point, content: Sequence[int]) -> NoValueError:
+    number = turned(point, content)
+    if number is not None:
+        return TurnedWordsError(
+            f"{point.name}: the registers do not hold what the map says; they may mean {number:g}", number
+        )
+    return NoValueError(f"{point.name}: the device says that it has no value")
 
 
 def _unknown(name: str) -> UnknownPointError:

@@ -176,6 +176,8 @@ class Readback:
         """Look at what new readings show; adds to `findings` what became of our writes."""
         looks: dict[str, Look] = {}
         for name in names:
+            if not image.makes_sense(name):
+                continue  # nobody knows what stands there
             memory, value = self.points[name], image.value_of(name)
             if not memory.is_new(value, image.monotonic):
                 findings.extend(self._ours.unread(name, image))

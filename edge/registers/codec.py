@@ -78,6 +78,23 @@ def decode(point: Point, content: Sequence[int]) -> float | None:
     return raw * point.scale + point.offset
 
 
+def turned(point: Point, content: Sequence[int]) -> float | None:
+    """Return a number that tells, of what `decode` calls "no value", that the registers mean something else.
+
+    They hold a number too small to be normal, and a possible one in the reverse order of their words; or it is a point
+    that can be written, where nobody has put such a number. None where they may be meant so.
+    """
+    if point.type not in _LEAST_NORMAL:
+        return None
+    raw = float(decode_raw(content, point.type, point.order))
+    if not 0.0 < abs(raw) < _LEAST_NORMAL[point.type]:
+        return None
+    value = decode(point, tuple(reversed(content)))
+    if value is not None and value != 0.0 and point.low <= value <= point.high:
+        return value
+    return raw if point.writable else None
+
+
 def encode(point: Point, value: float) -> tuple[int, ...]:
     """Return the registers (or the one bit) to write so that `decode` gives `value` back.
 

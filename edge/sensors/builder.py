@@ -13,12 +13,13 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from igrow.core.quantities import with_unit
-from igrow.edge.bus.errors import NoValueError
+from igrow.edge.bus.errors import NoValueError, TurnedWordsError
 from igrow.edge.image import MISSING, Image, Quality, Value
 from igrow.edge.sensors.belief import Belief
 from igrow.edge.sensors.contact import Contact
 from igrow.edge.sensors.pairs import PAIR_CHECKS, PairContext, TwinSensors, suspects
 from igrow.edge.sensors.rules import SensorRule
+from igrow.edge.sensors.sense import Sense, Shown
 
 NO_NUMBER = "the register holds no number"
 
@@ -53,6 +54,8 @@ class _Track:
     accepted_at: float = -math.inf
     too_fast: bool = False
     error: str = ""
+    turned: float | None = None
+    """What it may mean while it holds a number only in the reverse order of its words."""
     belief: Belief = field(default_factory=Belief)
 
 
@@ -74,6 +77,7 @@ class ImageBuilder:
         self._twins = tuple(twins)
         self._sun_elevation = sun_elevation
         self._contact = Contact(rules, units or {})
+        self._sense = Sense(rules, units or {})
 
     def names(self, wanted: Collection[str]) -> list[str]:
         """Return those of the wanted points that there are."""
@@ -102,7 +106,9 @@ class ImageBuilder:
             )
         self._contact.hear(readings)
         contact = self._contact
-        return Image(monotonic, true_time, values, contact.link_ok, contact.silent, contact.interrupted)
+        shown = {name: one for name, track in self._tracks.items() if (one := _shown(track, monotonic)) is not None}
+        senseless = self._sense.judge(shown, monotonic)
+        return Image(monotonic, true_time, values, contact.link_ok, contact.silent, contact.interrupted, senseless)
 
 
 def _suspected(value: Value, why: str) -> Value:
@@ -118,6 +124,7 @@ def _take(track: _Track, reading: RawReading | None, now: float) -> bool:
         return False
     track.reading_at, track.error = reading.at, ""
     track.read_at = now
+    track.turned = reading.error.number if isinstance(reading.error, TurnedWordsError) else None
     if reading.value is None:
         track.value, track.too_fast = None, False
         return True
@@ -134,6 +141,15 @@ def _take(track: _Track, reading: RawReading | None, now: float) -> bool:
     else:
         track.too_fast = True
     return True
+
+
+def _shown(track: _Track, now: float) -> Shown | None:
+    """Return what a point shows as a number, if it was read lately."""
+    if now - track.read_at > track.rule.missing_after:
+        return None
+    if track.turned is not None:
+        return Shown(track.turned, turned=True)
+    return None if track.value is None or not math.isfinite(track.value) else Shown(track.value)
 
 
 def _possible(rule: SensorRule, change: float, seconds: float) -> bool:

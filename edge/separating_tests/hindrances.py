@@ -32,8 +32,10 @@ def by_image(test: SeparatingTest, conditions: Iterable[Condition], image: Image
         if image.value_of(flag).says_yes:
             return text
     for point in test.points:
-        if not image.reaches(point):
+        if not image.answers(point):
             return f"{point} does not answer"
+        if not image.makes_sense(point):
+            return f"the numbers of the unit that holds {point} make no sense"
     for condition in conditions:
         if condition.if_measured and condition.quantity not in image.values:
             continue
