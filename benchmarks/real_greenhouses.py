@@ -179,7 +179,7 @@ def later(house: Greenhouse, every: float) -> dict[str, object]:
     )
     table = show(title, found)
     print_coverage([coverage(house.record, ways, rows, None, every)])
-    print_range(house, model, ways["hybrid, setpoints"][0], fit, rows, every)
+    print_range(house, ways["hybrid, setpoints"][0], fit, rows, every)
     print_totals([daily_totals(house.record, house.setpoints, model, rows)])
     return table
 
@@ -292,22 +292,17 @@ def print_coverage(parts: Sequence[Mapping[tuple[str, str], tuple[float, float]]
         print(f"  {driven:10s} {what:28s} {inside / max(number, 1):.3f}")
 
 
-def print_range(house: Greenhouse, model: Forecaster, predict: Predictor, fit: Mask, rows: Mask, every: float) -> None:
-    """Tell whether runs outside the training range are worse: by both measures, the error of 24 h runs.
+def print_range(house: Greenhouse, predict: Predictor, fit: Mask, rows: Mask, every: float) -> None:
+    """Tell whether runs outside the training range are worse: the error of 24 h runs.
 
-    `bounds` is what a bundle's graph tells planning: the largest excess over the bounds of single quantities
-    (`igrow.trainer.fit.model.training_envelope`). `TrainingRange` sees combinations that never occurred too.
+    Outside is what a bundle's graph tells planning: beyond the bounds of single quantities
+    (`igrow.trainer.fit.model.training_envelope`).
     """
     record = house.record
     known = {**record.inputs, **record.measured, **house.setpoints}
     bounds = training_envelope({name: known[name][fit] for name in RANGED})
-    excess = {
-        "bounds": np.max(
-            [np.maximum(low - known[name], known[name] - high) / (high - low) for name, (low, high) in bounds.items()],
-            axis=0,
-        ),
-        "TrainingRange": model.range.excess(np, {name: known[name] for name in model.range.names}),
-    }
+    excess = [np.maximum(low - known[name], known[name] - high) for name, (low, high) in bounds.items()]
+    outside = np.max(excess, axis=0) > 0.0
     steps = round(86_400.0 / record.step)
     starts = starts_within(record, rows, steps, max(1, round(every / record.step)))
     ahead = starts + 1 + np.arange(steps)[:, None]
@@ -317,17 +312,14 @@ def print_range(house: Greenhouse, model: Forecaster, predict: Predictor, fit: M
         if name in record.measured
     }
     print("\nerror of 24 h runs by the share of their rows outside the training range")
-    for measure, values in excess.items():
-        share = np.nanmean(values[ahead] > 0.0, axis=0)
-        for title, chosen in (
-            ("none", share == 0.0),
-            ("up to 20 %", (share > 0.0) & (share <= 0.2)),
-            ("more", share > 0.2),
-        ):
-            cells = "".join(
-                f"{name} {np.nanmean(error[chosen]):8.3g}  " for name, error in errors.items() if chosen.any()
-            )
-            print(f"  {measure:14s} {title:10s} {chosen.sum():5d} runs  {cells}")
+    share = outside[ahead].mean(axis=0)
+    for title, chosen in (
+        ("none", share == 0.0),
+        ("up to 20 %", (share > 0.0) & (share <= 0.2)),
+        ("more", share > 0.2),
+    ):
+        cells = "".join(f"{name} {np.nanmean(error[chosen]):8.3g}  " for name, error in errors.items() if chosen.any())
+        print(f"  {title:10s} {chosen.sum():5d} runs  {cells}")
 
 
 def print_totals(parts: Sequence[Mapping[str, Floats]]) -> None:

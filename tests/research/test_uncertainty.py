@@ -1,11 +1,10 @@
-"""Intervals of predictions, and the range of the training data."""
+"""Intervals of predictions."""
 
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
-from igrow.trainer.research.forecasts.uncertainty import error_growth, training_range
+from igrow.trainer.research.forecasts.uncertainty import error_growth
 
 
 def test_intervals_cover_new_errors_of_the_same_kind() -> None:
@@ -27,21 +26,3 @@ def test_errors_that_grow_give_intervals_that_grow() -> None:
     growth = error_growth(hours[:, None] * generator.standard_normal((96, 300)), hours, np.zeros((96, 300)))
     width = growth.high[0] - growth.low[0]
     assert (np.diff(width[1:]) > 0.0).all()
-
-
-def test_training_rows_are_inside_and_what_was_never_seen_is_outside() -> None:
-    generator = np.random.default_rng(3)
-    temperature = generator.normal(20.0, 2.0, 5000)
-    drivers = {
-        "air_temperature": temperature,
-        "air_humidity": 80.0 - 3.0 * (temperature - 20.0) + generator.normal(0.0, 1.0, 5000),
-        "lamp_on": np.zeros(5000),
-    }
-    known = training_range(drivers)
-    assert known.names == ("air_temperature", "air_humidity")
-    assert (known.excess(np, drivers) > 0.0).mean() < 0.012
-    outside = known.excess(np, {"air_temperature": 40.0, "air_humidity": 80.0})
-    against = known.excess(np, {"air_temperature": 23.0, "air_humidity": 89.0})
-    assert outside > 0.5
-    assert against > 0.5, "each within its bounds, but never together"
-    assert known.excess(np, {"air_temperature": 20.0, "air_humidity": 80.0}) == pytest.approx(0.0)

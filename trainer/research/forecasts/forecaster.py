@@ -1,4 +1,4 @@
-"""All that a log teaches about a site's forecasts: parameters, residual model, disturbance, rules, intervals, range."""
+"""All that a log teaches about a site's forecasts: parameters, residual model, disturbance, rules, intervals."""
 
 from __future__ import annotations
 
@@ -35,20 +35,8 @@ from igrow.trainer.research.forecasts.output_statistics import (
     fit_output_statistics,
 )
 from igrow.trainer.research.forecasts.residual_model import ResidualModel, fit_residual_model
-from igrow.trainer.research.forecasts.uncertainty import ErrorGrowth, TrainingRange, growth_of_runs, training_range
+from igrow.trainer.research.forecasts.uncertainty import ErrorGrowth, growth_of_runs
 
-RANGE_DRIVERS = (
-    "outdoor_temperature",
-    "global_radiation",
-    "wind_speed",
-    "air_temperature",
-    "air_humidity",
-    "air_co2",
-    "heating_setpoint",
-    "co2_setpoint",
-    "lamp_on",
-)
-"""What the training range watches: weather, climate and setpoints of a plan."""
 _PENALTIES = (0.03, 0.1, 0.3, 1.0)
 _WIDENING = 1.5
 """By which the spread of other compartments' parameters is held too small for a new one."""
@@ -76,7 +64,6 @@ class Forecaster:
     """What combined forecasts still miss."""
     combined_growth: Mapping[str, ErrorGrowth]
     """By quantity, of combined forecasts."""
-    range: TrainingRange
 
     def added(self, record: Record) -> dict[str, Floats]:
         """Return the residual model's fluxes along a record, (n,) by channel."""
@@ -157,12 +144,7 @@ def fit_forecaster(
         rules = fit_actuation([(record, setpoints, fit) for record, setpoints, fit, _ in parts], values)
         rules = _refined(parts[0], values, rules, residual_model, disturbance)
         say("actuation stage fitted in closed loop")
-    table = {
-        name: np.concatenate([_driver(part[0], part[1], name)[part[2]] for part in parts]) for name in RANGE_DRIVERS
-    }
-    model = Forecaster(
-        posterior, effects, residual_model, disturbance, rules, {}, {}, {}, {}, {}, training_range(_complete(table))
-    )
+    model = Forecaster(posterior, effects, residual_model, disturbance, rules, {}, {}, {}, {}, {})
     model = replace(model, growth=growth_of_runs([(part[0], part[3], model.predictor(part[0])) for part in parts]))
     if not actuation:
         return model
@@ -203,8 +185,7 @@ def adapt(model: Forecaster, record: Record, rows: Mask) -> Forecaster:
 def from_few_days(record: Record, rows: Mask, prior: Gaussian) -> Forecaster:
     """Return a model of a site of which there are few days and nothing else: parameters, and usual disturbances."""
     posterior = fit_climate([_working(record, rows)], prior)
-    table = {name: _driver(record, {}, name)[rows] for name in RANGE_DRIVERS}
-    return Forecaster(posterior, {}, None, DisturbanceModel(), {}, {}, {}, {}, {}, {}, training_range(_complete(table)))
+    return Forecaster(posterior, {}, None, DisturbanceModel(), {}, {}, {}, {}, {}, {})
 
 
 def _working(record: Record, rows: Mask) -> tuple[Record, Mask]:
@@ -270,16 +251,3 @@ def _selection_errors(
             if not (quantity == "air_co2" and "co2_dosing" in record.missing):
                 total[quantity] = total.get(quantity, 0.0) + by_horizon["24_h"].mae / ERROR_SCALES[quantity]
     return total
-
-
-def _driver(record: Record, setpoints: Mapping[str, Floats], name: str) -> Floats:
-    for source in (record.inputs, record.measured, setpoints):
-        if name in source:
-            return source[name]
-    return np.full(len(record), np.nan)
-
-
-def _complete(table: Mapping[str, Floats]) -> dict[str, Floats]:
-    known = {name: values for name, values in table.items() if np.isfinite(values).any()}
-    rows = np.all([np.isfinite(values) for values in known.values()], axis=0)
-    return {name: values[rows] for name, values in known.items()}

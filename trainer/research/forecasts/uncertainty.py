@@ -1,20 +1,18 @@
-"""How far to trust the simulator: intervals of its predictions, and a measure of leaving what it was fitted on.
+"""How far to trust the simulator: intervals of its predictions.
 
 Intervals come from errors that the fitted model made on days it had not seen, by lead time and by daylight
 (split conformal prediction; Vovk, Gammerman and Shafer (2005), Algorithmic Learning in a Random World, ch. 4).
-They promise coverage for days like those, no more; `TrainingRange` says when the drivers are not like those.
+They promise coverage for days like those, no more.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from igrow.core.arrays import Array, Floats, Mask
-from igrow.core.effects.definition import Values
+from igrow.core.arrays import Floats, Mask
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.fit.evaluation import Predictor, starts_within
 
@@ -119,57 +117,3 @@ def growth_of_runs(
             np.concatenate([first.high, *(one.high for one in later)], axis=1),
         )
     return growth
-
-
-@dataclass(frozen=True)
-class TrainingRange:
-    """The drivers that a model was fitted on: bounds of each, and how they hang together."""
-
-    names: tuple[str, ...]
-    low: Floats
-    """Smallest value, (d,)."""
-    high: Floats
-    """Largest value, (d,)."""
-    centre: Floats
-    """(d,)."""
-    whitening: Floats
-    """(d, d): rows make independent, unit-variance combinations of drivers less `centre`."""
-    threshold: float
-    """Squared distance that 99 % of the training rows keep below."""
-
-    def excess(self, xp: Any, drivers: Values) -> Array:
-        """Return how far drivers lie outside: 0 within, 1 about one training range beyond; elementwise.
-
-        The sum of the bounds' excesses in ranges, and of the Mahalanobis distance's excess over its threshold
-        (in thresholds). A planner can subtract it from a profit, and flag what is above 0.
-        """
-        total: Array = 0.0
-        for position, name in enumerate(self.names):
-            width = max(float(self.high[position] - self.low[position]), 1e-6)
-            above = (drivers[name] - float(self.high[position])) / width
-            below = (float(self.low[position]) - drivers[name]) / width
-            zero = 0.0 * above
-            total = total + xp.maximum(above, zero) + xp.maximum(below, zero)
-        distance: Array = 0.0
-        for row in self.whitening:
-            combined: Array = 0.0
-            for position, name in enumerate(self.names):
-                combined = combined + float(row[position]) * (drivers[name] - float(self.centre[position]))
-            distance = distance + combined * combined
-        beyond = distance / self.threshold - 1.0
-        return total + xp.maximum(xp.sqrt(xp.maximum(beyond, 0.0 * beyond)), 0.0 * beyond)
-
-
-def training_range(drivers: Mapping[str, Floats]) -> TrainingRange:
-    """Return the range of training rows, (n,) by name; drivers that never vary are left out."""
-    names = tuple(name for name, values in drivers.items() if float(np.std(values)) > 1e-9)
-    table = np.stack([drivers[name] for name in names], axis=1)
-    centre = table.mean(axis=0)
-    values, vectors = np.linalg.eigh(np.cov(table.T).reshape(len(names), len(names)))
-    # Directions in which the drivers hardly move would make any departure look infinite.
-    values = np.maximum(values, 1e-4 * values.max())
-    whitening = (vectors / np.sqrt(values)).T
-    distance = np.sum(((table - centre) @ whitening.T) ** 2, axis=1)
-    return TrainingRange(
-        names, table.min(axis=0), table.max(axis=0), centre, whitening, float(np.quantile(distance, 0.99))
-    )
