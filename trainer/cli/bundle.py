@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import shutil
 from pathlib import Path
 
 from igrow.core.bundle import BUILT_IN
 from igrow.core.site import Site, load_site
+from igrow.trainer.cli.common import replace_bundle
 from igrow.trainer.cli.progress import progress
 from igrow.trainer.default_bundle import CREATED, default_model
-from igrow.trainer.exporting import export
 
 EXAMPLE = "igrow-trainer bundle --out igrow_core/default_bundle"
 
@@ -25,13 +24,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Build the bundle."""
     site = load_site(arguments.site) if arguments.site else Site(name=BUILT_IN, latitude=52.0, longitude=4.5)
-    fresh = arguments.out.with_name(f"{arguments.out.name}.new")
     with progress("building") as say:
         model = default_model(site, seed=arguments.seed, report=say)
         say("writing the bundle")
-        shutil.rmtree(fresh, ignore_errors=True)
-        bundle = export(model, fresh, created=CREATED, seed=arguments.seed)
-    shutil.rmtree(arguments.out, ignore_errors=True)
-    bundle.folder.rename(arguments.out)
+        bundle = replace_bundle(arguments.out, model, created=CREATED, seed=arguments.seed)
     print(f"wrote {arguments.out} ({bundle.label})")
     return 0

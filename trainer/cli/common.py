@@ -3,9 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import shutil
+from pathlib import Path
+from typing import TYPE_CHECKING
 
+from igrow.core.bundle import Bundle
 from igrow.core.exchange import Place
 from igrow.trainer.service.places import open_place
+
+if TYPE_CHECKING:
+    from datetime import datetime
+
+    from igrow.trainer.fit import FittedModel
 
 
 def add_exchange(parser: argparse.ArgumentParser) -> None:
@@ -20,3 +29,15 @@ def add_exchange(parser: argparse.ArgumentParser) -> None:
 def exchange_of(arguments: argparse.Namespace) -> Place:
     """Return the exchange; raises IgrowError."""
     return open_place(arguments.exchange, known_hosts=arguments.known_hosts, identity=arguments.identity)
+
+
+def replace_bundle(folder: Path, model: FittedModel, *, created: datetime | None = None, seed: int = 0) -> Bundle:
+    """Write a model as a bundle in the place of an earlier one, which stays until the new one is whole."""
+    from igrow.trainer.exporting import export  # noqa: PLC0415  (collecting needs no graphs)
+
+    fresh = folder.with_name(f"{folder.name}.new")
+    shutil.rmtree(fresh, ignore_errors=True)
+    bundle = export(model, fresh, created=created, seed=seed)
+    shutil.rmtree(folder, ignore_errors=True)
+    fresh.rename(folder)
+    return bundle

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import shutil
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +14,7 @@ from igrow.core.bundle import Bundle, default_bundle_folder, read_bundle
 from igrow.core.greenhouse import HiddenEffect
 from igrow.core.greenhouse.described import parse_effect
 from igrow.core.language import LANGUAGES
+from igrow.trainer.cli.common import replace_bundle
 from igrow.trainer.cli.log_arguments import add_log_arguments, log_of
 from igrow.trainer.cli.progress import progress
 from igrow.trainer.data.log import LEAST_DAYS, Log
@@ -22,8 +22,7 @@ from igrow.trainer.diagnosis import diagnose
 from igrow.trainer.diagnosis.drift import read_drift
 from igrow.trainer.diagnosis.evidence import errors_with
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
-from igrow.trainer.exporting import export, read_model
-from igrow.trainer.fit import FittedModel
+from igrow.trainer.exporting import read_model
 from igrow.trainer.fit.scoring import calibrated_until
 from igrow.trainer.report import write_diagnosis
 
@@ -103,12 +102,3 @@ def known_term(hidden: HiddenEffect) -> ActiveTerm:
     effect = hidden.definition
     size = effect.amplitude.typical if hidden.size is None else hidden.size
     return ActiveTerm(hidden.name, size, {one.name: one.typical for one in effect.shapes}, hidden.start)
-
-
-def replace_bundle(folder: Path, model: FittedModel) -> None:
-    """Write a model as a bundle in the place of an earlier one, which stays until the new one is whole."""
-    fresh = folder.with_name(f"{folder.name}.new")
-    shutil.rmtree(fresh, ignore_errors=True)
-    export(model, fresh)
-    shutil.rmtree(folder, ignore_errors=True)
-    fresh.rename(folder)

@@ -8,14 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from igrow.core.bundle import Bundle, read_bundle
-from igrow.core.effects import EFFECTS
 from igrow.core.quantities import QUANTITIES
 from igrow.trainer.data import Log
-from igrow.trainer.diagnosis.knowledge import activate, active_term
 from igrow.trainer.exporting import read_model
-from igrow.trainer.fit.evaluation import Evaluation, evaluate
+from igrow.trainer.fit.evaluation import Evaluation, errors_of, summarise
 from igrow.trainer.fit.model import FittedModel
-from igrow.trainer.fit.scoring import BY_SETPOINTS, score_bundle, unseen
+from igrow.trainer.fit.scoring import BY_SETPOINTS, runs_by_actuators, score_bundle, unseen
 
 HORIZONS = ("1_h", "24_h")
 PERSISTENCE = "persistence"
@@ -103,8 +101,4 @@ def _scores(simulator: Simulator, log: Log, horizons: Sequence[str]) -> Evaluati
         if bundle.manifest.variant == "network":
             return score_bundle(log, bundle, horizons)[BY_SETPOINTS]
         return _scores(read_model(bundle, log.known_site), unseen(log, bundle), horizons)
-    model = simulator
-    alignment = log.best_shift(model.posterior.values) if model.alignment is None else model.alignment
-    record = log.record(alignment)
-    terms = [active_term(effect) for effect in model.effects if effect.name in EFFECTS]
-    return evaluate(record, model.posterior.values, activate(record, terms), horizons)
+    return summarise([errors_of(*runs_by_actuators(log, simulator), horizons)])

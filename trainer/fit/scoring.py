@@ -25,6 +25,7 @@ from igrow.trainer.diagnosis.knowledge import activate, active_term
 from igrow.trainer.exporting import read_model
 from igrow.trainer.fit.actuation import setpoint_columns
 from igrow.trainer.fit.evaluation import EVERY, Errors, Evaluation, Predictor, errors_of, free_runs, summarise
+from igrow.trainer.fit.model import FittedModel
 
 HORIZONS = ("1_h", "24_h", "7_d")
 ACTUATORS, BY_SETPOINTS = "by actuators", "by setpoints"
@@ -61,15 +62,19 @@ def score_bundle(
         record = log.record()
         by_setpoints = climate_runs(bundle.folder, record, setpoint_columns(log.telemetry, record)[0])
         return {BY_SETPOINTS: _scores(record, by_setpoints, horizons, BY_SETPOINTS, say)}
-    model = read_model(bundle, site)
-    alignment = log.best_shift(model.posterior.values) if model.alignment is None else model.alignment
-    record = log.record(alignment)
-    terms = [active_term(effect) for effect in model.effects if effect.name in EFFECTS]
-    by_actuators = free_runs(record, model.posterior.values, activate(record, terms))
+    record, by_actuators = runs_by_actuators(log, read_model(bundle, site))
     found = {ACTUATORS: _scores(record, by_actuators, horizons, ACTUATORS, say)}
     setpoints, _ = setpoint_columns(log.telemetry, record)
     planned = planned_runs(bundle, site, record, setpoints)
     return found | {BY_SETPOINTS: _scores(record, planned, horizons, BY_SETPOINTS, say)}
+
+
+def runs_by_actuators(log: Log, model: FittedModel) -> tuple[Record, Predictor]:
+    """Return a log as a model reads it, and the model's runs along it, driven by what the actuators did."""
+    alignment = log.best_shift(model.posterior.values) if model.alignment is None else model.alignment
+    record = log.record(alignment)
+    terms = [active_term(effect) for effect in model.effects if effect.name in EFFECTS]
+    return record, free_runs(record, model.posterior.values, activate(record, terms))
 
 
 def _scores(record: Record, predict: Predictor, horizons: Sequence[str], how: str, say: Report) -> Evaluation:
