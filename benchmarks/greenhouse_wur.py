@@ -21,7 +21,7 @@ from igrow.core.greenhouse.parameters import stack
 from igrow.core.greenhouse.plant import Plant
 from igrow.core.greenhouse.weather_table import WeatherTable
 from igrow.core.telemetry import Telemetry
-from igrow.trainer.data.public.wur2020 import Seasons, read_seasons
+from igrow.trainer.research.paper.wur2020 import Seasons, read_seasons
 
 HOUR = 3600
 CLIMATE = ("air_temperature", "air_humidity", "air_co2")

@@ -11,12 +11,20 @@ import pytest
 
 from igrow.core.errors import IgrowError
 from igrow.core.site import Prices
-from igrow.trainer.data.public import automatoes2020, liaoyang2020
-from igrow.trainer.data.public.wur2020 import FAULTY_DAYS, TrajectoryFileError, read_seasons
 from igrow.trainer.research.network.leaf_picking import smooth
-from igrow.trainer.research.paper import figure3, harvests, incremental, pilot, seasons, table1
+from igrow.trainer.research.paper import (
+    automatoes2020,
+    figure3,
+    harvests,
+    incremental,
+    liaoyang2020,
+    pilot,
+    seasons,
+    table1,
+)
 from igrow.trainer.research.paper.compartments import Compartment, read_2019
 from igrow.trainer.research.paper.scores import SCORED, r2, score
+from igrow.trainer.research.paper.wur2020 import FAULTY_DAYS, TrajectoryFileError, read_seasons
 from igrow.trainer.training.stage import StageData, TrainingPlan
 
 

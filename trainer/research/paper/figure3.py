@@ -19,8 +19,8 @@ from igrow.core.arrays import Floats
 from igrow.core.economics import co2_cost, product_price
 from igrow.core.errors import IgrowError
 from igrow.core.site import Prices
-from igrow.trainer.data.public.automatoes2020 import Champion
-from igrow.trainer.data.public.automatoes2020 import read as read_champion
+from igrow.trainer.research.paper.automatoes2020 import Champion
+from igrow.trainer.research.paper.automatoes2020 import read as read_champion
 from igrow.trainer.research.paper.compartments import Compartment, read_2019
 from igrow.trainer.research.paper.harvests import PREDICTORS
 

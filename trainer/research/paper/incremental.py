@@ -26,10 +26,10 @@ from igrow.core.simulator.network import NetworkSimulator, Stage
 from igrow.core.simulator.network_run import free_growth
 from igrow.core.telemetry import Telemetry, to_grid
 from igrow.trainer.data.public import agc2019
-from igrow.trainer.data.public.wur2020 import Seasons, read_seasons
 from igrow.trainer.research.network.simulator import Layouts, derived, hourly_data, train_simulator
 from igrow.trainer.research.paper.scores import SCORED, score
 from igrow.trainer.research.paper.table1 import run_freely, split_seasons
+from igrow.trainer.research.paper.wur2020 import Seasons, read_seasons
 from igrow.trainer.training.stage import StageData, TrainingPlan, run_windows, train_stage, untrained
 
 WEEK = 168

@@ -20,8 +20,8 @@ from scipy import stats
 from igrow.core.arrays import Floats
 from igrow.core.language import ENGLISH
 from igrow.core.quantities import QUANTITIES
-from igrow.trainer.data.public.liaoyang2020 import AREA, CONTROL, EXPERIMENT, Pilot, read, read_climate_pair
 from igrow.trainer.figure_style import COLOURS, date_axis, few_ticks, name_above, panels
+from igrow.trainer.research.paper.liaoyang2020 import AREA, CONTROL, EXPERIMENT, Pilot, read, read_climate_pair
 
 PUBLISHED: Mapping[str, Mapping[str, float]] = {
     "yield": {"change": 10.15, "control_spread": 53.0, "experiment_spread": 45.0, "p": 8e-3},

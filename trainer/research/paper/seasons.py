@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from igrow.trainer.data.public.wur2020 import read_seasons
 from igrow.trainer.research.network.checkpoint import load_simulator
 from igrow.trainer.research.paper.scores import PUBLISHED_BASELINE, PUBLISHED_INCREMENTAL, SCORED, Score, score
 from igrow.trainer.research.paper.table1 import run_freely
+from igrow.trainer.research.paper.wur2020 import read_seasons
 
 
 def evaluate(

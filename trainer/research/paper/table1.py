@@ -23,11 +23,11 @@ from igrow.core.arrays import Floats, Integers
 from igrow.core.errors import IgrowError
 from igrow.core.simulator.network import NetworkSimulator
 from igrow.core.simulator.network_run import free_run
-from igrow.trainer.data.public.wur2020 import Seasons, TrajectoryFileError, read_seasons
 from igrow.trainer.research.network.checkpoint import BUNDLE_FOLDER
 from igrow.trainer.research.network.export import write_network_bundle
 from igrow.trainer.research.network.simulator import Layouts, train_simulator, with_setting_drivers
 from igrow.trainer.research.paper.scores import PUBLISHED_BASELINE, PUBLISHED_INCREMENTAL, SCORED, Score, score
+from igrow.trainer.research.paper.wur2020 import Seasons, TrajectoryFileError, read_seasons
 
 SITE = "wur2020"
 SETTINGS = ("ventilation_offset", "lamp_radiation_limit")
