@@ -19,6 +19,10 @@ from pathlib import Path
 import numpy as np
 from sklearn.ensemble import HistGradientBoostingRegressor
 
+from benchmarks.forecasts.combination import remembering
+from benchmarks.forecasts.forecaster import Forecaster, adapt, fit_forecaster, from_few_days
+from benchmarks.forecasts.totals import coverage, daily_totals
+from benchmarks.forecasts.uncertainty import ErrorGrowth
 from benchmarks.measured_network import network_predictor
 from igrow.core.arrays import Floats, Integers, Mask
 from igrow.core.economics import local_days
@@ -35,10 +39,6 @@ from igrow.trainer.fit.actuation import setpoint_columns
 from igrow.trainer.fit.climate import site_prior
 from igrow.trainer.fit.evaluation import Errors, Predictor, errors_of, starts_within, summarise
 from igrow.trainer.fit.model import training_envelope
-from igrow.trainer.research.forecasts.combination import remembering
-from igrow.trainer.research.forecasts.forecaster import Forecaster, adapt, fit_forecaster, from_few_days
-from igrow.trainer.research.forecasts.totals import coverage, daily_totals
-from igrow.trainer.research.forecasts.uncertainty import ErrorGrowth
 
 STEP = 300.0
 HORIZONS = ("1_h", "24_h", "7_d")

@@ -7,13 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
+from benchmarks.forecasts.forecaster import fit_forecaster
+from benchmarks.forecasts.totals import daily_totals
 from igrow.core.arrays import Array
 from igrow.core.simulator import actuation
 from igrow.core.simulator.hybrid.nominal import nominal, site_record
 from igrow.trainer.fit.actuation import by_its_own_rules, fit_actuation, setpoint_columns
 from igrow.trainer.fit.climate import site_prior
-from igrow.trainer.research.forecasts.forecaster import fit_forecaster
-from igrow.trainer.research.forecasts.totals import daily_totals
 from tests.virtual_log import SITE, virtual_log
 
 

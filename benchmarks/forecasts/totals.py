@@ -6,14 +6,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from benchmarks.forecasts.forecaster import Forecaster
+from benchmarks.forecasts.uncertainty import ErrorGrowth
 from igrow.core.arrays import Floats, Mask
 from igrow.core.simulator.closed_loop import pipe_heat
 from igrow.core.simulator.hybrid import climate
 from igrow.core.simulator.hybrid import record as records
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.fit.evaluation import Predictor, starts_within
-from igrow.trainer.research.forecasts.forecaster import Forecaster
-from igrow.trainer.research.forecasts.uncertainty import ErrorGrowth
 
 _DAYS = 6
 """Days that are looked back for how much more or less was used than predicted."""

@@ -7,6 +7,25 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from benchmarks.forecasts.closed_loop import refine_actuation
+from benchmarks.forecasts.combination import Combination, fit_combination, remembering
+from benchmarks.forecasts.disturbance import (
+    CHANNELS,
+    DisturbanceModel,
+    fit_disturbance,
+    helpful_channels,
+    missing_fluxes,
+    observed_runs,
+    run_fluxes,
+)
+from benchmarks.forecasts.output_statistics import (
+    OutputStatistics,
+    all_runs,
+    corrected_runs,
+    fit_output_statistics,
+)
+from benchmarks.forecasts.residual_model import ResidualModel, fit_residual_model
+from benchmarks.forecasts.uncertainty import ErrorGrowth, growth_of_runs
 from igrow.core.arrays import Floats, Integers, Mask
 from igrow.core.simulator.closed_loop import closed_run
 from igrow.core.simulator.hybrid import record as records
@@ -17,25 +36,6 @@ from igrow.trainer.fit.climate import fit_climate
 from igrow.trainer.fit.evaluation import Predictor, errors_of, starts_within, summarise
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.scales import ERROR_SCALES
-from igrow.trainer.research.forecasts.closed_loop import refine_actuation
-from igrow.trainer.research.forecasts.combination import Combination, fit_combination, remembering
-from igrow.trainer.research.forecasts.disturbance import (
-    CHANNELS,
-    DisturbanceModel,
-    fit_disturbance,
-    helpful_channels,
-    missing_fluxes,
-    observed_runs,
-    run_fluxes,
-)
-from igrow.trainer.research.forecasts.output_statistics import (
-    OutputStatistics,
-    all_runs,
-    corrected_runs,
-    fit_output_statistics,
-)
-from igrow.trainer.research.forecasts.residual_model import ResidualModel, fit_residual_model
-from igrow.trainer.research.forecasts.uncertainty import ErrorGrowth, growth_of_runs
 
 _PENALTIES = (0.03, 0.1, 0.3, 1.0)
 _WIDENING = 1.5

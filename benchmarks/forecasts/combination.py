@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from benchmarks.forecasts.uncertainty import DAYLIGHT
 from igrow.core.arrays import Floats, Integers
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.fit.evaluation import Predictor
-from igrow.trainer.research.forecasts.uncertainty import DAYLIGHT
 
 _DAYS = 6
 """Days that are looked back for the usual error."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from igrow.trainer.research.forecasts.uncertainty import error_growth
+from benchmarks.forecasts.uncertainty import error_growth
 
 
 def test_intervals_cover_new_errors_of_the_same_kind() -> None:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from benchmarks.forecasts.combination import fit_combination
+from benchmarks.forecasts.disturbance import missing_fluxes, observed_runs
+from benchmarks.forecasts.residual_model import fit_residual_model
 from igrow.core.simulator.hybrid.nominal import nominal, site_record
 from igrow.trainer.fit.evaluation import errors_of, evaluate, summarise
-from igrow.trainer.research.forecasts.combination import fit_combination
-from igrow.trainer.research.forecasts.disturbance import missing_fluxes, observed_runs
-from igrow.trainer.research.forecasts.residual_model import fit_residual_model
 from tests.virtual_log import SITE, virtual_log
 
 

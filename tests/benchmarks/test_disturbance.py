@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from igrow.core.simulator.hybrid.nominal import nominal, site_record
-from igrow.trainer.research.forecasts.disturbance import (
+from benchmarks.forecasts.disturbance import (
     CHANNELS,
     DisturbanceModel,
     expected_fluxes,
     helpful_channels,
     missing_fluxes,
 )
+from igrow.core.simulator.hybrid.nominal import nominal, site_record
 from tests.virtual_log import SITE, virtual_log
 
 DAY = 288

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.forecasts.combination import Combination
+from benchmarks.forecasts.output_statistics import all_runs, corrected_runs, fit_output_statistics
 from igrow.core.simulator.hybrid.nominal import site_record
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.fit.actuation import setpoint_columns
-from igrow.trainer.research.forecasts.combination import Combination
-from igrow.trainer.research.forecasts.output_statistics import all_runs, corrected_runs, fit_output_statistics
 from tests.virtual_log import SITE, virtual_log
 
 DAY = 288

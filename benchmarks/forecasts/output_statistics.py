@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from benchmarks.forecasts.combination import Combination, cells, usual_error
 from igrow.core.arrays import Floats, Integers
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.fit.evaluation import Predictor
-from igrow.trainer.research.forecasts.combination import Combination, cells, usual_error
 
 _AHEAD = (
     "outdoor_temperature",
