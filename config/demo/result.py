@@ -106,8 +106,11 @@ def recipe_season(out: Path) -> Telemetry:
     return to_grid(read_csv(next((out / "recipe").glob("*.csv.gz"))), 300)
 
 
-def obtained(site: Site, log: Telemetry, days: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return what each day was worth by the planner's own rules, from what was measured, EUR m-2."""
+def obtained(site: Site, log: Telemetry, days: NDArray[np.int64], co2: float) -> NDArray[np.float64]:
+    """Return what each day was worth by the planner's own rules, from what was measured, EUR m-2.
+
+    The crop has had `co2` kg m-2 when the log begins.
+    """
     physical = site.greenhouse
     rail = np.maximum(log["rail_pipe_temperature"] - log["air_temperature"], 0.0)
     grow = np.maximum(log["grow_pipe_temperature"] - log["air_temperature"], 0.0)
@@ -119,40 +122,64 @@ def obtained(site: Site, log: Telemetry, days: NDArray[np.int64]) -> NDArray[np.
         "net_growth": np.gradient(log["net_growth"]) * 12.0,
         "fruit_fresh_weight": np.gradient(log["fruit_fresh_weight"]) * 12.0,
     } | {name: log[name] for name in (*PREDICTED, "leaf_area_index")}
+    had = co2 + dosed(log)
     worth = []
     for day in days:
         rows = slice(day * DAY, (day + 1) * DAY)
         means = {name: np.nanmean(values[rows].reshape(24, 12), axis=1)[None, None] for name, values in hourly.items()}
         outcome = Outcome(**means, outside=np.zeros((1, 1, 24)))
         time = log.time[rows][::12]
-        worth.append(float(Objective(site, time).value(outcome).profit[0, 0]))
+        worth.append(float(Objective(site, time, had[day]).value(outcome).profit[0, 0]))
     return np.array(worth)
 
 
+def dosed(log: Telemetry) -> NDArray[np.float64]:
+    """Return the CO2 dosed before each midnight of a log, kg m-2, (days + 1,)."""
+    rows = np.nan_to_num(log["co2_dosing"])[: len(log) // DAY * DAY]
+    return np.append(0.0, np.cumsum(rows.reshape(-1, DAY).sum(axis=1) / 12.0))
+
+
 def compare_money(site: Site, log: Telemetry, recipe: Telemetry, events: Any, since: int | None) -> dict[str, Any]:
-    """Return expected and obtained worth, plan against recipe, EUR m-2 per day, before and after the adoption."""
+    """Return expected and obtained worth, plan against recipe, EUR m-2 per day, before and after the adoption.
+
+    Days of weather differ more than plan and recipe do: the gain has the standard error of its days.
+    """
     days = min(len(log), len(recipe)) // DAY
-    all_days = np.arange(1, days)
-    plan, other = obtained(site, log, all_days), obtained(site, recipe, all_days)
-    expected = np.full((2, days), np.nan)
+    plans: dict[int, Any] = {}
     for event in events:
         if event.get("kind") == "plan":
             detail = event.get("detail", event)
             start = np.datetime64(str(detail["start"]).removesuffix("+00:00").removesuffix("Z"), "s")
-            day = int((start - log.time[0]) // np.timedelta64(1, "D"))
-            if 0 <= day < days:
-                expected[:, day] = detail["expected_profit"], detail["recipe_profit"]
-    spans = {"first bundle": slice(0, since), "corrected bundle": slice(since, None)} if since else {"all": slice(None)}
+            plans[int((start - log.time[0]) // np.timedelta64(1, "D"))] = detail
+    number = np.array(sorted(day for day in plans if 0 <= day < days), dtype=np.int64)
+    if not len(number):
+        return {}
+    expected, usual = (np.array([plans[day][key] for day in number]) for key in ("expected_profit", "recipe_profit"))
+    # Both houses were one until the first plan.
+    co2 = plans[number[0]]["co2_before"] - float(dosed(log)[number[0]])
+    plan, other = obtained(site, log, number, co2), obtained(site, recipe, number, co2)
+    spans = {"all": number >= 0}
+    if since is not None:
+        spans = {"first bundle": number < since, "corrected bundle": number >= since}
     return {
         name: {
-            "plan_expected": mean(expected[0, 1:][span]),
+            "days": int(span.sum()),
+            "plan_expected": mean(expected[span]),
             "plan_obtained": mean(plan[span]),
-            "recipe_expected": mean(expected[1, 1:][span]),
+            "recipe_expected": mean(usual[span]),
             "recipe_obtained": mean(other[span]),
+            "gain_expected": mean((expected - usual)[span]),
+            "gain_obtained": mean((plan - other)[span]),
+            "gain_standard_error": standard_error((plan - other)[span]),
             "unit": "EUR m-2 d-1",
         }
         for name, span in spans.items()
     }
+
+
+def standard_error(values: NDArray[np.float64]) -> float:
+    """Return that of a mean; NaN for fewer than two values."""
+    return float(values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else float("nan")
 
 
 def mean(values: NDArray[np.float64]) -> float:
@@ -180,10 +207,13 @@ def table(result: dict[str, Any]) -> str:
             + "".join("              -" if x is None else f"{x:15.3f}" for x in cells)
             + f"   {row['unit']}"
         )
-    lines += ["", "worth of a day (EUR m-2)        plan expected  obtained   recipe expected  obtained"]
+    lines += ["", f"{'worth of a day, EUR m-2':29}by plans:         by the recipe:    more by plans:"]
+    lines.append(f"{'':28}" + " expected obtained" * 3)
     for name, row in result["money"].items():
-        cells = [row[key] for key in ("plan_expected", "plan_obtained", "recipe_expected", "recipe_obtained")]
-        lines.append(f"  {name:28}{cells[0]:14.3f}{cells[1]:10.3f}{cells[2]:18.3f}{cells[3]:10.3f}")
+        keys = [f"{side}_{when}" for side in ("plan", "recipe", "gain") for when in ("expected", "obtained")]
+        amounts = "".join(f"{row[key]:9.3f}" for key in keys)
+        who = f"{name}, {row['days']} days"
+        lines.append(f"  {who:26}{amounts} +- {row['gain_standard_error']:.3f}")
     named = ", ".join(one["effect"] for one in result["findings"]) or "nothing"
     lines += ["", f"undeclared effect: {result['effect']}, since {result['broken_on']}"]
     lines.append(f"found: {result['verdict']} ({named}), since {result['found_since'] or 'before the log begins'}")
