@@ -18,7 +18,7 @@ QUANTITIES = ("air_temperature", "air_humidity", "air_co2")
 
 
 @dataclass(frozen=True)
-class Greenhouses:
+class Asked:
     """What a command asked for."""
 
     shared: list[GreenhouseParameters]
@@ -27,7 +27,7 @@ class Greenhouses:
     """The next ones are free for weather and noise."""
 
 
-def asked_for(about: str | None, *, shared: int, new: int, seed: int) -> Greenhouses:
+def asked_for(about: str | None, *, shared: int, new: int, seed: int) -> Asked:
     """Return the greenhouses of `--shared N --new N --seed N`, with these defaults; `about` is the command's help."""
     parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--shared", type=int, default=shared, help=f"greenhouses that share (default {shared})")
@@ -37,7 +37,7 @@ def asked_for(about: str | None, *, shared: int, new: int, seed: int) -> Greenho
     rng = np.random.default_rng(options.seed)
     builder = GreenhouseParameters().varied(rng, BUILDER)
     plants = [builder.varied(rng, OWN) for _ in range(options.shared + options.new)]
-    return Greenhouses(plants[: options.shared], plants[options.shared :], options.seed)
+    return Asked(plants[: options.shared], plants[options.shared :], options.seed)
 
 
 def site_of(plant: GreenhouseParameters) -> Site:

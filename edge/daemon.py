@@ -20,12 +20,12 @@ from igrow.edge.earlier import Earlier
 from igrow.edge.hand_off import PATIENCE, HandOff, settled
 from igrow.edge.image import Quality
 from igrow.edge.journal import Journal
-from igrow.edge.notify import Notifier
 from igrow.edge.ports import Plan
 from igrow.edge.reloading import Reloading, refuse_what_needs_a_restart, same_registers
 from igrow.edge.services import SIMULATED_PATIENCE, Services, open_services
 from igrow.edge.snapshot import snapshot_of
 from igrow.edge.stopping import STOP_SECONDS, StopReport
+from igrow.edge.systemd_notify import SystemdNotifier
 from igrow.edge.wiring import Control, build_control
 
 LEAST_STOP = 5.0
@@ -44,12 +44,12 @@ class Daemon:
     """Runs control for one site until it is told to stop."""
 
     def __init__(
-        self, configuration: Configuration, services: Services | None = None, notifier: Notifier | None = None
+        self, configuration: Configuration, services: Services | None = None, notifier: SystemdNotifier | None = None
     ):
         """`services` and `notifier` replace the real ones in tests."""
         self.configuration = configuration
         self.services = services or open_services(configuration)
-        self._notifier = notifier or Notifier()
+        self._notifier = notifier or SystemdNotifier()
         self._journal = Journal(self.services.store)
         self._control: Control | None = None
         self._stopping = asyncio.Event()

@@ -16,7 +16,7 @@ PATIENCE = 2.0
 
 
 class SignOfLife(Protocol):
-    """Hears that a wait goes on as it should (`igrow.edge.notify.Notifier`)."""
+    """Hears that a wait goes on as it should (`igrow.edge.systemd_notify.SystemdNotifier`)."""
 
     feed_every: float
     """Seconds between two signs that it can rely on; may be infinite."""

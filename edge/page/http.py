@@ -34,7 +34,7 @@ HTML = "text/html; charset=utf-8"
 TEXT = "text/plain; charset=utf-8"
 
 
-class RefusedError(Exception):
+class RequestRefusedError(Exception):
     """A request that is not served: a status line, and one line of text."""
 
     def __init__(self, status: str, text: str) -> None:
@@ -57,10 +57,10 @@ class Request:
 
     @property
     def form(self) -> dict[str, str]:
-        """The fields of a form. Raises RefusedError for a body that is none."""
+        """The fields of a form. Raises RequestRefusedError for a body that is none."""
         kind = self.headers.get("content-type", "").partition(";")[0].strip().lower()
         if kind != "application/x-www-form-urlencoded":
-            raise RefusedError("415 Unsupported Media Type", "a form is expected")
+            raise RequestRefusedError("415 Unsupported Media Type", "a form is expected")
         return _fields(self.body.decode("latin-1"))
 
     @property
@@ -122,18 +122,20 @@ def see(path: str, headers: Mapping[str, str] | None = None) -> Response:
 
 
 async def read_request(reader: asyncio.StreamReader, address: str) -> Request:
-    """Read one request. Raises RefusedError; IncompleteReadError where the visitor hangs up before its end."""
+    """Read one request. Raises RequestRefusedError; IncompleteReadError where the visitor hangs up before its end."""
     try:
         head = (await reader.readuntil(b"\r\n\r\n")).decode("latin-1")
     except asyncio.LimitOverrunError:
-        raise RefusedError("431 Request Header Fields Too Large", f"at most {HEAD_BYTES} bytes are read") from None
+        raise RequestRefusedError(
+            "431 Request Header Fields Too Large", f"at most {HEAD_BYTES} bytes are read"
+        ) from None
     first, *lines = head.removesuffix("\r\n\r\n").split("\r\n")
     parts = first.split(" ")
     if len(parts) != 3 or not parts[2].startswith("HTTP/1.") or not parts[1].startswith("/"):
-        raise RefusedError("400 Bad Request", "no HTTP request")
+        raise RequestRefusedError("400 Bad Request", "no HTTP request")
     method, target, _ = parts
     if method not in ("GET", "HEAD", "POST"):
-        raise RefusedError("405 Method Not Allowed", "GET, HEAD and POST are answered")
+        raise RequestRefusedError("405 Method Not Allowed", "GET, HEAD and POST are answered")
     headers = _headers(lines)
     body = await _body(reader, headers) if method == "POST" else b""
     path, _, query = target.partition("?")
@@ -146,9 +148,9 @@ def _headers(lines: Sequence[str]) -> dict[str, str]:
         name, colon, value = line.partition(":")
         name = name.lower()
         if not colon or name != name.strip() or not name:
-            raise RefusedError("400 Bad Request", "no header")
+            raise RequestRefusedError("400 Bad Request", "no header")
         if name in headers and name in ("host", "content-length", "origin", "content-type", "cookie"):
-            raise RefusedError("400 Bad Request", f"{name} comes twice")
+            raise RequestRefusedError("400 Bad Request", f"{name} comes twice")
         headers[name] = value.strip()
     return headers
 
@@ -156,9 +158,9 @@ def _headers(lines: Sequence[str]) -> dict[str, str]:
 async def _body(reader: asyncio.StreamReader, headers: Mapping[str, str]) -> bytes:
     length = headers.get("content-length", "")
     if "transfer-encoding" in headers or not (length.isascii() and length.isdigit()):
-        raise RefusedError("411 Length Required", "a form with its length is expected")
+        raise RequestRefusedError("411 Length Required", "a form with its length is expected")
     if len(length) > 6 or int(length) > BODY_BYTES:
-        raise RefusedError("413 Content Too Large", f"at most {BODY_BYTES} bytes are read")
+        raise RequestRefusedError("413 Content Too Large", f"at most {BODY_BYTES} bytes are read")
     return await reader.readexactly(int(length))
 
 
@@ -166,7 +168,7 @@ def _fields(encoded: str) -> dict[str, str]:
     try:
         return dict(parse_qsl(encoded, keep_blank_values=True, max_num_fields=MOST_FIELDS))
     except ValueError:
-        raise RefusedError("400 Bad Request", "too many fields") from None
+        raise RequestRefusedError("400 Bad Request", "too many fields") from None
 
 
 def own_name(host: str | None, names: Sequence[str]) -> bool:

@@ -13,8 +13,8 @@ from typing import Any, TypeVar
 from igrow.core.errors import IgrowError
 from igrow.edge.page.http import (
     HEAD_BYTES,
-    RefusedError,
     Request,
+    RequestRefusedError,
     Response,
     own_name,
     plain,
@@ -100,7 +100,7 @@ class PageServer:
         try:
             async with asyncio.timeout(REQUEST_SECONDS):
                 request = await read_request(reader, address)
-        except RefusedError as refused:
+        except RequestRefusedError as refused:
             response, head_only = plain(refused.status, str(refused)), False
         else:
             response, head_only = await self._answer_any(request), request.method == "HEAD"
@@ -114,7 +114,7 @@ class PageServer:
         """Answer whatever happens."""
         try:
             return await self._answer(request)
-        except RefusedError as refused:
+        except RequestRefusedError as refused:
             return plain(refused.status, str(refused))
         except TimeoutError:
             return plain("503 Service Unavailable", "a disk, or the daemon, takes too long; try again")
@@ -125,7 +125,9 @@ class PageServer:
     async def _answer(self, request: Request) -> Response:
         configuration, say = self._pages.configuration(), self._pages.words(request)
         if not own_name(request.headers.get("host"), configuration.file.page.names):
-            raise RefusedError("421 Misdirected Request", "this page is for its own names: localhost, or page.names")
+            raise RequestRefusedError(
+                "421 Misdirected Request", "this page is for its own names: localhost, or page.names"
+            )
         if request.method == "POST":
             return await self._post(request)
         found = self._pages.file(request.path)
@@ -136,7 +138,7 @@ class PageServer:
         if request.path == "/sign-in":
             return self._pages.sign_in(say, has_password=password is not None)
         if request.path != "/":
-            raise RefusedError("404 Not Found", "there is only /")
+            raise RequestRefusedError("404 Not Found", "there is only /")
         # The flash is taken here, in the one thread that sessions belong to.
         said = session.take_said() if session is not None and request.method == "GET" else ("", True)
         span = request.query.get("span", "day")
@@ -149,7 +151,7 @@ class PageServer:
 
     async def _post(self, request: Request) -> Response:
         if not same_origin(request):
-            raise RefusedError("403 Forbidden", "the form is of another page")
+            raise RequestRefusedError("403 Forbidden", "the form is of another page")
         if request.path == "/sign-in":
             return await self._sign_in(request)
         password = await self._aside(self._pages.password)
@@ -158,12 +160,12 @@ class PageServer:
         if session is None:
             return see("/sign-in")
         if not hmac.compare_digest(request.form.get("token", "").encode(), session.token.encode()):
-            raise RefusedError("403 Forbidden", "the form is not of this session: load the page again")
+            raise RequestRefusedError("403 Forbidden", "the form is not of this session: load the page again")
         if request.path == "/sign-out":
             self._sessions.end(secret)
             return see("/", {"Set-Cookie": f"{COOKIE}=; Max-Age=0; Path=/; HttpOnly; SameSite=Strict"})
         if request.path != "/act":
-            raise RefusedError("404 Not Found", "there is nothing to do there")
+            raise RequestRefusedError("404 Not Found", "there is nothing to do there")
         return await self._act(request, session)
 
     async def _act(self, request: Request, session: Session) -> Response:
@@ -216,7 +218,7 @@ class PageServer:
     async def _run(self, threads: ThreadPoolExecutor, work: Callable[[], T]) -> T:
         """Return what `work` returns. Raises TimeoutError where it takes too long; it is then left to its thread."""
         if self._at_work >= MOST_AT_WORK:
-            raise RefusedError("503 Service Unavailable", "too many visitors; try again")
+            raise RequestRefusedError("503 Service Unavailable", "too many visitors; try again")
         self._at_work += 1
         future = asyncio.get_running_loop().run_in_executor(threads, work)
         future.add_done_callback(self._worked)

@@ -11,7 +11,7 @@ from igrow.edge.planning.graph_process import ProcessError
 from igrow.edge.updates.bundles import WENT_DOWN, Bundles, identity_of
 from igrow.edge.updates.rules import Graphs, UpdateRules
 from igrow.edge.updates.shadow import Comparison, Predictor
-from igrow.edge.updates.signed_source import Fetched, RefusedError, SignedSource, UpdateError
+from igrow.edge.updates.signed_source import BundleRefusedError, Fetched, SignedSource, UpdateError
 from igrow.edge.updates.telling import Teller, Verdict
 from igrow.edge.updates.wishes import Wishes
 
@@ -135,7 +135,7 @@ class BundleLife:
             fetched = self._source.fetch(self._site, self._bundles.settled)
             bundle = None if fetched is None else self._bundles.take(fetched)
         except (UpdateError, BundleError, ProcessError) as error:
-            if fetched is not None and isinstance(error, RefusedError | BundleError | ProcessError):
+            if fetched is not None and isinstance(error, BundleRefusedError | BundleError | ProcessError):
                 identity = identity_of(fetched)
                 self._bundles.reject(time, Verdict("rejected", identity, identity, str(error)))
             if str(error) != self.last_refusal:

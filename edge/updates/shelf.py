@@ -10,7 +10,7 @@ from pathlib import Path
 
 from igrow.core.bundle import Bundle, BundleError, read_bundle, self_test
 from igrow.core.quantities import QUANTITIES
-from igrow.edge.updates.signed_source import LARGEST_BUNDLE, RefusedError, UpdateError
+from igrow.edge.updates.signed_source import LARGEST_BUNDLE, BundleRefusedError, UpdateError
 
 SPARE_BYTES = 16 * 2**20
 """Left free on the disk after unpacking, for the log."""
@@ -76,7 +76,9 @@ class Shelf:
     def _place(self, partial: Path, *, own_site: bool) -> Bundle:
         bundle = read_bundle(partial)
         if own_site and bundle.manifest.site != self._site:
-            raise RefusedError(f"{bundle.label}: made for site {bundle.manifest.site}, this gateway is {self._site}")
+            raise BundleRefusedError(
+                f"{bundle.label}: made for site {bundle.manifest.site}, this gateway is {self._site}"
+            )
         self._check(bundle)
         self_test(bundle)
         final = self.path(bundle.identity)
@@ -89,7 +91,7 @@ class Shelf:
         """Refuse a bundle that is not meant for this gateway."""
         manifest = bundle.manifest
         if _version(manifest.igrow_version) > _version(self._version):
-            raise RefusedError(
+            raise BundleRefusedError(
                 f"{bundle.label}: made by igrow {manifest.igrow_version}, newer than {self._version} here; "
                 "update the gateway"
             )
@@ -98,7 +100,7 @@ class Shelf:
                 for quantity, unit in zip(tensor.quantities, tensor.units, strict=True):
                     known = QUANTITIES.get(quantity)
                     if known is not None and known.unit != unit:
-                        raise RefusedError(
+                        raise BundleRefusedError(
                             f"{bundle.label}: {graph}.{tensor.name}: {quantity} in {unit}, expected {known.unit}"
                         )
 
@@ -107,7 +109,7 @@ def _version(text: str) -> tuple[int, ...]:
     """Return major and minor: a patch never changes what a bundle means."""
     found = re.match(r"(\d+)\.(\d+)", text)
     if found is None:
-        raise RefusedError(f'"{text}" is no version such as 1.2.3')
+        raise BundleRefusedError(f'"{text}" is no version such as 1.2.3')
     return int(found[1]), int(found[2])
 
 
@@ -118,10 +120,10 @@ def _unpack(archive: Path, folder: Path) -> None:
         for member in source:
             name = member.name
             if not member.isreg() or "/" in name or "\\" in name or name.startswith("."):
-                raise RefusedError(f"{archive.name}: {name!r} is not a plain file with a plain name")
+                raise BundleRefusedError(f"{archive.name}: {name!r} is not a plain file with a plain name")
             total += member.size
             if total > LARGEST_BUNDLE:
-                raise RefusedError(f"{archive.name}: more than {LARGEST_BUNDLE >> 20} MiB")
+                raise BundleRefusedError(f"{archive.name}: more than {LARGEST_BUNDLE >> 20} MiB")
             if shutil.disk_usage(folder).free < member.size + SPARE_BYTES:
                 raise UpdateError(f"{archive.name}: not enough space on the disk")
             content = source.extractfile(member)

@@ -36,7 +36,7 @@ class UpdateError(IgrowError):
     """A bundle that was not let in, and why; another attempt may succeed."""
 
 
-class RefusedError(UpdateError):
+class BundleRefusedError(UpdateError):
     """A bundle that is not meant for this gateway, whenever it is tried."""
 
 

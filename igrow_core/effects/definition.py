@@ -70,7 +70,7 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class Memory:
+class EffectMemory:
     """The one state of an effect that remembers.
 
     `start(xp, drivers, parameters)` gives its value at rest under the drivers; `advance(xp, memory, drivers,
@@ -108,7 +108,7 @@ class Effect:
     source: str
     opposite: str = ""
     """The same of a negative amplitude, with its size; empty where there is none."""
-    memory: Memory | None = None
+    memory: EffectMemory | None = None
     measured: tuple[str, ...] = ()
     """The quantities whose measurement a sensor effect falsifies."""
     resembles: tuple[str, ...] = ()
@@ -143,14 +143,14 @@ class Effect:
 
 def lagged(
     driver: Callable[[Any, Drivers], Array], time_constant: str, unit_seconds: float, *, within_step: bool = False
-) -> Memory:
+) -> EffectMemory:
     """Return the memory of a first-order lag.
 
     Args:
         driver: what is lagged, a function of (xp, drivers).
         time_constant: name of the parameter with the time constant.
         unit_seconds: seconds in one unit of that parameter.
-        within_step: see `Memory`.
+        within_step: see `EffectMemory`.
     """
 
     def start(xp: Any, drivers: Drivers, _parameters: Values) -> Array:
@@ -160,7 +160,7 @@ def lagged(
         decay = decay_factor(xp, parameters[time_constant], seconds / unit_seconds)
         return driver(xp, drivers) + (memory - driver(xp, drivers)) * decay
 
-    return Memory(start, advance, within_step)
+    return EffectMemory(start, advance, within_step)
 
 
 def decay_factor(xp: Any, time_constant: Array, elapsed: float) -> Array:

@@ -11,7 +11,7 @@ from typing import Any
 
 from igrow.core.air import LATENT_HEAT
 from igrow.core.arrays import Array
-from igrow.core.effects import Effect, Memory, Parameter
+from igrow.core.effects import Effect, EffectMemory, Parameter
 from igrow.core.effects.definition import Balance, Drivers, Values
 
 _SOURCE = "invented for tests"
@@ -24,7 +24,7 @@ def _effect(
     balances: tuple[Balance, ...],
     contribution: Callable[[Any, Drivers, Values, Array], Mapping[str, Array]],
     sentence: str,
-    memory: Memory | None = None,
+    memory: EffectMemory | None = None,
 ) -> Effect:
     return Effect(
         name=name, kind="process", balances=balances, drivers=drivers, parameters=(amplitude,),
@@ -137,7 +137,7 @@ _DEFINITIONS = (
         ("light", "heat"),
         _whitewash,
         "whitewash on the cover that rain washes off",
-        Memory(_whitewash_start, _whitewash_advance),
+        EffectMemory(_whitewash_start, _whitewash_advance),
     ),
     _effect(
         "boiler_flue",
@@ -154,7 +154,7 @@ _DEFINITIONS = (
         ("vapour", "heat"),
         _wet_floor,
         "the floor is hosed down on Mondays and dries for hours",
-        Memory(_wet_floor_start, _wet_floor_advance),
+        EffectMemory(_wet_floor_start, _wet_floor_advance),
     ),
     _effect(
         "buried_main",

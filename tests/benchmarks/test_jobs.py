@@ -13,7 +13,7 @@ from benchmarks.jobs import CLUSTER, Jobs
 from igrow.trainer.fleet import calls
 from igrow.trainer.fleet.registry import Backend
 from igrow.trainer.fleet.runner import run_tasks
-from igrow.trainer.fleet.tasks import Outcome, Task
+from igrow.trainer.fleet.tasks import Task, TaskOutcome
 
 
 def digits(job: tuple[int, str]) -> tuple[int, Any]:
@@ -58,7 +58,7 @@ def test_one_worker_gives_the_digits_of_two(tmp_path: Path) -> None:
 def test_a_cluster_that_is_named_gets_the_same_tasks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[tuple[Backend, str | None]] = []
 
-    def noted(tasks: Sequence[Task], backend: Backend, *, workers: int, address: str | None) -> Iterator[Outcome]:
+    def noted(tasks: Sequence[Task], backend: Backend, *, workers: int, address: str | None) -> Iterator[TaskOutcome]:
         asked.append((backend, address))
         return run_tasks(tasks, workers=workers)
 

@@ -12,7 +12,7 @@ import pytest
 from benchmarks.processes import below
 from igrow.trainer.fleet.registry import Backend
 from igrow.trainer.fleet.runner import run_tasks
-from igrow.trainer.fleet.tasks import Ending, Outcome, Task
+from igrow.trainer.fleet.tasks import Ending, Task, TaskOutcome
 
 HERE = "tests.fleet.fleet_of_sites"
 
@@ -21,7 +21,7 @@ def task(name: str, function: str, arguments: dict[str, object], *, limit: float
     return Task(name, f"{HERE}:{function}", arguments, limit, megabytes, 2)
 
 
-def outcomes(*tasks: Task, workers: int = 1) -> dict[str, Outcome]:
+def outcomes(*tasks: Task, workers: int = 1) -> dict[str, TaskOutcome]:
     return {one.name: one for one in run_tasks(tasks, workers=workers)}
 
 
@@ -53,7 +53,7 @@ def test_failures_of_every_kind_leave_the_others_alone(tmp_path: Path) -> None:
     assert found["recovers"].result == {"attempt": 2}
 
 
-def digits(found: dict[str, Outcome]) -> dict[str, object]:
+def digits(found: dict[str, TaskOutcome]) -> dict[str, object]:
     return {name: one.result for name, one in found.items()}
 
 

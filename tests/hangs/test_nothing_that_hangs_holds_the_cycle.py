@@ -19,10 +19,10 @@ from pymodbus.transport.serialtransport import SerialTransport
 
 from igrow.core.whole_files import write_whole
 from igrow.edge.exchange import ExchangeService
-from igrow.edge.notify import Notifier
 from igrow.edge.planning import GraphProcess, PlanningProcess
 from igrow.edge.sources.override import Lease, write_leases
 from igrow.edge.status.server import StatusServer
+from igrow.edge.systemd_notify import SystemdNotifier
 from tests.control.daemon_bench import plan_at_once, until
 from tests.hangs.conftest import Bench, hurry
 from tests.hangs.hanging_disk import HangingDisk
@@ -221,7 +221,7 @@ async def test_a_configuration_on_a_share_that_hangs(bench: Bench, monkeypatch: 
 async def test_a_watchdog_that_reads_nothing(bench: Bench) -> None:
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as nobody_reads:
         nobody_reads.bind(str(bench.folder / "notify"))
-        notifier = Notifier({"NOTIFY_SOCKET": str(bench.folder / "notify"), "WATCHDOG_USEC": "90000"})
+        notifier = SystemdNotifier({"NOTIFY_SOCKET": str(bench.folder / "notify"), "WATCHDOG_USEC": "90000"})
         async with bench.running(notifier=notifier):
             await bench.controls()
             for _ in range(1000):

@@ -14,7 +14,7 @@ from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.service import history, recalibration
 from igrow.trainer.service.archive import Archive
-from igrow.trainer.service.recalibration import Outcome, bundle_in_force, forget_old, recalibrate, relative_gain
+from igrow.trainer.service.recalibration import Diagnosed, bundle_in_force, forget_old, recalibrate, relative_gain
 from tests.tiny_bundle import write_tiny_bundle
 
 SITE = Site(name="house", latitude=52.0, longitude=4.5)
@@ -46,7 +46,7 @@ def diagnosed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         def write(folder: Path) -> None:
             write_tiny_bundle(folder, site="house", offset=offset)
 
-        return Outcome("named", ("wind_infiltration",), 0.2, (), write)
+        return Diagnosed("named", ("wind_infiltration",), 0.2, (), write)
 
     monkeypatch.setattr(recalibration, "_diagnose", diagnose)
     return asked

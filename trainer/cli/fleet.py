@@ -12,7 +12,7 @@ from typing import Any
 from igrow.trainer.fleet.overview import SiteRow, overview, utc
 from igrow.trainer.fleet.registry import Entry, Registry, load_registry
 from igrow.trainer.fleet.runner import run_tasks
-from igrow.trainer.fleet.tasks import Ending, Outcome, Task
+from igrow.trainer.fleet.tasks import Ending, Task, TaskOutcome
 from igrow.trainer.fleet.work import CHANGE, LATER_DAYS, LEARNED
 from igrow.trainer.service import history
 from igrow.trainer.service.recalibration import DAYS, site_folder, utc_now
@@ -148,7 +148,7 @@ def write_shared(registry: Registry, entries: Sequence[Entry]) -> str:
     return "\n".join(lines)
 
 
-def remember(registry: Registry, action: str, outcome: Outcome, now: datetime) -> None:
+def remember(registry: Registry, action: str, outcome: TaskOutcome, now: datetime) -> None:
     """Write into a site's history what its task could not write itself."""
     if outcome.ending is Ending.DONE:
         return
@@ -162,7 +162,7 @@ def remember(registry: Registry, action: str, outcome: Outcome, now: datetime) -
         print(f"{outcome.name}: its history cannot be written: {folder}: {error.strerror}", file=sys.stderr, flush=True)
 
 
-def sentence(outcome: Outcome) -> str:
+def sentence(outcome: TaskOutcome) -> str:
     """Return what became of one site's task, in one line and one more for each note."""
     cost = f"({outcome.seconds:.1f} s, {outcome.megabytes:.0f} MB)"
     if outcome.ending is not Ending.DONE:

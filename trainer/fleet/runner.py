@@ -16,7 +16,7 @@ from joblib import Parallel, delayed
 
 from igrow.core.errors import IgrowError
 from igrow.trainer.fleet.registry import Backend
-from igrow.trainer.fleet.tasks import Outcome, Task
+from igrow.trainer.fleet.tasks import Task, TaskOutcome
 from igrow.trainer.fleet.worker import close_all, run_limited
 
 ANSWERS_SECONDS = 20.0
@@ -25,7 +25,7 @@ ANSWERS_SECONDS = 20.0
 
 def run_tasks(
     tasks: Sequence[Task], backend: Backend = Backend.PROCESSES, *, workers: int = 1, address: str | None = None
-) -> Iterator[Outcome]:
+) -> Iterator[TaskOutcome]:
     """Yield the outcome of each task as it ends.
 
     Args:
@@ -47,7 +47,7 @@ def run_tasks(
         close_all()
 
 
-def _on_ray(tasks: Sequence[Task], workers: int, address: str | None) -> Iterator[Outcome]:
+def _on_ray(tasks: Sequence[Task], workers: int, address: str | None) -> Iterator[TaskOutcome]:
     ray = _ray()
     began = not ray.is_initialized()
     if began:

@@ -13,7 +13,7 @@ import threading
 import time
 from dataclasses import replace
 
-from igrow.trainer.fleet.tasks import Ending, Outcome, Task
+from igrow.trainer.fleet.tasks import Ending, Task, TaskOutcome
 
 MOST_TASKS = 200
 """After which a child is replaced, so that what libraries leave behind does not pile up."""
@@ -37,7 +37,7 @@ class Worker:
             start_new_session=True,
         )
 
-    def run(self, task: Task) -> Outcome:
+    def run(self, task: Task) -> TaskOutcome:
         """Do one task; after anything but DONE or FAILED this worker is of no more use."""
         began = time.monotonic()
         request = {"function": task.function, "arguments": dict(task.arguments)}
@@ -52,7 +52,7 @@ class Worker:
         if line is None:
             self.close()
             note = f"not done after {task.seconds:g} s, its limit"
-            return Outcome(task.name, Ending.LATE, {}, note, seconds)
+            return TaskOutcome(task.name, Ending.LATE, {}, note, seconds)
         if not line.endswith(b"\n"):
             return self._lost(task, began)
         self.done += 1
@@ -61,8 +61,8 @@ class Worker:
             self.done = MOST_TASKS
         used = {"seconds": seconds, "processor": answer["processor"], "megabytes": answer["megabytes"]}
         if "result" in answer:
-            return Outcome(task.name, Ending.DONE, answer["result"], **used)
-        return Outcome(task.name, Ending.FAILED, {}, answer["note"], **used)
+            return TaskOutcome(task.name, Ending.DONE, answer["result"], **used)
+        return TaskOutcome(task.name, Ending.FAILED, {}, answer["note"], **used)
 
     def close(self) -> None:
         """End the child, with all that it started."""
@@ -88,15 +88,15 @@ class Worker:
             line += chunk
         return line
 
-    def _lost(self, task: Task, began: float) -> Outcome:
+    def _lost(self, task: Task, began: float) -> TaskOutcome:
         self.close()
         code = self._process.returncode
         how = signal.Signals(-code).name if code < 0 else f"exit code {code}"
         note = f"its process ended ({how}); out of memory, or ended from outside"
-        return Outcome(task.name, Ending.KILLED, {}, note, time.monotonic() - began)
+        return TaskOutcome(task.name, Ending.KILLED, {}, note, time.monotonic() - began)
 
 
-def run_limited(task: Task) -> Outcome:
+def run_limited(task: Task) -> TaskOutcome:
     """Do a task in this thread's worker, and again where the worker was lost, as often as the task allows."""
     for attempt in range(1, task.retries + 2):
         worker = getattr(_local, "worker", None)

@@ -158,7 +158,7 @@ def _run(
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Diagnosed:
     """What a diagnosis means for the loop."""
 
     verdict: str
@@ -169,7 +169,7 @@ class Outcome:
     """Writes the corrected model as a bundle; None where there is none."""
 
 
-def _diagnose(site: Site, log: SiteLog, bundle: Bundle, target: Path, drift: Path | None) -> Outcome:
+def _diagnose(site: Site, log: SiteLog, bundle: Bundle, target: Path, drift: Path | None) -> Diagnosed:
     """Diagnose a log against a bundle, and write diagnosis and report to `target`."""
     from igrow.trainer.data import prepare_log  # noqa: PLC0415  (scipy is slow to import)
     from igrow.trainer.diagnosis import diagnose  # noqa: PLC0415
@@ -187,7 +187,7 @@ def _diagnose(site: Site, log: SiteLog, bundle: Bundle, target: Path, drift: Pat
             export(diagnosis.corrected, folder)
 
     causes = tuple(one.effect for one in diagnosis.findings)
-    return Outcome(diagnosis.verdict, causes, relative_gain(diagnosis.errors), tuple(diagnosis.notes), write_bundle)
+    return Diagnosed(diagnosis.verdict, causes, relative_gain(diagnosis.errors), tuple(diagnosis.notes), write_bundle)
 
 
 def relative_gain(errors: Mapping[str, Mapping[str, Mapping[str, float]]]) -> float:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from igrow.core.arrays import Array
-from igrow.core.effects.definition import Drivers, Effect, Memory, Parameter, Values
+from igrow.core.effects.definition import Drivers, Effect, EffectMemory, Parameter, Values
 
 
 def _opening(drivers: Drivers) -> Array:
@@ -43,5 +43,5 @@ EFFECT = Effect(
     title="vents that answer late when they turn back",
     sentence="the vents answer late when they turn back (share {value})",
     source="general practice: play of rack-and-pinion vent drives",
-    memory=Memory(_start, _advance, within_step=True),
+    memory=EffectMemory(_start, _advance, within_step=True),
 )

@@ -14,7 +14,7 @@ import time
 from collections.abc import Mapping
 
 
-class Notifier:
+class SystemdNotifier:
     """Sends to systemd, or nowhere when the daemon was started by hand."""
 
     def __init__(self, environment: Mapping[str, str] = os.environ) -> None:
