@@ -25,15 +25,15 @@ if TYPE_CHECKING:
     from igrow.trainer.diagnosis import diagnose
     from igrow.trainer.exporting import export, read_model
     from igrow.trainer.fit import FittedModel, calibrate
-    from igrow.trainer.fit.comparison import Comparison, compare
     from igrow.trainer.publishing import publish
+    from igrow.trainer.scoring.comparison import Comparison, compare
 
 _PLACES = {
-    "Comparison": "igrow.trainer.fit.comparison",
+    "Comparison": "igrow.trainer.scoring.comparison",
     "FittedModel": "igrow.trainer.fit",
     "Log": "igrow.trainer.data",
     "calibrate": "igrow.trainer.fit",
-    "compare": "igrow.trainer.fit.comparison",
+    "compare": "igrow.trainer.scoring.comparison",
     "diagnose": "igrow.trainer.diagnosis",
     "export": "igrow.trainer.exporting",
     "prepare_log": "igrow.trainer.data",

@@ -16,7 +16,7 @@ BARRED = {
     "edge": ("igrow.trainer", *HEAVY),
     "trainer": ("igrow.edge",),
 }
-SCORES_BOTH_VARIANTS = "trainer/fit/scoring.py"
+SCORES_BOTH_VARIANTS = "trainer/scoring/bundles.py"
 
 
 def imports(folder: str) -> Iterator[tuple[str, str]]:

@@ -18,10 +18,10 @@ from igrow.core.simulator.leaf_picking import LeafPicking
 from igrow.core.simulator.network import HOURS, LightFormula, NetworkSimulator, Stage
 from igrow.core.simulator.network_run import Carried, begin, free_run, known_inputs, run_harvest, run_hour
 from igrow.trainer.data import prepare_log
-from igrow.trainer.fit.scoring import BY_SETPOINTS, score_bundle
 from igrow.trainer.research.network.checkpoint import load_simulator
 from igrow.trainer.research.network.export import CARRIED, NEXT, hourly_outputs, write_network_bundle
 from igrow.trainer.research.network.simulator import CLIMATE, GROWTH, HARVEST, daily_data, derived, hourly_data
+from igrow.trainer.scoring.bundles import BY_SETPOINTS, score_bundle
 from igrow.trainer.training.stage import run_stage, untrained
 from tests.virtual_log import SITE, virtual_log
 

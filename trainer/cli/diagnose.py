@@ -23,8 +23,8 @@ from igrow.trainer.diagnosis.drift import read_drift
 from igrow.trainer.diagnosis.evidence import errors_with
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
 from igrow.trainer.exporting import read_model
-from igrow.trainer.fit.scoring import calibrated_until
 from igrow.trainer.report import write_diagnosis
+from igrow.trainer.scoring.bundles import calibrated_until
 
 EXAMPLE = "igrow-trainer diagnose logs/ --bundle bundle/ --site site.yaml --out diagnosis/"
 

@@ -15,7 +15,7 @@ from igrow.core.quantities import QUANTITIES
 from igrow.trainer.cli.log_arguments import add_log_arguments, log_of
 from igrow.trainer.cli.progress import progress
 from igrow.trainer.fit.evaluation import Evaluation
-from igrow.trainer.fit.scoring import score_bundle, unseen
+from igrow.trainer.scoring.bundles import score_bundle, unseen
 
 EXAMPLE = "igrow-trainer evaluate later.csv --bundle out/bundle --site config/site.yaml"
 

@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+from igrow.core import gaps
 from igrow.core.arrays import Floats, Integers
 from igrow.core.errors import IgrowError
 from igrow.core.local_time import to_local
@@ -76,8 +77,7 @@ def hourly_run(telemetry: Telemetry, seasons: Seasons, simulator: NetworkSimulat
         good &= known
         if not known.any():
             raise IgrowError(f"the log has no value of {name}")
-        last = np.maximum.accumulate(np.where(known, np.arange(hours), -1))
-        columns[name] = values[np.where(last < 0, int(np.argmax(known)), last)][None]
+        columns[name] = gaps.held(values)[None]
     light = simulator.light.par(np, columns["global_radiation"], columns["lamp_on"])
     full = derived({**columns, "par": light})
     crop = (*simulator.growth.states, *simulator.harvest.states)

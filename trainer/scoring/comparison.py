@@ -13,7 +13,7 @@ from igrow.trainer.data import Log
 from igrow.trainer.exporting import read_model
 from igrow.trainer.fit.evaluation import Evaluation, errors_of, summarise
 from igrow.trainer.fit.model import FittedModel
-from igrow.trainer.fit.scoring import BY_SETPOINTS, runs_by_actuators, score_bundle, unseen
+from igrow.trainer.scoring.bundles import BY_SETPOINTS, runs_by_actuators, score_bundle, unseen
 
 HORIZONS = ("1_h", "24_h")
 PERSISTENCE = "persistence"

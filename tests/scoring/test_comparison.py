@@ -7,8 +7,8 @@ import pytest
 from igrow.core.bundle import default_bundle_folder
 from igrow.trainer.data import prepare_log
 from igrow.trainer.fit import FittedModel
-from igrow.trainer.fit.comparison import compare
 from igrow.trainer.fit.evaluation import evaluate
+from igrow.trainer.scoring.comparison import compare
 from tests.diagnosis.conftest import model_in_force
 from tests.virtual_log import SITE, virtual_log
 

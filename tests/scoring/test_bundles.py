@@ -16,7 +16,7 @@ from igrow.core.telemetry import Telemetry, write_csv
 from igrow.trainer import FittedModel, export, prepare_log
 from igrow.trainer.cli import main
 from igrow.trainer.cli.diagnose import since_calibration
-from igrow.trainer.fit.scoring import ACTUATORS, BY_SETPOINTS, score_bundle, unseen
+from igrow.trainer.scoring.bundles import ACTUATORS, BY_SETPOINTS, score_bundle, unseen
 from tests.virtual_log import SITE, virtual_log
 
 DAYS = 12
