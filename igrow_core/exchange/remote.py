@@ -6,9 +6,9 @@ import importlib
 from pathlib import Path
 from typing import Any
 
-from igrow.core.exchange.address import Address
+from igrow.core.exchange.address import Address, parse_address
 from igrow.core.exchange.errors import ExchangeError
-from igrow.core.exchange.place import Entry
+from igrow.core.exchange.place import Entry, FolderPlace, Place
 
 TIMEOUT_SECONDS = 60
 
@@ -81,6 +81,20 @@ class RemotePlace:
         # What libraries of this kind raise is known to nobody: their own errors, their transports', the system's.
         text = (str(error).strip().splitlines() or [type(error).__name__])[0]
         return ExchangeError(f"{self._name}: {text[:200]}")
+
+
+def open_place(
+    text: str, *, base: Path | None = None, known_hosts: str | None = None, identity: str | None = None
+) -> Place:
+    """Return the place at an address: a folder, below `base` where it is relative, or a server. Raises IgrowError."""
+    address = parse_address(text, base)
+    if address.scheme == "file":
+        return FolderPlace(Path(address.path))
+    return open_remote(
+        address,
+        known_hosts=Path(known_hosts) if known_hosts else None,
+        identity=Path(identity) if identity else None,
+    )
 
 
 def open_remote(address: Address, *, known_hosts: Path | None = None, identity: Path | None = None) -> RemotePlace:

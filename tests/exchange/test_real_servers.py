@@ -13,10 +13,10 @@ import pytest
 
 from igrow.core.exchange import ExchangeError, FolderPlace, Place
 from igrow.core.exchange.address import parse_address
+from igrow.core.exchange.remote import open_place as open_at_trainer
 from igrow.edge.exchange.places import open_place as open_at_gateway
 from igrow.edge.exchange.sftp import SftpPlace
 from igrow.trainer.publishing import create_keys, publish_in
-from igrow.trainer.service.places import open_place as open_at_trainer
 from tests.exchange.gateway_and_trainer import DAY, SITE, START, World
 from tests.exchange.peers import Sftp, s3_server, sftp_server
 

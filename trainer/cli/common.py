@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from igrow.core.bundle import Bundle
 from igrow.core.exchange import Place
-from igrow.trainer.service.places import open_place
+from igrow.core.exchange.remote import open_place
 
 if TYPE_CHECKING:
     from datetime import datetime

@@ -14,13 +14,13 @@ import numpy as np
 from igrow.core.errors import IgrowError
 from igrow.core.exchange import Below, Place
 from igrow.core.exchange.documents import LARGEST_DOCUMENT, parse_object
+from igrow.core.exchange.remote import open_place
 from igrow.core.site import load_site
 from igrow.core.whole_files import write_whole
 from igrow.trainer.service import history
 from igrow.trainer.service.archive import Archive
 from igrow.trainer.service.collecting import collect
 from igrow.trainer.service.forwarding import forward
-from igrow.trainer.service.places import open_place
 from igrow.trainer.service.recalibration import recalibrate, site_folder
 
 COLLECTED = "collected.json"

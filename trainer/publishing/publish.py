@@ -6,8 +6,8 @@ from pathlib import Path
 
 from igrow.core.bundle import Bundle, read_bundle
 from igrow.core.exchange import Below, Place
+from igrow.core.exchange.remote import open_place
 from igrow.trainer.publishing.repository import publish_in
-from igrow.trainer.service.places import open_place
 
 
 def publish(bundle: Bundle | Path | str, exchange: Place | Path | str, keys: Path | str) -> Bundle:
