@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,17 @@ EXAMPLE = (
     "  igrow-trainer fleet recalibrate /srv/fleet             # those that are due; --site NAME for one\n"
     "  igrow-trainer fleet status /srv/fleet --page /var/www/greenhouses"
 )
+
+
+FUNCTIONS = {
+    "collect": "collect_site",
+    "diagnose": "recalibrate_site",
+    "recalibrate": "recalibrate_site",
+    "calibrate": "calibrate_site",
+    "learn": "learn_from_site",
+    "publish": "publish_site",
+}
+"""Of `work.py`, by action."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -83,36 +94,24 @@ def make_task(arguments: argparse.Namespace, registry: Registry, entry: Entry, n
         "identity": registry.path(registry.file.identity),
     }
     common = {"state": str(registry.state.resolve()), "exchange": exchange, "now": now.timestamp()}
-    keys = str(registry.keys.resolve())
-    given: dict[str, Callable[[], tuple[str, dict[str, Any]]]] = {
-        "collect": lambda: (
-            "collect_site",
-            {"site": entry.site.name, "forward_to": registry.file.forward, "take_over": arguments.take_over},
-        ),
-        "publish": lambda: ("publish_site", {"site": entry.site.name, "keys": keys, "again": arguments.again}),
-        "diagnose": lambda: (
-            "recalibrate_site",
-            {"file": str(entry.file.resolve()), "keys": keys, "publish": False, "force": True, "days": arguments.days,
-             "drift": shared(entry, registry.drift)},
-        ),
-        "learn": lambda: ("learn_from_site", {"file": str(entry.file.resolve()), "days": arguments.days}),
-        "calibrate": lambda: (
-            "calibrate_site",
-            {"file": str(entry.file.resolve()), "keys": keys, "days": arguments.days,
-             "population": shared(entry, registry.population)},
-        ),
-        "recalibrate": lambda: (
-            "recalibrate_site",
-            {"file": str(entry.file.resolve()), "keys": keys, "publish": True, "force": arguments.force,
-             "days": arguments.days, "drift": shared(entry, registry.drift)},
-        ),
+    site, file, keys = entry.site.name, str(entry.file.resolve()), str(registry.keys.resolve())
+    asked = vars(arguments)
+    days, drift = asked.get("days"), shared(entry, registry.drift)
+    own: dict[str, Any] = {
+        "collect": {"site": site, "forward_to": registry.file.forward, "take_over": asked.get("take_over")},
+        "publish": {"site": site, "keys": keys, "again": asked.get("again")},
+        "diagnose": {"file": file, "keys": keys, "publish": False, "force": True, "days": days, "drift": drift},
+        "recalibrate": {
+            "file": file, "keys": keys, "publish": True, "force": asked.get("force"), "days": days, "drift": drift,
+        },
+        "learn": {"file": file, "days": days},
+        "calibrate": {"file": file, "keys": keys, "days": days, "population": shared(entry, registry.population)},
     }  # fmt: skip
-    function, own = given[arguments.action]()
     limits = registry.file.limits
     return Task(
         entry.site.name,
-        f"igrow.trainer.fleet.work:{function}",
-        {**common, **own},
+        f"igrow.trainer.fleet.work:{FUNCTIONS[arguments.action]}",
+        {**common, **own[arguments.action]},
         seconds=limits.time.total_seconds(),
         megabytes=limits.memory,
         retries=limits.retries,
