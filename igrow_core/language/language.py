@@ -17,7 +17,7 @@ from igrow.core.errors import IgrowError
 from igrow.core.language import sentences
 from igrow.core.language.locales import Locale, locale_of
 from igrow.core.language.names import NAMES
-from igrow.core.language.units import US, Shown, Units, written
+from igrow.core.language.units import US, US_WORDS, Shown, Units, written
 from igrow.core.quantities import QUANTITIES
 
 _UNITS = {unit for one in QUANTITIES.values() for unit in (one.unit, one.difference_unit)} - {"1"} | {"g m-3"}
@@ -27,6 +27,7 @@ PART = re.compile(
     + r"))?)(?![\w/-]|[.:]\w)"
 )
 """A name of the program, or a number with what unit it has, within a line."""
+_US_WORD = re.compile("|".join(map(re.escape, US_WORDS)))
 _TEMPERATURE = re.compile(r"(?<![\w.,/-])([-−]?\d+(?:[.,]\d+)?) (K|degC|°C)(?![\w/])")
 LANGUAGES = ("en", "nl", "de", "es", "zh")
 """Codes of the languages; texts are written in the first."""
@@ -79,6 +80,17 @@ class Language:
             return self.amount(float(found[1].replace("−", "-").replace(",", ".")), found[2].replace("°C", "degC"), 3)
 
         return _TEMPERATURE.sub(shown, text) if self.units == "us" else text
+
+    def sized(self, message: str, value: float, unit: str) -> str:
+        """Return a text with a size of a unit of the registry in it, `{value}` and `{unit}`.
+
+        Where people use another unit, what the text says of its parts ("for each kelvin") is told in theirs as well.
+        """
+        shown = self.shown(unit)
+        told = self.text(message, value=self.number(shown.of(value)), unit=self.text(shown.unit))
+        if self.units == "us" and unit in US and "{unit}" not in message:
+            told = _US_WORD.sub(lambda found: US_WORDS[found[0]], told)
+        return self.in_units(told)
 
     def name(self, word: str) -> str:
         """Return what people call a quantity, parameter, balance or reason of the program."""

@@ -49,8 +49,20 @@ US: Mapping[str, Shown] = {
     "kg m-2": Shown("lb/ft²", 0.3048**2 / 0.45359237),
     "kg m-2 h-1": Shown("lb/(ft² h)", 0.3048**2 / 0.45359237),
     "L m-2 h-1": Shown("gal/(ft² h)", 0.3048**2 / 3.785411784),
+    "g m-2 h-1": Shown("oz/(ft² h)", 0.3048**2 / 28.349523125),
+    "g m-2 h-1 kPa-1": Shown("oz/(ft² h kPa)", 0.3048**2 / 28.349523125),
+    "W m-2 K-1": Shown("W/(m² °F)", 1.0 / 1.8),
+    "h-1 (m s-1)-1": Shown("1/(h mph)", 1609.344 / 3600.0),
+    "m s-1 K-0.5": Shown("mph/√°F", 3600.0 / 1609.344 / 1.8**0.5),
 }
-"""What growers in the United States use in place of a unit of the registry; exact by NIST Special Publication 811."""
+"""What growers in the United States use in place of a unit of the registry; exact by NIST Special Publication 811. The
+power for an area stays in W/m², as their climate computers have the sun's."""
+US_WORDS: Mapping[str, str] = {
+    **dict.fromkeys(("kelvin", "Kelvin", "一开尔文", "开尔文"), "°F"),
+    **dict.fromkeys(("g/m2", "g/m²"), "oz/ft²"),
+    "m/s": "mph",
+}
+"""Words of sentences that name a part of such a unit: for each kelvin, per m/s of wind."""
 
 
 def written(unit: str) -> str:

@@ -246,10 +246,33 @@ def test_the_size_of_a_cause_goes_with_its_unit(leak: Diagnosis) -> None:
     assert "<td>1.8</td><td>0.9 to 2.7</td><td>°F</td>" in render_report(american)
 
 
+@pytest.mark.parametrize("code", LANGUAGES)
 @pytest.mark.parametrize("name", EFFECTS)
-def test_a_size_whose_unit_is_another_in_america_is_said_with_it(name: str) -> None:
+def test_a_size_whose_unit_is_another_in_america_is_said_with_it(name: str, code: str) -> None:
+    """No sentence of a cause has a part in kelvin, metres a second or grams per m2, in any language."""
+    effect, metric, us = EFFECTS[name], speak(code), speak(code, units="us")
+    unit = effect.amplitude.unit
+    for sentence in filter(None, (effect.sentence, effect.opposite)):
+        told, here = us.sized(sentence, 2.0, unit), metric.sized(sentence, 2.0, unit)
+        assert not re.search(r"[Kk]elvin|开尔文|m/s|g/m|\d K\b|°C|degC", told)
+        if unit in US:
+            assert us.number(us.shown(unit).of(2.0)) in told
+            assert metric.number(2.0) in here
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "told"),
+    [
+        ("wind_infiltration", 0.1, "about 0.045 air changes per hour more for each mph of wind"),
+        ("screen_gap", 1.8, "about 1 W/m2 more for each °F of difference to outside"),
+        ("soil_respiration", 1.0, "about 0.0033 oz/ft² per hour at 68 °F"),
+        ("photosynthesis_heat_limit", 0.2, "0.2 less for 18 °F too much"),
+        ("stack_ventilation", 0.1, "(0.17 mph per root °F)"),
+    ],
+)
+def test_a_size_of_several_units_is_told_in_those_of_the_site(name: str, value: float, told: str) -> None:
     effect = EFFECTS[name]
-    assert effect.amplitude.unit not in US or "{value} {unit}" in effect.sentence
+    assert told in speak("en", units="us").sized(effect.sentence, value, effect.amplitude.unit)
 
 
 def test_figures_share_one_style_and_turn_dark_with_the_page(page: str) -> None:

@@ -87,8 +87,7 @@ def cause(finding: Finding, language: Language) -> str:
 def _told(effect: Effect, size: float, unit: str, language: Language) -> str:
     """Return an effect's sentence with its size, in the units of the site as far as people there have others."""
     sentence, amount = effect.told(size)
-    value = language.number(language.shown(unit).of(amount))
-    return language.in_units(language.text(sentence, value=value, unit=language.unit(unit)))
+    return language.sized(sentence, amount, unit)
 
 
 def omission(one: Omission, language: Language, *, completed: bool) -> list[str]:

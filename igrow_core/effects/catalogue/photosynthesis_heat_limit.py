@@ -34,6 +34,6 @@ EFFECT = Effect(
     signature="CO2 stays high on hot noons",
     separating_test="shade or ventilate more for one hot noon and compare",
     title="a crop that assimilates less in heat",
-    sentence="the crop assimilates less in heat: {value} less for ten degrees too much",
+    sentence="the crop assimilates less in heat: {value} less for 10 K too much",
     source="Farquhar et al. (1980), Planta 149: temperature response",
 )
