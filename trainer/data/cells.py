@@ -10,10 +10,12 @@ import re
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
 from igrow.core.errors import IgrowError
+from igrow.trainer.data import fixed_places
 
 EXCEL = (".xlsx", ".xls", ".xlsm", ".xlsb", ".ods")
 TEXT = (".csv", ".csv.gz", ".txt", ".tsv", ".dat", ".txt.gz", ".tsv.gz")
@@ -75,6 +77,8 @@ def _refuse_what_is_no_text(path: Path, data: bytes) -> None:
     told = next((text for start, text in what.items() if data.startswith(start)), None)
     if told is None and re.match(rb"\s*<(!doctype|html|table|\?xml)", data[:200], re.IGNORECASE):
         told = "a page of HTML or XML: open it in a spreadsheet and save it as CSV or .xlsx"
+    if told is None and re.match(rb"\s*(\{\s*\"|\[\s*[\[{])", data[:200]):
+        told = "JSON: a table is needed, such as CSV with a row for each time and a column for each sensor"
     if told is not None:
         raise IgrowError(f"{path}: is {told}")
 
@@ -103,14 +107,22 @@ def read_text(path: Path, encoding: str) -> str:
         raise IgrowError(f"{path}: is not {encoding} text") from None
 
 
-def read_cells(path: Path, *, delimiter: str = ",", encoding: str = "utf-8", sheet: str | None = None) -> Cells:
+def read_cells(
+    path: Path,
+    *,
+    delimiter: str = ",",
+    encoding: str = "utf-8",
+    sheet: str | None = None,
+    transposed: bool = False,
+) -> Cells:
     """Return the cells of a file; rows without any text are left out.
 
     Args:
         path: of a text file (gzip or not), a workbook, or Parquet.
-        delimiter: between the cells of a text file.
+        delimiter: between the cells of a text file; a blank where columns stand at fixed places.
         encoding: of a text file.
         sheet: of a workbook; None: the first.
+        transposed: whether rows and columns are to be exchanged.
 
     Raises:
         IgrowError: the file cannot be read, or has no such sheet.
@@ -119,14 +131,30 @@ def read_cells(path: Path, *, delimiter: str = ",", encoding: str = "utf-8", she
         table = _workbook(path, sheet)
     elif path.name.lower().endswith(".parquet"):
         table = _parquet(path)
+    elif delimiter == " ":
+        table = fixed_places.split(read_text(path, encoding))
     else:
-        reader = csv.reader(io.StringIO(read_text(path, encoding), newline=""), delimiter=delimiter)
+        text = unquoted(read_text(path, encoding))
+        reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
         try:
             table = [(row, reader.line_num) for row in reader]
         except csv.Error as error:
             raise IgrowError(f"{path}:{reader.line_num}: cannot be read as a table: {error}") from None
+    if transposed:
+        columns = zip_longest(*(row for row, _ in table), fillvalue="")
+        table = [(list(column), number) for number, column in enumerate(columns, 1)]
     kept = [([cell.strip() for cell in row], line) for row, line in table if any(cell.strip() for cell in row)]
     return Cells(path, [row for row, _ in kept], [line for _, line in kept])
+
+
+def unquoted(text: str) -> str:
+    """Return a text whose lines each stand in quotes as a whole without them: what a spreadsheet made of a CSV."""
+    lines = [line for line in text.splitlines() if line.strip()]
+    inside = [line.strip()[1:-1] for line in lines]
+    whole = all(
+        line.strip() == f'"{own}"' and '"' not in own.replace('""', "") for line, own in zip(lines, inside, strict=True)
+    )
+    return "\n".join(own.replace('""', '"') for own in inside) if lines and whole else text
 
 
 def sheets(path: Path) -> list[str]:

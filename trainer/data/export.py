@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Container, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,37 +11,21 @@ import numpy as np
 from igrow.core.arrays import Floats, Times
 from igrow.core.errors import IgrowError
 from igrow.core.local_time import to_local
-from igrow.core.telemetry import concatenate
-from igrow.trainer.data.cells import Cells, read_cells
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.data.cells import read_cells
+from igrow.trainer.data.export_table import ExportTable, as_table, chosen_rows, held, with_rows
+from igrow.trainer.data.fault import DataFault
 from igrow.trainer.data.mapping import ColumnMapping, ExportMapping, TimeColumn
 from igrow.trainer.data.number_texts import number
-from igrow.trainer.data.rows import Merged, merge
-from igrow.trainer.data.timestamps import ZONE, to_utc, wall_parser, without_weekday
-from igrow.trainer.data.vocabulary import folded, month_names, words_of, zones_called
+from igrow.trainer.data.rows import Merged, joined, merge
+from igrow.trainer.data.timestamps import ZONE, dates_alone, to_utc, wall_parser
+from igrow.trainer.data.vocabulary import folded, words_of, zones_called
 from igrow.trainer.data.zone_abbreviations import split
 
 MOST_UNREADABLE = 0.02
 """Share of rows whose time cannot be read up to which they are no readings; beyond it the form is wrong."""
-_LEAST_WIDTH = 3
-"""Columns of a table in which a line of one cell is a title."""
 LONGEST_INTERVAL = 7200.0
 """Seconds; what fell in a longer one is no rate."""
-
-
-@dataclass(frozen=True)
-class ExportTable:
-    """An export's columns as texts."""
-
-    path: Path
-    columns: Mapping[str, Sequence[str]]
-    """By name, (n,)."""
-    lines: Sequence[int]
-
-    def __getitem__(self, name: str) -> Sequence[str]:
-        """Return one column; raises IgrowError where the export lacks it."""
-        if name not in self.columns:
-            raise IgrowError(f"{self.path}: no column {name!r}; it has {', '.join(self.columns)}")
-        return self.columns[name]
 
 
 def read(path: Path, mapping: ExportMapping) -> Merged:
@@ -51,7 +34,13 @@ def read(path: Path, mapping: ExportMapping) -> Merged:
     Raises:
         IgrowError: a column is not there, or a cell is no number or no time.
     """
-    cells = read_cells(path, delimiter=mapping.delimiter, encoding=mapping.encoding, sheet=mapping.sheet)
+    cells = read_cells(
+        path,
+        delimiter=mapping.delimiter,
+        encoding=mapping.encoding,
+        sheet=mapping.sheet,
+        transposed=mapping.transposed,
+    )
     return read_table(chosen_rows(as_table(cells, mapping.header, mapping.first_row), mapping.only), mapping)
 
 
@@ -71,98 +60,27 @@ def read_table(table: ExportTable, mapping: ExportMapping) -> Merged:
 def read_tables(tables: Sequence[ExportTable], mapping: ExportMapping) -> Merged:
     """Return the telemetry of several tables of one layout, joined in time; raises IgrowError as `read` does."""
     parts = [read_table(chosen_rows(table, mapping.only), mapping) for table in tables]
-    if len(parts) == 1:
-        return parts[0]
-    notes = dict.fromkeys(note for one in parts for note in one.notes)
-    faults = dict.fromkeys(fault for one in parts for fault in one.faults)
-    return Merged(concatenate([one.telemetry for one in parts]), tuple(notes), tuple(faults))
-
-
-def as_table(cells: Cells, header: Sequence[int] = (1,), first_row: int | None = None) -> ExportTable:
-    """Return the columns of cells by the names that the header lines give them.
-
-    Names over several lines are joined by a blank; an upper line's cell stands for the empty ones after it (the merged
-    cells of a workbook). A name that stands twice gets a number.
-    """
-    heads = [row for row, line in zip(cells.rows, cells.lines, strict=True) if line in set(header)]
-    if not heads:
-        raise IgrowError(f"{cells.path}: line {header[0]} with the columns' names is empty or not there")
-    start = max(header) + 1 if first_row is None else first_row
-    body = [(row, line) for row, line in zip(cells.rows, cells.lines, strict=True) if line >= start]
-    width = max(len(row) for row in heads)
-    heads = [*(_spread(row, width) for row in heads[:-1]), heads[-1]]
-    names: list[str] = []
-    for position in range(width):
-        parts = [" ".join(row[position].split()) for row in heads if position < len(row) and row[position]]
-        name = " ".join(parts)
-        seen = sum(other == name or re.fullmatch(re.escape(name) + r" \(\d+\)", other) is not None for other in names)
-        names.append(f"{name} ({seen + 1})" if seen and name else name)
-    for row, line in body:
-        if any(row[width:]):
-            told = f"{len(row)} cells where the header has {width}"
-            hint = "where decimals have commas, cells need another sign between them"
-            raise IgrowError(f"{cells.path}:{line}: {told}: {hint}")
-    columns: dict[str, Sequence[str]] = {}
-    for position, name in enumerate(names):
-        texts = [row[position] if position < len(row) else "" for row, _ in body]
-        if name or any(texts):
-            columns[name or f"column {position + 1}"] = texts
-    return _without_titles(ExportTable(cells.path, columns, [line for _, line in body]))
-
-
-def _spread(row: Sequence[str], width: int) -> list[str]:
-    """Return a row whose empty cells have the text of the cell before them."""
-    return _held([*row, *[""] * (width - len(row))])
-
-
-def chosen_rows(table: ExportTable, only: Mapping[str, str]) -> ExportTable:
-    """Return the rows in which columns have given texts; raises IgrowError where there is none."""
-    for name, text in only.items():
-        if text not in table[name]:
-            there = ", ".join(sorted(set(table[name]))[:9])
-            raise IgrowError(f"{table.path}: no row has {text!r} in column {name!r}; it has {there}")
-        table = _rows(table, [row for row, cell in enumerate(table[name]) if cell == text])
-    return table
-
-
-def _without_titles(table: ExportTable) -> ExportTable:
-    """Return a table without lines of one text alone, such as the title of each day's part; a date is no title."""
-    if len(table.columns) < _LEAST_WIDTH:
-        return table
-    first, *others = table.columns.values()
-    titles = {row for row, text in enumerate(first) if _is_title(text) and not any(cells[row] for cells in others)}
-    return _rows(table, [row for row in range(len(first)) if row not in titles])
-
-
-def _is_title(text: str) -> bool:
-    word = re.match(r"[^\W\d_]+", without_weekday(text))
-    return word is not None and folded(word[0]) not in month_names()
-
-
-def _rows(table: ExportTable, kept: Sequence[int]) -> ExportTable:
-    if len(kept) == len(table.lines):
-        return table
-    columns = {name: [cells[row] for row in kept] for name, cells in table.columns.items()}
-    return ExportTable(table.path, columns, [table.lines[row] for row in kept])
+    return joined(parts)
 
 
 def readings(table: ExportTable, time: TimeColumn) -> tuple[ExportTable, tuple[str, ...]]:
     """Return the rows that are readings, with notes on the others.
 
     A text without any digit is no time: a line of sums below the table, or its header once more; nor are the few that
-    cannot be read as one, such as a month with its means. A day that stands on the first of its rows alone holds for
-    those below it.
+    cannot be read as one, such as a month with its means, and dates alone among times of day. A day that stands on the
+    first of its rows alone holds for those below it.
     """
     column, time_of_day = time.column, time.time_of_day
     notes: list[str] = []
     if time_of_day is not None and not all(table[column]):
-        days, hours = _held(table[column]), table[time_of_day]
+        days, hours = held(table[column]), table[time_of_day]
         filled = [day if hour else own for day, hour, own in zip(days, hours, table[column], strict=True)]
         if filled != list(table[column]):
             notes.append(f"{column!r} is empty on some rows: the day above holds there")
             table = ExportTable(table.path, {**table.columns, column: filled}, table.lines)
     texts = table[column]
     strange = [row for row, text in enumerate(texts) if text and not any(map(str.isdigit, text))]
+    strange += dates_alone(texts) if time_of_day is None else ()
     strange = sorted({*strange, *_unreadable(table, time, set(strange))})
     if not strange:
         return table, tuple(notes)
@@ -170,7 +88,7 @@ def readings(table: ExportTable, time: TimeColumn) -> tuple[ExportTable, tuple[s
     more = f" and {len(strange) - 3} more" if len(strange) > 3 else ""
     notes.append(f"no readings, set aside: {where}{more}")
     out = set(strange)
-    return _rows(table, [row for row in range(len(texts)) if row not in out]), tuple(notes)
+    return with_rows(table, [row for row in range(len(texts)) if row not in out]), tuple(notes)
 
 
 def _unreadable(table: ExportTable, time: TimeColumn, known: Container[int]) -> list[int]:
@@ -193,14 +111,6 @@ def written_times(table: ExportTable, time: TimeColumn) -> Sequence[str]:
     if time.time_of_day is None:
         return days
     return [f"{day} {hour}".strip() for day, hour in zip(days, table[time.time_of_day], strict=True)]
-
-
-def _held(texts: Sequence[str]) -> list[str]:
-    """Return texts whose empty ones have the text above."""
-    held: list[str] = []
-    for text in texts:
-        held.append(text or (held[-1] if held else ""))
-    return held
 
 
 def times(table: ExportTable, mapping: ExportMapping) -> Times:
@@ -285,6 +195,8 @@ def _read_long(table: ExportTable, mapping: ExportMapping) -> Merged:
     when = times(table, mapping)
     time = np.unique(when[~np.isnat(when)])
     columns: dict[str, Floats] = {}
+    notes: dict[str, None] = {}
+    faults: list[DataFault] = []
     for ours, rule in mapping.columns.items():
         total = np.zeros(len(time))
         for name in (rule.column, *rule.add):
@@ -293,9 +205,12 @@ def _read_long(table: ExportTable, mapping: ExportMapping) -> Merged:
                 there = ", ".join(sorted(set(names.tolist()))[:20])
                 raise IgrowError(f"{table.path}: no row is called {name!r}; there are {there}")
             part = ExportTable(table.path, {name: [values[row] for row in rows]}, [table.lines[row] for row in rows])
-            column = np.full(len(time), np.nan)
             own = ColumnMapping(name, amount=rule.amount, words=rule.words)
-            column[np.searchsorted(time, when[rows])] = quantity(ours, part, own, mapping, when[rows])
+            merged = merge(when[rows], {ours: quantity(ours, part, own, mapping, when[rows])})
+            column = np.full(len(time), np.nan)
+            column[np.searchsorted(time, merged.telemetry.time)] = merged.telemetry[ours]
             total = total + column
+            notes |= dict.fromkeys(merged.notes)
+            faults += merged.faults
         columns[ours] = total * rule.scale + rule.offset
-    return merge(time, columns)
+    return Merged(Telemetry(time, columns), tuple(notes), tuple(faults[:1]))

@@ -42,7 +42,8 @@ class TimeColumn:
     )
     format: str = setting(
         default="ISO 8601",
-        help="ISO 8601, excel (days since 1899-12-30), unix, unix ms, or as strptime has it; %Z at the end: EST, CET",
+        help="ISO 8601, excel (days since 1899-12-30), unix (or unix ms, us, ns: of parts of a second), or as strptime "
+        "has it; %Z at the end: EST, CET",
     )
     time_zone: str = setting(
         default="UTC", help="IANA name of the zone of times without one, and of abbreviations that several zones have"
@@ -85,13 +86,16 @@ class ExportMapping:
 
     columns: Mapping[str, ColumnMapping] = setting(help="our name -> the export's column", keys=tuple(QUANTITIES))
     time: TimeColumn = setting(default_factory=TimeColumn, help="the time")
-    delimiter: str = setting(default=",", help="between cells of a text file")
+    delimiter: str = setting(
+        default=",", help="between cells of a text file; a blank where columns stand at fixed places"
+    )
     decimal: str = setting(default=".", help="decimal sign of numbers")
     missing: tuple[str, ...] = setting(default=MISSING, help="texts that stand for no value")
     encoding: str = setting(default="utf-8", help="of a text file")
     sheet: str | None = setting(default=None, help="of a workbook; the first, where none is named")
     header: tuple[int, ...] = setting(default=(1,), low=1, help="lines that together name the columns")
     first_row: int | None = setting(default=None, low=2, help="line of the first reading; the one after the header")
+    transposed: bool = setting(default=False, help="whether times stand across, with a line for each sensor")
     only: Mapping[str, str] = setting(default_factory=dict, help="rows to read: column -> its text there")
     long: LongTable | None = setting(default=None, help="for an export with one reading a row")
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from igrow.core.arrays import Floats, Times
-from igrow.core.telemetry import Telemetry, from_rows
+from igrow.core.telemetry import Telemetry, concatenate, from_rows
 from igrow.trainer.data.fault import DataFault
 
 COMPARED = ("air_temperature", "outdoor_temperature", "air_humidity", "air_co2", "global_radiation")
@@ -65,6 +65,31 @@ def merge(time: Times, columns: Mapping[str, Floats]) -> Merged:
     return Merged(table, tuple(notes), tuple(faults))
 
 
+def joined(parts: Sequence[Merged]) -> Merged:
+    """Return the tables of several files joined in time, with a fault where those that overlap contradict each other.
+
+    Where rows overlap the later file counts; files of one sensor each overlap without a contradiction.
+    """
+    if len(parts) == 1:
+        return parts[0]
+    tables = [one.telemetry for one in parts]
+    table = concatenate(tables)
+    faults = dict.fromkeys(fault for one in parts for fault in one.faults)
+    repeated = sum(map(len, tables)) - len(table)
+    if repeated >= LEAST_REPEATED:
+        compared = [one.only([name for name in COMPARED if name in one]) for one in tables]
+        time = np.concatenate([one.time for one in compared])
+        empty = {name: [one.columns.get(name, np.full(len(one), np.nan)) for one in compared] for name in COMPARED}
+        columns = {name: np.concatenate(values) for name, values in empty.items() if name in table}
+        sentence = _contradiction(time, columns, table)
+        if sentence is not None:
+            seen = f"several files have rows of the same times, and {sentence}"
+            mend = "read one compartment alone: its files in a folder of their own"
+            faults[DataFault("repeated_times", "", seen, mend)] = None
+    notes = dict.fromkeys(note for one in parts for note in one.notes)
+    return Merged(table, tuple(notes), tuple(faults))
+
+
 def without_strays(telemetry: Telemetry) -> tuple[Telemetry, tuple[str, ...]]:
     """Return a log without the few rows that stand months away from all others, and a note on them.
 
@@ -88,14 +113,14 @@ def without_strays(telemetry: Telemetry) -> tuple[Telemetry, tuple[str, ...]]:
 
 def _contradiction(time: Times, columns: Mapping[str, Floats], table: Telemetry) -> str | None:
     """Return how rows of one time differ, where they do so by far more than a row does from the next."""
-    order = np.argsort(time, kind="stable")
-    same = np.flatnonzero(np.diff(time[order].astype(np.int64)) == 0)
     for name in COMPARED:
         if name not in columns:
             continue
+        read = np.flatnonzero(np.isfinite(columns[name]))
+        order = read[np.argsort(time[read], kind="stable")]
+        same = np.flatnonzero(np.diff(time[order].astype(np.int64)) == 0)
         values = columns[name][order]
         apart = np.abs(values[same + 1] - values[same])
-        apart = apart[np.isfinite(apart)]
         usual = _median_step(table[name])
         if len(apart) >= LEAST_REPEATED and usual is not None:
             middle = float(np.median(apart))

@@ -14,7 +14,7 @@ from igrow.core.errors import IgrowError
 from igrow.core.quantities import QUANTITIES
 from igrow.trainer.data import export, mapping
 from igrow.trainer.data.cells import ARCHIVE, ENDINGS, EXCEL, may_be_table
-from igrow.trainer.data.rows import Merged, merge
+from igrow.trainer.data.rows import Merged, joined, merge
 from igrow.trainer.data.source import Source
 
 MAPPING_FILE = "mapping.yaml"
@@ -35,10 +35,8 @@ def read(paths: Sequence[Path], translation: Path | None = None) -> Source:
     tables = [read_file(part, translation or mapping_beside(part, path)) for path in paths for part in files_in(path)]
     if not tables:
         raise IgrowError("no telemetry files were given")
-    telemetry = tables[0].telemetry if len(tables) == 1 else core.concatenate([one.telemetry for one in tables])
-    notes = dict.fromkeys(note for one in tables for note in one.notes)
-    faults = dict.fromkeys(fault for one in tables for fault in one.faults)
-    return Source(paths[0].name, telemetry, notes=tuple(notes), faults=tuple(faults))
+    whole = joined(tables)
+    return Source(paths[0].name, whole.telemetry, notes=whole.notes, faults=whole.faults)
 
 
 def unpacked(path: Path) -> Path:

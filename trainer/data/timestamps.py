@@ -17,20 +17,26 @@ from igrow.core.local_time import from_local
 from igrow.trainer.data.vocabulary import folded, month_names, weekday_names
 from igrow.trainer.data.zone_abbreviations import ahead_of_utc, split
 
-ISO, EXCEL, UNIX, UNIX_MS = "ISO 8601", "excel", "unix", "unix ms"
+ISO, EXCEL = "ISO 8601", "excel"
+UNIX = {"unix": 1.0, "unix ms": 1e-3, "unix us": 1e-6, "unix ns": 1e-9}
+"""Counts since 1970 -> their unit in seconds."""
 _EXCEL_EPOCH = datetime.datetime(1899, 12, 30)
 _UNIX_EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
 ZONE = "%Z"
 _WEEKDAY = re.compile(r"([^\W\d_]{2,})\.?,?\s+(?=\w)")
 _DATE = re.compile(r"\d{1,4}[-/.]\s?\d{1,2}[-/.]")
 _LETTERS = re.compile(r"[^\W\d_]+", re.UNICODE)
+_MIDNIGHT = re.compile(r"(?<![\d:])(0?0:00|12:00(:00)?\s*a)", re.IGNORECASE)
+_CLOCKED = re.compile(r"(.*?\d)[\sT,]+\d{1,2}:\d\d")
+_MONTH = re.compile(r"([^\W\d_]+)(\.?)")
+_OF = re.compile(r"(?<=\s)del?\s+", re.IGNORECASE)
 
 
 def parser(form: str, time_zone: str = "UTC") -> Callable[[str], datetime.datetime]:
     """Return the function that reads one text of a form; it raises ValueError where the text is of another one.
 
     Args:
-        form: `ISO 8601`, `excel`, `unix`, `unix ms`, or as strptime has it; ``%Z`` at the end is an abbreviation.
+        form: `ISO 8601`, `excel`, one of `UNIX`, or as strptime has it; ``%Z`` at the end is an abbreviation.
         time_zone: IANA name; what an abbreviation of several zones stands for.
     """
     if form == ISO:
@@ -40,9 +46,8 @@ def parser(form: str, time_zone: str = "UTC") -> Callable[[str], datetime.dateti
         return lambda text: _abbreviated(text, plain, time_zone)
     if form == EXCEL:
         return lambda text: _EXCEL_EPOCH + datetime.timedelta(seconds=round(_number(text) * 86_400))
-    if form in (UNIX, UNIX_MS):
-        unit = 1.0 if form == UNIX else 1e-3
-        return lambda text: _UNIX_EPOCH + datetime.timedelta(seconds=round(_number(text) * unit))
+    if form in UNIX:
+        return lambda text: _UNIX_EPOCH + datetime.timedelta(seconds=round(_number(text) * UNIX[form]))
     return lambda text: _formatted(without_weekday(text), form)
 
 
@@ -62,6 +67,17 @@ def without_weekday(text: str) -> str:
     rest = text[found.end() :]
     dated = _DATE.match(rest) or any(folded(word) in month_names() for word in _LETTERS.findall(rest))
     return rest if dated or name not in month_names() else text
+
+
+def with_english_months(text: str) -> str:
+    """Return a date whose month has its English abbreviation: ``1 de febrero de 2020`` and ``1 févr. 2020`` alike."""
+
+    def english(found: re.Match[str]) -> str:
+        name = month_names().get(folded(found[1]))
+        return found[0] if name is None else name
+
+    changed = _MONTH.sub(english, text)
+    return changed if changed == text else _OF.sub("", changed)
 
 
 def _abbreviated(text: str, plain: Callable[[str], datetime.datetime], time_zone: str) -> datetime.datetime:
@@ -101,6 +117,18 @@ def to_utc(texts: Sequence[str], form: str, time_zone: str) -> tuple[Times, int 
     return (local - shifts if aware else _of_wall(local, time_zone)), None
 
 
+def dates_alone(texts: Sequence[str]) -> set[int]:
+    """Return the positions of dates without a time of day, where others have one and midnight is written out.
+
+    They head a day, or stand before its mean or its sum.
+    """
+    clocked = [found[1] for text in texts if (found := _CLOCKED.match(text)) is not None]
+    if len(clocked) < 0.5 * len(texts) or not any(map(_MIDNIGHT.search, texts)):
+        return set()
+    days = set(clocked)
+    return {row for row, text in enumerate(texts) if text in days}
+
+
 def _of_wall(local: Times, time_zone: str) -> Times:
     """Return UTC times of wall times in the order of a file: forwards or backwards, each time on one row or several.
 
@@ -127,7 +155,8 @@ def _iso(text: str) -> datetime.datetime:
 
 def _formatted(text: str, form: str) -> datetime.datetime:
     if "%b" in form:
-        text = _LETTERS.sub(lambda found: month_names().get(folded(found[0]), found[0]), text)
+        text = with_english_months(text)
+        form = re.sub(r"%b\.", "%b", form)
     if "%p" in form:
         text = re.sub(r"\b([ap])\.\s?m\.?", r"\1m", text, flags=re.IGNORECASE)
     try:

@@ -182,6 +182,28 @@ def unit_texts(name: str) -> list[str]:
     return [text for part in parts if (text := compact(part))]
 
 
+@cache
+def _symbols() -> frozenset[str]:
+    return frozenset(compact(symbol) for symbol in _table()["symbols"])
+
+
+def unknown_unit(name: str) -> str:
+    """Return the unit in brackets in a column's name that `units` lacks, such as ``g/kg``; empty without one."""
+    for text in _BRACKETS.findall(name):
+        parts = compact(text).split("/")
+        if len(parts) > 1 and all(part in _symbols() for part in parts) and not find_units([compact(text)]):
+            return str(text)
+    return ""
+
+
+def without_unit(name: str) -> str:
+    """Return a column's name without a unit in brackets: the minute of ``l/min`` is no lowest value."""
+    for text in _BRACKETS.findall(name):
+        if "/" in text and (find_units([compact(text)]) or unknown_unit(f"({text})")):
+            name = name.replace(text, "")
+    return name
+
+
 def find_units(texts: Sequence[str]) -> dict[str, Unit]:
     """Return the unit of each dimension that one of some compact texts may be."""
     found: dict[str, Unit] = {}
@@ -202,6 +224,11 @@ def compartment(name: str) -> str:
     """Return the compartment that a column's name tells, such as ``afd 4``; empty where it tells none."""
     found = _compartment_pattern().search(folded(name))
     return f"{found[1]} {found[2]}" if found else ""
+
+
+def is_value(name: str) -> bool:
+    """Tell whether a column's name is a word for what was read."""
+    return not set(re.split(r"\W+", folded(name))).isdisjoint(_table()["values"])
 
 
 def is_compartment(name: str) -> bool:

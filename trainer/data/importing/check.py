@@ -12,7 +12,7 @@ from igrow.core.site import Site
 from igrow.trainer.data import export
 from igrow.trainer.data.fault import DataFault, Remedy
 from igrow.trainer.data.importing.proposal import Proposal
-from igrow.trainer.data.importing.told_units import BY_SIZE, like_the_others
+from igrow.trainer.data.importing.told_units import BY_SIZE, like_the_others, tenths_like_the_air
 from igrow.trainer.data.importing.zone import fixed
 from igrow.trainer.data.mapping import ColumnMapping, ExportMapping
 from igrow.trainer.data.plausibility import find_faults
@@ -45,11 +45,12 @@ def check(proposal: Proposal, site: Site | None) -> Checked:
     """
     mapping = proposal.mapping
     mended: list[str] = []
+    applied: set[tuple[str, str]] = set()
     for _ in range(_ROUNDS):
         merged = export.read_tables(proposal.tables, mapping)
         faults = (*merged.faults, *find_faults(merged.telemetry, site))
         better = _on_another_clock(proposal, mapping, faults, site, mended) or _remedied(
-            mapping, faults, proposal, mended
+            mapping, faults, proposal, merged, mended, applied
         )
         if better is None:
             break
@@ -114,13 +115,20 @@ def _with_remedy(rule: ColumnMapping, remedy: Remedy) -> ColumnMapping:
 
 
 def _remedied(
-    mapping: ExportMapping, faults: Sequence[DataFault], proposal: Proposal, mended: list[str]
+    mapping: ExportMapping,
+    faults: Sequence[DataFault],
+    proposal: Proposal,
+    merged: Merged,
+    mended: list[str],
+    applied: set[tuple[str, str]],
 ) -> ExportMapping | None:
     """Return the mapping with every certain remedy in it, or None where there is none.
 
-    What the user said of a unit stays.
+    What the user said of a unit stays. A remedy that did not cure (`applied`, quantity and kind) is not taken twice.
     """
-    units, faults = proposal.units, [fault for fault in faults if fault.quantity not in proposal.given]
+    units = proposal.units
+    faults = [one for one in faults if one.quantity not in proposal.given and (one.quantity, one.kind) not in applied]
+    applied |= {(one.quantity, one.kind) for one in faults}
     columns: Mapping[str, ColumnMapping] = mapping.columns
     changed = dict(columns)
     fahrenheit = {fault.quantity for fault in faults if fault.kind == "fahrenheit" and not units.get(fault.quantity)}
@@ -128,6 +136,11 @@ def _remedied(
     if american is not None:
         faulty = {one.quantity: "told" for one in faults if one.kind not in ("kilometres_per_hour", "fahrenheit")}
         changed, _, notes = like_the_others(changed, {**units, **faulty}, american)
+        mended += notes
+    if any(fault.kind == "tenths" and fault.quantity in BY_SIZE for fault in faults):
+        table = merged.telemetry
+        whole = {name for name in changed if not np.any(np.mod(table[name][np.isfinite(table[name])], 1.0))}
+        changed, notes = tenths_like_the_air(changed, units, whole - proposal.given)
         mended += notes
     like_the_air = {name for name, rule in changed.items() if rule != columns[name]}
     for fault in faults:

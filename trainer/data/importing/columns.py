@@ -54,9 +54,9 @@ def find_matches(columns: Iterable[str], unit_line: Mapping[str, str]) -> list[M
         units = vocabulary.find_units([*written, *vocabulary.unit_texts(column)])
         # A unit that is known, of a quantity that is not: grams per m3 are no per cent.
         foreign = bool(written) and not vocabulary.find_units(written)
-        plain = vocabulary.folded(column).replace(" ", "_").strip("_")
-        exact = plain if plain in QUANTITIES else vocabulary.exact_names().get(vocabulary.compact(column))
-        words, compartment = vocabulary.words_in(column), vocabulary.compartment(column)
+        foreign = foreign or bool(vocabulary.unknown_unit(column))
+        exact = _exact(column)
+        words, compartment = vocabulary.words_in(vocabulary.without_unit(column)), vocabulary.compartment(column)
         if exact is not None:
             found.append(Match(exact, column, _CERTAIN, units.get(dimension(exact)), compartment))
             continue
@@ -71,6 +71,29 @@ def find_matches(columns: Iterable[str], unit_line: Mapping[str, str]) -> list[M
             score = 10 * needed + 3 * more + 4 * bool(units) - 12 * bool(words & _UNLIKELY) - 2 * ("sum" in words)
             found.append(Match(quantity, column, score, units.get(rule.dimension), compartment))
     return found
+
+
+def of_unknown_unit(columns: Iterable[str], unit_line: Mapping[str, str]) -> dict[str, str]:
+    """Return column -> its unit, of those that their names make a quantity and their units none."""
+    found = {}
+    for column in columns:
+        written = vocabulary.compact(unit_line.get(column, ""))
+        own = unit_line[column] if written and not vocabulary.find_units([written]) else vocabulary.unknown_unit(column)
+        words = vocabulary.words_in(vocabulary.without_unit(column))
+        named = any(
+            words.issuperset(one) and not words & rule.excluded.difference(one)
+            for rule in vocabulary.rules().values()
+            for one in rule.needed
+        )
+        if own and named and _exact(column) is None:
+            found[column] = own
+    return found
+
+
+def _exact(column: str) -> str | None:
+    """Return the quantity that a name is without any word in it, or None."""
+    plain = vocabulary.folded(column).replace(" ", "_").strip("_")
+    return plain if plain in QUANTITIES else vocabulary.exact_names().get(vocabulary.compact(column))
 
 
 def dimension(quantity: str) -> str:

@@ -7,14 +7,14 @@ from pathlib import Path
 
 from igrow.core.errors import IgrowError
 from igrow.trainer.data.cells import Cells, read_cells
-from igrow.trainer.data.export import ExportTable
+from igrow.trainer.data.export_table import ExportTable
 from igrow.trainer.data.importing.layout import Layout, find_layout
 
 
 def alike(paths: Sequence[Path], sheet: str | None = None) -> list[list[Path]]:
     """Return files by their layout, in the order in which the first of each comes.
 
-    Files are alike that have the same names in the same lines.
+    Files are alike that have the same names in the same lines, and the same units below them.
 
     Raises:
         IgrowError: a file that is of no known layout cannot be understood.
@@ -33,7 +33,13 @@ def alike(paths: Sequence[Path], sheet: str | None = None) -> list[list[Path]]:
 def further_cells(paths: Sequence[Path], layout: Layout) -> Iterator[Cells]:
     """Yield the cells of files of one layout."""
     for path in paths:
-        yield read_cells(path, delimiter=layout.delimiter, encoding=layout.encoding, sheet=layout.sheet)
+        yield read_cells(
+            path,
+            delimiter=layout.delimiter,
+            encoding=layout.encoding,
+            sheet=layout.sheet,
+            transposed=layout.transposed,
+        )
 
 
 def joined(tables: Sequence[ExportTable]) -> ExportTable:
@@ -54,4 +60,5 @@ def _head(path: Path, layout: Layout) -> list[list[str]] | None:
 
 
 def _lines(cells: Cells, layout: Layout) -> list[list[str]]:
-    return [row for row, line in zip(cells.rows, cells.lines, strict=True) if line in layout.header]
+    told = {*layout.header, layout.units}
+    return [row for row, line in zip(cells.rows, cells.lines, strict=True) if line in told]

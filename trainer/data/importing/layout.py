@@ -16,9 +16,9 @@ import charset_normalizer
 
 from igrow.core.errors import IgrowError
 from igrow.trainer.data import vocabulary
-from igrow.trainer.data.cells import EXCEL, Cells, is_text, read_bytes, read_cells, sheets
-from igrow.trainer.data.importing.time_format import looks_like_time, parts_of_time, spread
-from igrow.trainer.data.mapping import MISSING
+from igrow.trainer.data.cells import EXCEL, Cells, is_text, read_bytes, read_cells, sheets, unquoted
+from igrow.trainer.data.fixed_places import stands_at_fixed_places
+from igrow.trainer.data.importing.first_reading import first_reading, is_value, times_stand_across
 
 DELIMITERS = (";", "\t", "|", ",")
 """In the order in which they are believed: a comma may be a decimal sign."""
@@ -28,7 +28,6 @@ _BYTES, _HEAD = 100_000, 30
 """Of a text that are looked at for its encoding, and lines in which columns' names stand."""
 _SAMPLE = 400
 """Rows that are looked at."""
-_NUMERIC = re.compile(r"[-+\u2212]?\d[\d.,'\u00a0 ]*([eE][-+]?\d+)?\s*(%|°?[CF]|ppm|W/m²|W/m2|m/s|km/h|mph)?")
 _DIGITS = re.compile(r"[-+\u2212]?(\d[\d.,]*)(?![\d:/-])")
 _GROUPED = re.compile(r"[1-9]\d{0,2}([.,]\d{3})+")
 
@@ -45,6 +44,8 @@ class Layout:
     units: int | None
     """Line with the units, where it has its own."""
     first_row: int
+    transposed: bool = False
+    """Whether times stand across."""
 
 
 def find_layout(path: Path, sheet: str | None = None) -> tuple[Layout, Cells]:
@@ -56,11 +57,15 @@ def find_layout(path: Path, sheet: str | None = None) -> tuple[Layout, Cells]:
     encoding, delimiter = "utf-8", ","
     if is_text(path):
         encoding = find_encoding(read_bytes(path))
-        delimiter = find_delimiter(read_bytes(path).decode(encoding, errors="replace").removeprefix("\ufeff"))
+        text = read_bytes(path).decode(encoding, errors="replace").removeprefix("\ufeff")
+        delimiter = " " if stands_at_fixed_places(text) else find_delimiter(unquoted(text))
     elif path.name.lower().endswith(EXCEL) and sheet is None:
         sheet = _fullest_sheet(path)
     cells = read_cells(path, delimiter=delimiter, encoding=encoding, sheet=sheet)
-    first = _first_reading(cells)
+    transposed = times_stand_across(cells)
+    if transposed:
+        cells = read_cells(path, delimiter=delimiter, encoding=encoding, sheet=sheet, transposed=True)
+    first = first_reading(cells)
     head, units = _header(cells, first)
     body = list(zip_longest(*cells.rows[first : first + _SAMPLE], fillvalue=""))
     return Layout(
@@ -71,6 +76,7 @@ def find_layout(path: Path, sheet: str | None = None) -> tuple[Layout, Cells]:
         tuple(cells.lines[row] for row in head),
         None if units is None else cells.lines[units],
         cells.lines[first],
+        transposed,
     ), cells
 
 
@@ -80,6 +86,9 @@ def find_encoding(data: bytes) -> str:
         if data.startswith(mark):
             return name
     try:
+        if b"\x00" in data[:_BYTES]:
+            # Half of the bytes of UTF-16 are zero; without a mark their place tells the order.
+            return "utf-16-be" if data[:_BYTES:2].count(0) > data[1:_BYTES:2].count(0) else "utf-16-le"
         data.decode("utf-8")
     except UnicodeDecodeError:
         return _likeliest_encoding(data[:_BYTES])
@@ -164,27 +173,6 @@ def _fullest_sheet(path: Path) -> str | None:
     return max(names, key=lambda name: sum(len(row) for row in read_cells(path, sheet=name).rows))
 
 
-def _is_value(cell: str) -> bool:
-    return _NUMERIC.fullmatch(cell) is not None or cell in MISSING or cell.lower() in vocabulary.switch_words()
-
-
-def _first_reading(cells: Cells) -> int:
-    """Return the index of the first row of readings: it has a time and a value."""
-    usual = Counter(len(row) for row in cells.rows[-_SAMPLE:]).most_common(1)
-    for index, row in enumerate(cells.rows[:_SAMPLE]):
-        filled = [cell for cell in row if cell]
-        times = [cell for cell in filled if looks_like_time(cell)]
-        values = [cell for cell in filled if _is_value(cell)]
-        wide = not usual or len(row) >= 0.5 * usual[0][0]
-        if wide and times and values:
-            return index
-    parts = next((found for row in cells.rows[:_SAMPLE] if len(found := parts_of_time(row)) > 2), ())
-    if parts:
-        raise IgrowError(f"{cells.path}: {spread(parts)}")
-    needed = "export the log as a table with a row for each time and a column for each sensor"
-    raise IgrowError(f"{cells.path}: no row has a time and numbers: {needed}")
-
-
 def _header(cells: Cells, first: int) -> tuple[list[int], int | None]:
     """Return the rows that name the columns, and the row of units (None: it has none of its own)."""
     width = len(cells.rows[first])
@@ -192,7 +180,7 @@ def _header(cells: Cells, first: int) -> tuple[list[int], int | None]:
         row
         for row in range(first)
         if sum(bool(cell) for cell in cells.rows[row]) >= max(2, 0.3 * width)
-        and sum(_is_value(cell) for cell in cells.rows[row] if cell) < 0.5 * sum(bool(cell) for cell in cells.rows[row])
+        and sum(is_value(cell) for cell in cells.rows[row] if cell) < 0.5 * sum(bool(cell) for cell in cells.rows[row])
     ]
     # Lines of names stand together, right above the readings.
     above = [row for row in above if row >= first - 4]

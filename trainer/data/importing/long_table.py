@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 from igrow.trainer.data import vocabulary
-from igrow.trainer.data.export import ExportTable
+from igrow.trainer.data.export_table import ExportTable
 from igrow.trainer.data.importing import columns as names
 from igrow.trainer.data.importing.texts import column_texts
 from igrow.trainer.data.mapping import LongTable
 
-_MOST_COLUMNS, _MOST_NAMES = 6, 500
+_MOST_COLUMNS, _MOST_NAMES = 12, 500
 
 
 def find_long(table: ExportTable, time: Collection[str | None], decimal: str) -> LongTable | None:
@@ -29,10 +29,20 @@ def find_long(table: ExportTable, time: Collection[str | None], decimal: str) ->
         if not 2 <= len(labels) <= _MOST_NAMES or len(labels) > 0.5 * len(table.lines):
             continue
         told = {match.quantity for match in names.find_matches(labels, {})}
-        value = next((one for one in others if one != name and column_texts(table[one], decimal).numeric > 0.8), None)
+        value = _value([one for one in others if one != name], table, decimal)
         if len(told) >= 2 and value is not None and column_texts(table[name], decimal).numeric < 0.2:
             return LongTable(name, value)
     return None
+
+
+def _value(others: Sequence[str], table: ExportTable, decimal: str) -> str | None:
+    """Return the column of the readings: the one that is called so, else the one whose numbers differ most.
+
+    A number of the row, a code of quality and the number of a compartment are none.
+    """
+    numeric = [one for one in others if column_texts(table[one], decimal).numeric > 0.8]
+    counted = [one for one in numeric if len(set(table[one])) < len(table.lines)]
+    return max(counted, key=lambda one: (vocabulary.is_value(one), len(set(table[one]))), default=None)
 
 
 def units_beside(table: ExportTable, long: LongTable) -> dict[str, str]:

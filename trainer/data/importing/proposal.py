@@ -10,15 +10,25 @@ from igrow.core.errors import IgrowError
 from igrow.core.quantities import QUANTITIES
 from igrow.core.site import Site
 from igrow.trainer.data import vocabulary
-from igrow.trainer.data.export import ExportTable, as_table, chosen_rows, readings
+from igrow.trainer.data.export import readings
+from igrow.trainer.data.export_table import ExportTable, as_table, chosen_rows
 from igrow.trainer.data.importing import columns as names
 from igrow.trainer.data.importing.capacity import add_lamp_power, by_capacity
+from igrow.trainer.data.importing.compartments import chosen_compartment, rows_of_one
+from igrow.trainer.data.importing.error_codes import MEASURED, error_codes
 from igrow.trainer.data.importing.folder import further_cells, joined
 from igrow.trainer.data.importing.layout import Layout, find_layout
 from igrow.trainer.data.importing.long_table import find_long, units_beside
 from igrow.trainer.data.importing.question import Answers, Question
 from igrow.trainer.data.importing.texts import ColumnTexts, column_texts
-from igrow.trainer.data.importing.time_format import TimeForm, find_time, parts_of_time, spread, why_none
+from igrow.trainer.data.importing.time_format import (
+    TimeForm,
+    find_time,
+    half_of_day,
+    parts_of_time,
+    spread,
+    why_none,
+)
 from igrow.trainer.data.importing.told_units import like_the_others, unit_of_cells
 from igrow.trainer.data.importing.zone import find_zone, zones_asked
 from igrow.trainer.data.mapping import MISSING, ColumnMapping, ExportMapping, LongTable, TimeColumn
@@ -27,7 +37,6 @@ from igrow.trainer.data.vocabulary import Unit
 ORDERS = {"dmy": ("%d", "%m"), "mdy": ("%m", "%d"), "ymd": ("%Y", "%m")}
 MUST_BE_RIGHT = ("air_temperature", "outdoor_temperature", "air_humidity", "air_co2", "global_radiation")
 """Quantities of which no column is taken where another would do as well."""
-_MOST_COMPARTMENTS = 60
 
 
 @dataclass(frozen=True)
@@ -59,8 +68,11 @@ class _Body:
 
     def texts(self, label: str, quantity: str) -> ColumnTexts:
         """Return what the readings under a label are, which are taken for a quantity."""
-        cells = self.table[label] if self.long is None else self._named(self.long, label)
-        return column_texts(cells, self.decimal, vocabulary.words_of(quantity))
+        return column_texts(self.cells(label), self.decimal, vocabulary.words_of(quantity))
+
+    def cells(self, label: str) -> Sequence[str]:
+        """Return the readings under a label as they are written."""
+        return self.table[label] if self.long is None else self._named(self.long, label)
 
     def _named(self, long: LongTable, label: str) -> list[str]:
         return [
@@ -102,22 +114,24 @@ def propose(
     parts = [one for one in parts_of_time(table.columns) if one not in (time.column, time.time_of_day)]
     if time.form.endswith("%H") and parts:
         raise IgrowError(f"{path}: {spread((time.column, str(time.time_of_day), *parts))}")
+    half = half_of_day(dict(table.columns))
+    if half is not None and "%p" not in time.form:
+        columns = [one for one in (time.column, time.time_of_day, half) if one is not None]
+        raise IgrowError(f"{path}: {spread(columns)}")
     time = _ordered(time, answers, draft)
     table = readings(table, TimeColumn(time.column, time.time_of_day, time.form))[0]
     long = find_long(table, (time.column, time.time_of_day), layout.decimal)
     if long is not None:
         unit_line = units_beside(table, long)
-    only: dict[str, str] = {}
-    if long is None:
-        only = _rows_of_one(table, time, answers, draft)
-        table = chosen_rows(table, only)
+    only = rows_of_one(table, time, long, answers, draft.questions)
+    table = chosen_rows(table, only)
     labels = (
         list(dict.fromkeys(table[long.name]))
         if long is not None
         else [name for name in table.columns if name not in (time.column, time.time_of_day)]
     )
     matches = names.side_by_side(names.find_matches(labels, unit_line))
-    compartment = _compartment(matches, answers, draft)
+    compartment = chosen_compartment(matches, answers, draft.questions)
     names.check_given(answers.columns, labels)
     body = _Body(table, labels, long, layout.decimal)
     assigned = names.assign(matches, compartment, answers.columns)
@@ -130,6 +144,11 @@ def propose(
         draft.questions.append(Question("time_zone", text, choices, f"--time-zone {choices[0]}", blocks=True))
     if why:
         draft.notes.append(why)
+    draft.notes += [
+        f"{column!r} is in {unit!r}, which is not known: left out (--column QUANTITY={column!r} takes it as it is)"
+        for column, unit in names.of_unknown_unit(labels, unit_line).items()
+        if column not in answers.columns.values()
+    ]
     marks = _marks(body, mapped)
     if marks:
         draft.notes.append(f"taken for no reading: {', '.join(map(repr, marks[:6]))}" + ", ..." * (len(marks) > 6))
@@ -143,6 +162,7 @@ def propose(
         sheet=layout.sheet,
         header=layout.header,
         first_row=layout.first_row if layout.first_row != max(layout.header) + 1 else None,
+        transposed=layout.transposed,
         only=only,
         long=long,
     )
@@ -185,45 +205,6 @@ def _ordered(time: TimeForm, answers: Answers, draft: _Draft) -> TimeForm:
         text = "does the day or the month come first in its dates?"
         draft.questions.append(Question("date_order", text, orders, "--date-order dmy", blocks=True))
     return time
-
-
-def _rows_of_one(table: ExportTable, time: TimeForm, answers: Answers, draft: _Draft) -> dict[str, str]:
-    """Return the rows to read of a file that holds several compartments under each other."""
-    stamps = table[time.column]
-    if time.time_of_day is not None:
-        stamps = [f"{day} {hour}" for day, hour in zip(stamps, table[time.time_of_day], strict=True)]
-    repeated = len(stamps) / max(len(set(stamps)), 1)
-    if repeated < 1.9:
-        return {}
-    for name in table.columns:
-        labels = sorted(set(table[name]) - {""})
-        told = vocabulary.is_compartment(name)
-        if name != time.column and told and 2 <= len(labels) <= _MOST_COMPARTMENTS:
-            if answers.compartment in labels:
-                return {name: str(answers.compartment)}
-            _ask_compartment(labels, draft)
-            return {name: labels[0]}
-    return {}
-
-
-def _compartment(matches: Sequence[names.Match], answers: Answers, draft: _Draft) -> str:
-    known = names.compartments(matches)
-    if answers.compartment is not None and known:
-        wanted = vocabulary.folded(answers.compartment)
-        chosen = next((one for one in known if one == wanted or one.split()[-1] == wanted), None)
-        if chosen is None:
-            raise IgrowError(f"no compartment is called {answers.compartment!r}; there are {', '.join(known)}")
-        return chosen
-    if len(known) > 1:
-        _ask_compartment(known, draft)
-    return known[0] if known else ""
-
-
-def _ask_compartment(labels: Sequence[str], draft: _Draft) -> None:
-    option = f"--compartment {labels[0]!r}"
-    draft.questions.append(
-        Question("compartment", "which compartment is the log of?", tuple(labels), option, blocks=True)
-    )
 
 
 def _mapped(
@@ -289,6 +270,9 @@ def _ask_unit(quantity: str, column: str, draft: _Draft) -> None:
 
 
 def _marks(body: _Body, rules: Mapping[str, ColumnMapping]) -> tuple[str, ...]:
-    """Return the texts in mapped columns that are neither numbers nor words: marks of a missing value."""
+    """Return the texts in mapped columns that are no reading: neither numbers nor words, or numbers for a fault."""
     found = dict.fromkeys(mark for quantity, rule in rules.items() for mark in body.texts(rule.column, quantity).marks)
+    for quantity, rule in rules.items():
+        if quantity in MEASURED:
+            found |= dict.fromkeys(error_codes(body.cells(rule.column), body.decimal))
     return tuple(mark for mark in found if mark not in MISSING)

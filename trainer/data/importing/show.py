@@ -26,8 +26,9 @@ def understood(proposal: Proposal, checked: Checked) -> list[str]:
     first, last = (str(table.time[row]).replace("T", " ")[:16] for row in (0, -1)) if len(table) else ("-", "-")
     step = own_step(table.time) / 60.0
     lines = [f"{proposal.path.name}: {len(table)} rows, {first} to {last} UTC, every {step:g} min"]
-    names = f"names in line {' and '.join(map(str, layout.header))}"
-    units = f", units in line {layout.units}" if layout.units else ""
+    line = "times across, column" if layout.transposed else "line"
+    names = f"names in {line} {' and '.join(map(str, layout.header))}"
+    units = f", units in {line.rsplit(maxsplit=1)[-1]} {layout.units}" if layout.units else ""
     kind = f"sheet {layout.sheet!r}" if layout.sheet else f"{layout.encoding}, {_shown(layout.delimiter)} between cells"
     lines.append(f"layout: {kind}, decimal {_shown(layout.decimal)}, {names}{units}")
     day = (
@@ -73,7 +74,7 @@ def _unit_there(proposal: Proposal, quantity: str, rule: ColumnMapping) -> str:
 
 
 def _shown(sign: str) -> str:
-    return {"\t": "tab", ",": "comma", ";": "semicolon", ".": "point", "|": "bar"}.get(sign, sign)
+    return {" ": "blanks", "\t": "tab", ",": "comma", ";": "semicolon", ".": "point", "|": "bar"}.get(sign, sign)
 
 
 def as_yaml(mapping: ExportMapping, remarks: Iterable[str] = ()) -> str:
@@ -81,7 +82,7 @@ def as_yaml(mapping: ExportMapping, remarks: Iterable[str] = ()) -> str:
     lines = [f"# {remark}" for remark in remarks]
     lines.append(f"time: {_inline(mapping.time, TimeColumn())}")
     plain = ExportMapping({})
-    for name in ("delimiter", "decimal", "encoding", "sheet", "header", "first_row", "only"):
+    for name in ("delimiter", "decimal", "encoding", "sheet", "transposed", "header", "first_row", "only"):
         value = getattr(mapping, name)
         if value != getattr(plain, name):
             lines.append(f"{name}: {_value(value)}")
@@ -106,6 +107,8 @@ def _inline(one: TimeColumn | ColumnMapping, plain: TimeColumn | ColumnMapping) 
 
 def _value(value: object) -> str:
     """Return a value as YAML: texts in quotes, so that none is taken for something else."""
+    if isinstance(value, bool):
+        return str(value).lower()
     if isinstance(value, float):
         return f"{value:.10g}" if value != int(value) else f"{int(value)}"
     if isinstance(value, (list, tuple)):

@@ -11,7 +11,17 @@ from itertools import pairwise
 import numpy as np
 
 from igrow.trainer.data import vocabulary
-from igrow.trainer.data.timestamps import EXCEL, ISO, UNIX, UNIX_MS, ZONE, parser, wall_parser, without_weekday
+from igrow.trainer.data.timestamps import (
+    EXCEL,
+    ISO,
+    UNIX,
+    ZONE,
+    dates_alone,
+    parser,
+    wall_parser,
+    with_english_months,
+    without_weekday,
+)
 from igrow.trainer.data.zone_abbreviations import split
 
 _SAMPLE = 1500
@@ -21,11 +31,13 @@ _LEAST_DATED = 0.8
 """Share of a column's texts that have a digit, if it is a time."""
 _CLOCK = re.compile(r"\d{1,2}[:.h]\d{2}([:.]\d{2})?([.,]\d+)?(\s?[ap]\.?\s?m\.?)?(\s?(uhr|hrs?|hs?|u))?", re.IGNORECASE)
 _DATE = re.compile(
-    r"(\d{1,4}[-/.年]\s?\d{1,2}[-/.月]\s?\d{1,4}日?|\d{8}|\d{1,2}[-\s.]+[^\W\d_]{3,}\.?[-\s]+\d{2,4}|"
+    r"(\d{1,4}[-/.年]\s?\d{1,2}[-/.月]\s?\d{1,4}日?|\d{8}|(?:19|20)\d\d-[0-3]\d\d|\d{1,2}[-\s.]+[^\W\d_]{3,}\.?[-\s]+\d{2,4}|"
     r"[^\W\d_]{3,}\.?\s+\d{1,2},?\s+\d{4})(\D.*)?"
 )
 _COMPACT = re.compile(r"(19|20)\d\d(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])([01]\d|2[0-4])[0-5]\d([0-5]\d)?")
 """Year to minute or second without a sign between them."""
+_PARTS = ("year", "month", "day", "day_of_year", "hour", "minute")
+_HALF = re.compile(r"[ap]\.?\s?m\.?", re.IGNORECASE)
 _TOKEN = re.compile(r"\d+|[^\W\d_]+|[^\w]+|_")
 
 
@@ -42,19 +54,24 @@ class TimeForm:
 
 def looks_like_time(text: str) -> bool:
     """Tell whether a cell may be a date, or a date and a time."""
-    text = without_weekday(text.strip())
+    text = with_english_months(without_weekday(text.strip()))
     if _COMPACT.fullmatch(text):
         return True
-    if _DATE.fullmatch(text.strip()) and not re.fullmatch(r"\d{8}", text.strip()):
+    if _DATE.fullmatch(text) and not re.fullmatch(r"\d{8}", text):
         return True
     if re.fullmatch(r"\d{8}", text) and not 1900 <= int(text[:4]) <= 2100:
         return False
     try:
-        moment = datetime.datetime.fromisoformat(text.strip())
+        moment = datetime.datetime.fromisoformat(text)
     except ValueError:
         number = re.fullmatch(r"\d+([.,]\d+)?", text)
         return number is not None and _serial(float(text.replace(",", "."))) is not None
     return 1990 <= moment.year <= 2100
+
+
+def is_clock(text: str) -> bool:
+    """Tell whether a cell is a time of day."""
+    return _CLOCK.fullmatch(text) is not None
 
 
 def find_time(columns: dict[str, Sequence[str]]) -> TimeForm | None:
@@ -83,9 +100,18 @@ def find_time(columns: dict[str, Sequence[str]]) -> TimeForm | None:
     return max(found, key=lambda one: one[0])[1] if found else None
 
 
+def half_of_day(columns: dict[str, Sequence[str]]) -> str | None:
+    """Return the column that tells the half of the day alone, AM or PM, or None where there is none."""
+    return next((name for name, texts in columns.items() if _all_halves([text for text in texts if text])), None)
+
+
+def _all_halves(texts: Sequence[str]) -> bool:
+    return bool(texts) and all(_HALF.fullmatch(text) for text in set(texts))
+
+
 def parts_of_time(names: Iterable[str]) -> tuple[str, ...]:
     """Return the names of columns that hold the year, the month, the day, the hour or the minute alone."""
-    parts = [word for kind in ("year", "month", "day", "hour", "minute") for word, _ in vocabulary.time_words(kind)]
+    parts = [word for kind in _PARTS for word, _ in vocabulary.time_words(kind)]
     return tuple(name for name in names if vocabulary.folded(name) in parts)
 
 
@@ -106,7 +132,8 @@ def why_none(columns: dict[str, Sequence[str]]) -> str:
 
 def _sample(texts: Sequence[str]) -> list[str]:
     """Return texts from the beginning, in their order (so that midnight is passed), and some from all along."""
-    filled = [text for text in texts if text]
+    alone = dates_alone(texts)
+    filled = [text for row, text in enumerate(texts) if text and row not in alone]
     # The header once more, or a line of sums.
     dated = [text for text in filled if any(map(str.isdigit, text))]
     kept = dated if len(dated) >= _LEAST_DATED * len(filled) else filled
@@ -134,7 +161,7 @@ def _clock_column(columns: dict[str, Sequence[str]], names: Sequence[str], date:
 
 
 def _is_clock(texts: Sequence[str]) -> bool:
-    return all(_CLOCK.fullmatch(text) for text in texts[:50])
+    return all(map(is_clock, texts[:50]))
 
 
 def _is_hour(name: str, texts: Sequence[str]) -> bool:
@@ -160,12 +187,10 @@ def _forms(texts: Sequence[str]) -> list[str]:
 
 
 def _serial(number: float) -> str | None:
-    """Return what kind of count a number is: days since 1899, seconds or milliseconds since 1970."""
+    """Return what kind of count a number is: days since 1899, or seconds and parts of them since 1970."""
     if 32_000.0 < number < 74_000.0:
         return EXCEL
-    if 6e8 < number < 4.2e9:
-        return UNIX
-    return UNIX_MS if 6e11 < number < 4.2e12 else None
+    return next((form for form, unit in UNIX.items() if 6e8 < number * unit < 4.2e9), None)
 
 
 def _reads(texts: Sequence[str], form: str) -> bool:
@@ -184,11 +209,13 @@ def _reads(texts: Sequence[str], form: str) -> bool:
 
 def _written_forms(texts: Sequence[str]) -> list[str]:
     """Return the strptime forms that the first text may have, by the order of day, month and year."""
-    tokens = _TOKEN.findall(without_weekday(texts[0]))
+    tokens = _TOKEN.findall(with_english_months(without_weekday(texts[0])))
     numbers = [position for position, token in enumerate(tokens) if token.isdigit()]
     months = [p for p, token in enumerate(tokens) if vocabulary.folded(token) in vocabulary.month_names()]
     if numbers and len(tokens[numbers[0]]) == 8:
         return [form for form in (_clock_after(tokens, numbers[0] + 1, "%Y%m%d"),) if form is not None]
+    if re.match(r"(19|20)\d\d-\d{3}(?!\d)", texts[0]):
+        return [form for form in (_clock_after(tokens, 3, "%Y-%j"),) if form is not None]
     date = sorted([*numbers, *months[:1]])[:3]
     if len(date) < 3:
         return []

@@ -6,7 +6,7 @@ size alone nobody can tell 37 degF, a mild day in winter, from a hot one in degC
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 from igrow.trainer.data import vocabulary
@@ -18,6 +18,30 @@ _AMERICAN = {"temperature": "degF", "speed": "mph"}
 """By dimension, what goes with degrees Fahrenheit."""
 BY_SIZE = ("air_temperature", "heating_setpoint", "rail_pipe_temperature", "grow_pipe_temperature")
 """Temperatures of the greenhouse, whose own size tells degF: what is 20 there is never degF, whatever stands beside."""
+
+
+def tenths_like_the_air(
+    rules: Mapping[str, ColumnMapping], units: Mapping[str, str], whole: Collection[str]
+) -> tuple[dict[str, ColumnMapping], list[str]]:
+    """Take the temperatures of the weather for tenths of degC as well, where those of the greenhouse are.
+
+    Args:
+        rules: of the quantities, by name.
+        units: quantity -> its unit; empty where nothing tells it.
+        whole: quantities whose readings are all whole numbers.
+
+    Returns:
+        The rules, changed, and what was changed in sentences.
+    """
+    changed, notes = dict(rules), list[str]()
+    for name in ("outdoor_temperature", "sky_temperature"):
+        if name in rules and name in whole and not units.get(name) and rules[name].scale == 1.0:
+            changed[name] = replace(rules[name], scale=0.1)
+            notes.append(
+                f"{rules[name].column!r} has no unit: taken for tenths of degC, as those of the greenhouse are "
+                f"(--unit {name}='degC' says otherwise)"
+            )
+    return changed, notes
 
 
 def unit_of_cells(quantity: str, behind: str) -> Unit | None:

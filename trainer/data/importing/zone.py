@@ -6,10 +6,11 @@ import re
 
 from igrow.core.site import Site
 from igrow.trainer.data import vocabulary
-from igrow.trainer.data.export import ExportTable, written_times
+from igrow.trainer.data.export import written_times
+from igrow.trainer.data.export_table import ExportTable
 from igrow.trainer.data.importing.time_format import TimeForm
 from igrow.trainer.data.mapping import TimeColumn
-from igrow.trainer.data.timestamps import ZONE, wall_parser
+from igrow.trainer.data.timestamps import UNIX, ZONE, wall_parser
 from igrow.trainer.data.zone_abbreviations import ahead_of_utc, split
 
 _OFFSET = re.compile(r"(?:GMT|UTC)\s*([+-])\s*(\d{1,2})(?::?(\d{2}))?")
@@ -35,7 +36,7 @@ def find_zone(time: TimeForm, table: ExportTable, site: Site | None, given: str 
     if told is not None:
         return told, f"the column's name says that times are {told}"
     sample = next((text for text in table[time.column] if text), "")
-    if time.form.startswith("unix") or _WITH_OFFSET.search(sample.strip()):
+    if time.form in UNIX or _WITH_OFFSET.search(sample.strip()):
         return "UTC", ""
     if site is not None and site.time_zone != "UTC":
         return site.time_zone, f"times are taken for wall times of {site.time_zone}, the site's zone"
