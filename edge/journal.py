@@ -29,6 +29,8 @@ SILENT_CYCLES = 3
 """Cycles without any answer after which a unit counts as down; a start or a hiccup is no alarm."""
 SENSOR_CALM = 900.0
 """Seconds for which a sensor must be well until its alarm ends, so that one at the edge of its range is one alarm."""
+BUS_CALM = 60.0
+"""Seconds for which nobody may have wanted a write that failed, until its alarm ends."""
 _EVENTS = {
     Outcome.BY_HAND: "changed_by_hand",
     Outcome.FALLBACK: "plc_fell_back",
@@ -167,8 +169,9 @@ class Journal:
         written = {o.write.point for o in outcomes} - errors.keys()
         for name in self._bus_alarms - errors.keys():
             if name in written or name not in pending:
-                self.alarm(f"bus {name}", "")
-                self._bus_alarms.discard(name)
+                # A ramp that is refused asks again and again, with cycles between in which it asks for nothing.
+                self.alarm(f"bus {name}", "", calm=0.0 if name in written else BUS_CALM)
+        self._bus_alarms &= {record.name.removeprefix("bus ") for record in self.alarms.active}
         for name, text in errors.items():
             self.alarm(f"bus {name}", text)
             self._bus_alarms.add(name)
