@@ -21,6 +21,7 @@ import pytest
 
 from igrow.edge.bus.errors import UnitRestingError
 from igrow.edge.guard import DEFAULT_INTERLOCKS, PointRule
+from igrow.edge.guard.answers import takes
 from igrow.edge.sensors import default_rule
 from tests.control.control_fakes import FixedSource
 from tests.control.stubborn_plc import RULES, SAFE, StubbornBench, make_stubborn_bench
@@ -161,7 +162,10 @@ class World:
     def wish(self) -> None:
         name = self.random.choice(list(RULES))
         rule = self.rules[name]
-        self.wishes[name] = round(self.random.uniform(rule.low, rule.high), 2)
+        wish = round(self.random.uniform(rule.low, rule.high), 2)
+        if any(takes(rule, wish, stands) for stands in (self.plc.values[name], rule.safe)):
+            return  # a write of it that is lost looks like a coarse register's answer
+        self.wishes[name] = wish
 
     def power_up(self) -> None:
         unit = self.random.choice(sorted({self.plc.unit_of(name) for name in RULES}))
