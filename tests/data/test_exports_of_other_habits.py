@@ -151,6 +151,22 @@ def test_a_workbook_with_the_times_across_is_read(tmp_path: Path, log: Telemetry
     assert_reads_as(tmp_path, log, export="export.xlsx")
 
 
+def test_of_a_workbook_with_a_sheet_a_day_the_others_are_named(tmp_path: Path, log: Telemetry, capsys) -> None:
+    """One day was read, and nothing said of the rest."""
+    frame = written(log, PLAIN)
+    with pd.ExcelWriter(tmp_path / "export.xlsx") as book:
+        for row in range(0, 3 * 48, 48):
+            frame.iloc[row : row + 48].to_excel(book, sheet_name=f"day {row // 48 + 1}", index=False)
+        pd.DataFrame({"legend": ["T", "RH"], "meaning": ["temperature", "humidity"]}).to_excel(
+            book, sheet_name="legend"
+        )
+    imported(tmp_path, "--date-order", "dmy", export="export.xlsx")
+    told = capsys.readouterr().out
+    assert "note: sheet 'day 1' alone is read; 'day 2', 'day 3' have readings too: --sheet reads another" in told
+    imported(tmp_path, "--date-order", "dmy", "--sheet", "day 2", "--force", export="export.xlsx")
+    assert "alone is read" not in capsys.readouterr().out
+
+
 def test_of_a_reading_that_is_missing_at_fixed_places_no_other_moves(tmp_path: Path, log: Telemetry) -> None:
     frame = written(log, TERSE, "%Y-%m-%dT%H:%M").astype(object)
     frame.iloc[100:110, 3] = ""

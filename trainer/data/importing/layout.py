@@ -165,6 +165,18 @@ def _is_decimal(digits: str) -> bool:
     return len(re.findall(r"[.,]", digits)) == 1 and _GROUPED.fullmatch(digits) is None
 
 
+def other_sheets(path: Path, chosen: str) -> list[str]:
+    """Return the other sheets of a workbook that have readings."""
+    found = []
+    for name in sheets(path):
+        try:
+            first_reading(read_cells(path, sheet=name))
+        except IgrowError:
+            continue
+        found += [name] if name != chosen else []
+    return found
+
+
 def _fullest_sheet(path: Path) -> str | None:
     """Return the sheet with most cells, None where there is one alone."""
     names = sheets(path)

@@ -17,7 +17,7 @@ from igrow.trainer.data.importing.capacity import add_lamp_power, by_capacity
 from igrow.trainer.data.importing.compartments import chosen_compartment, rows_of_one
 from igrow.trainer.data.importing.error_codes import MEASURED, error_codes
 from igrow.trainer.data.importing.folder import further_cells, joined
-from igrow.trainer.data.importing.layout import Layout, find_layout
+from igrow.trainer.data.importing.layout import Layout, find_layout, other_sheets
 from igrow.trainer.data.importing.long_table import find_long, units_beside
 from igrow.trainer.data.importing.question import Answers, Question
 from igrow.trainer.data.importing.texts import ColumnTexts, column_texts
@@ -133,6 +133,12 @@ def propose(
     matches = names.side_by_side(names.find_matches(labels, unit_line))
     compartment = chosen_compartment(matches, answers, draft.questions)
     names.check_given(answers.columns, labels)
+    others = other_sheets(path, layout.sheet) if layout.sheet is not None and answers.sheet is None else []
+    if others:
+        draft.notes.append(
+            f"sheet {layout.sheet!r} alone is read; {', '.join(map(repr, others[:4]))}{', ...' * (len(others) > 4)} "
+            "have readings too: --sheet reads another; each saved as a CSV in one folder, they are read together"
+        )
     body = _Body(table, labels, long, layout.decimal)
     assigned = names.assign(matches, compartment, answers.columns)
     mapped, units = _mapped(body, assigned, site, answers, draft)
