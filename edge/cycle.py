@@ -61,11 +61,12 @@ class ControlCycle:
         respect_hand: float,
         marks_tests: bool = False,
         keep: Callable[[Image, Mapping[str, object]], None] | None = None,
+        interval: float = 0.0,
     ) -> None:
         """`setpoints` are the points that sources decide; interlocks may force every point of `rules`.
 
         With `marks_tests` each row of the log says whether a separating test moved the plant. `keep` is handed what a
-        restart must not forget, in each cycle before anything is written.
+        restart must not forget, in each cycle before anything is written. `interval`: seconds from cycle to cycle.
         """
         self._plc = plc
         self._clock = clock
@@ -86,7 +87,7 @@ class ControlCycle:
         """Points to be read in the next cycle although they are not due, since they wait to be written."""
         self._reading: asyncio.Future[Mapping[str, RawReading]] | None = None
         self._seen = self._giving_way = False
-        self.held = Held()
+        self.held = Held(interval)
         self._heart = Heart(writer, readback, journal)
         self.unknown_until = -math.inf
         """Monotonic seconds until which it is not known what hands have set before a restart; all is left alone."""

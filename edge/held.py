@@ -10,7 +10,8 @@ import time
 from collections.abc import Callable, Sequence
 
 LONGEST = 60.0
-"""Seconds between the beginning of a cycle and its last write. A line whose requests all time out needs half of it."""
+"""Seconds between the beginning of a cycle and its last write, where cycles are no longer apart. A line whose requests
+all time out needs half of it."""
 
 
 def _since_boot() -> float:
@@ -25,7 +26,9 @@ date that is stepped on costs one cycle's writes, which the next one makes good.
 class Held:
     """Measures by several clocks how long ago a cycle began."""
 
-    def __init__(self, clocks: Sequence[Callable[[], float]] = CLOCKS) -> None:
+    def __init__(self, interval: float = 0.0, clocks: Sequence[Callable[[], float]] = CLOCKS) -> None:
+        """`interval`: seconds from one cycle to the next, half of which a slow line may need."""
+        self._longest = max(LONGEST, interval)
         self._clocks = clocks
         self.begin()
 
@@ -36,4 +39,4 @@ class Held:
     @property
     def too_long(self) -> bool:
         """What was read since the cycle began may be too old to act on."""
-        return any(clock() - began > LONGEST for clock, began in zip(self._clocks, self._began, strict=True))
+        return any(clock() - began > self._longest for clock, began in zip(self._clocks, self._began, strict=True))

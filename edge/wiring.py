@@ -150,6 +150,7 @@ def build_control(
         respect_hand=respect_hand,
         marks_tests=file.separating_tests.permitted,
         keep=notes.keep,
+        interval=interval,
     )
     return Control(
         configuration, plc, clock, pace, cycle, keeper, _schedule(configuration, services), notes, boot,

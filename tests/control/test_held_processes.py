@@ -9,13 +9,13 @@ from tests.control.stubborn_plc import make_stubborn_bench
 WISH = {"heating_setpoint": 21.0, "co2_setpoint": 700.0, "lamp_on": 1.0, "irrigation_on": 0.5}
 
 
-def bench_with_clocks():
+def bench_with_clocks(interval=0.0):
     bench, ahead = make_stubborn_bench(FixedSource(dict(WISH))), [0.0] * len(CLOCKS)
 
     def clock(number):
         return lambda: bench.clock.monotonic() + ahead[number]
 
-    bench.cycle.held = Held([clock(number) for number in range(len(CLOCKS))])
+    bench.cycle.held = Held(interval, [clock(number) for number in range(len(CLOCKS))])
     return bench, ahead
 
 
@@ -56,12 +56,14 @@ async def test_what_was_decided_before_a_process_was_held_is_not_written_afterwa
     assert len(bench.plc.written("heartbeat")) == 3
 
 
-async def test_a_slow_cycle_is_no_held_one():
-    bench, _ = bench_with_clocks()
+@pytest.mark.parametrize(("interval", "answer"), [(10.0, LONGEST / 10.0), (600.0, 50.0)])
+async def test_a_slow_cycle_is_no_held_one(interval, answer):
+    """Six writes of six seconds; or a serial line that a cycle of ten minutes keeps busy for nearly half of it."""
+    bench, _ = bench_with_clocks(interval)
     usual = bench.plc.write
 
     async def write(name, value):
-        bench.clock.advance(LONGEST / 10.0)
+        bench.clock.advance(answer)
         await usual(name, value)
 
     bench.plc.write = write
