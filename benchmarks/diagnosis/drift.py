@@ -8,7 +8,7 @@ learned from the nurseries of the other seasons. No case of a benchmark has thes
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
@@ -87,17 +87,29 @@ def _single(design: Design) -> linear.DailyGrams:
 
 def gains_under(log: NullLog, learned: Drift) -> dict[str, float]:
     """Return the proven gain of every effect in a log under a drift, the one that would be named first."""
+    return _gains(_under(log, learned), search.score_candidates)
+
+
+def parameter_gains(log: NullLog) -> dict[str, float]:
+    """Return the same of every parameter where all else changes by physics alone."""
+    return _gains(_under(log, Drift({}, BETWEEN)), search.score_parameters)
+
+
+def _gains(design: Design, score: Callable[..., list[search.Hypothesis]]) -> dict[str, float]:
+    fitted = linear.fit(design.grams, design.null_model())
+    scored = score(design, fitted, search.onset_days(design), np.random.default_rng(0))
+    ranked = sorted(scored, key=lambda one: -change.net_gain(design, one))
+    return {one.key: change.proven_gain(design, one) for one in ranked}
+
+
+def _under(log: NullLog, learned: Drift) -> Design:
     design, pair = log.design, log.pair
     assert design.history is not None
     keys = design.history.amplitudes.names
     rates = [learned.rate(key, rate, BETWEEN) for key, rate in zip(pair.keys, pair.expected.tolist(), strict=True)]
     covariance = pair.known + np.diag((pair.unit * np.array(rates)) ** 2)
     now = replace(design.history, amplitudes=Gaussian(keys, np.zeros(len(keys)), covariance), drift=learned)
-    design = replace(design, history=now)
-    fitted = linear.fit(design.grams, design.null_model())
-    scored = search.score_candidates(design, fitted, search.onset_days(design), np.random.default_rng(0))
-    ranked = sorted(scored, key=lambda one: -change.net_gain(design, one))
-    return {one.effect: change.proven_gain(design, one) for one in ranked}
+    return replace(design, history=now)
 
 
 def largest(gains: Sequence[dict[str, float]]) -> dict[str, float]:
@@ -117,6 +129,18 @@ def false_claims(
         named = next(iter(own), "")
         if named and own[named] >= bound.needed_gain(named):
             claims.append((log.greenhouse, log.group, named))
+    return claims
+
+
+def false_parameters(logs: Sequence[NullLog], gains: Sequence[dict[str, float]]) -> list[str]:
+    """Return the parameters that gain what they must, each greenhouse judged by the gains of the others."""
+    claims = []
+    for log, own in zip(logs, gains, strict=True):
+        rest = largest([one for other, one in zip(logs, gains, strict=True) if other.greenhouse != log.greenhouse])
+        needed = {
+            key: max(DEFAULT.least_parameter_gain, DEFAULT.parameter_over_null * rest.get(key, 0.0)) for key in own
+        }
+        claims += [f"{log.greenhouse} {key}" for key, gain in own.items() if gain >= needed[key]]
     return claims
 
 
@@ -161,10 +185,14 @@ def main(processes: int) -> int:
             least = float(bound)
         if bound <= 2 * LEAST:
             print(f"  bound {bound}: {len(claims)} {claims}")
+    moved = [parameter_gains(one) for one in logs]
+    print(f"parameters that would be named by the gains of other greenhouses: {false_parameters(logs, moved)}")
     found = learn(logs)
     for key, rate in sorted(found.rates.items(), key=lambda item: -item[1])[:20]:
         print(f"  {key:40} {rate:.3f}")
-    done = replace(found, null_gains=largest(gains), least_gain=least, provenance=provenance(COMMAND, dict(SEEDS)))
+    done = replace(
+        found, null_gains=largest(gains) | largest(moved), least_gain=least, provenance=provenance(COMMAND, dict(SEEDS))
+    )
     path = Path(str(files("igrow.trainer.diagnosis"))) / drift.FILE
     drift.write_drift(path, done)
     print(f"least gain {least:g}; wrote {path}")

@@ -19,7 +19,8 @@ from igrow.trainer.diagnosis import freerun
 from igrow.trainer.diagnosis.candidates import Pattern, pattern_fluxes
 from igrow.trainer.diagnosis.estimate import Estimated
 from igrow.trainer.diagnosis.freerun import FreeRuns
-from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, activate
+from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, activate, drift
+from igrow.trainer.diagnosis.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.refit import REGIMES
 from igrow.trainer.diagnosis.result import Finding, Interval
 from igrow.trainer.diagnosis.rules import DecisionRules
@@ -50,6 +51,8 @@ class Corrected:
     kept: tuple[Estimated, ...]
     estimates: tuple[Estimated, ...]
     """All causes with their size and skill on unseen days, kept or not."""
+    parameter: ParameterChange | None = None
+    """One that has changed, where no effect is missing."""
 
 
 @dataclass(frozen=True)
@@ -173,6 +176,25 @@ def _judged(log: LogDays, one: Estimated, current: Stage, trial: Stage) -> Estim
     if before is None or after is None or plain is None:
         return one
     return replace(one, effect_to_noise=freerun.effect_to_noise(plain, after), skill=freerun.skill(before, after))
+
+
+def with_parameter(
+    log: LogDays, knowledge: Knowledge, result: Corrected, parameter: ParameterChange | None, rules: DecisionRules
+) -> Corrected:
+    """Return a correction with a parameter that has changed, free by its value unless unseen days speak against it."""
+    if parameter is None:
+        return result
+    prior, current = knowledge.prior, result.stages["corrected"]
+    value = drift(prior.values, 1.0, rules) * np.array([name == parameter.parameter for name in prior.names])
+    try:
+        trial = Stage(log.fit(prior.widened(value), current.terms, current.posterior.values), current.terms)
+    except DivergenceError:
+        trial = current
+    before, after = log.run(current), log.run(trial)
+    if before is not None and after is not None and freerun.skill(before, after) < 0.0:
+        # Recalibration has followed the change already.
+        trial = current
+    return replace(result, stages={**result.stages, "corrected": trial}, parameter=parameter)
 
 
 def _with_patterns(

@@ -7,7 +7,8 @@ log, model --> knowledge --> design --> compare --> estimate --> refit --+--> co
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,14 +20,14 @@ from igrow.trainer.data.splits import split_days
 from igrow.trainer.diagnosis import freerun, history, sensitivity, wording
 from igrow.trainer.diagnosis.actuators import Completed, complete
 from igrow.trainer.diagnosis.compare import Round
-from igrow.trainer.diagnosis.correction import Corrected, LogDays, Stage, correct, corrected_model
+from igrow.trainer.diagnosis.correction import Corrected, LogDays, Stage, correct, corrected_model, with_parameter
 from igrow.trainer.diagnosis.design import prepare
 from igrow.trainer.diagnosis.drift import Drift
-from igrow.trainer.diagnosis.estimate import Estimated
 from igrow.trainer.diagnosis.evidence import Evidence
 from igrow.trainer.diagnosis.knowledge import activate, knowledge_of
 from igrow.trainer.diagnosis.nuisance import NuisanceSubspace, learn_discrepancy
 from igrow.trainer.diagnosis.open_vents import under_open_vents
+from igrow.trainer.diagnosis.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.result import Diagnosis, Finding, Verdict
 from igrow.trainer.diagnosis.rounds import search_of
 from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules
@@ -44,6 +45,8 @@ NEWEST = N_(
     "Within more than six weeks a crop changes: what has changed since the calibration was looked for in the newest "
     "six."
 )
+
+SINCE = N_("The errors are of the days since then: before, the greenhouse was another.")
 
 
 def diagnose(
@@ -93,7 +96,17 @@ def diagnose(
     first, last, found = search.run(rng)
     say("correcting the model")
     result = correct(days, knowledge, found, last.patterns, site.longitude, rules)
-    verdict, findings = _verdict(completed, result.kept, last, rules)
+    if not (result.kept or last.patterns or completed.found):
+        parameter = search.changed_parameter(rng)
+        since = None if parameter is None else parameter.onset
+        later = log if since is None else log.select(since.time)
+        if parameter is not None and since is not None and later.days >= rules.least_days:
+            # One set of parameters is none for a log of two greenhouses: the one that is there now counts.
+            told = diagnose(later, model, without=without, seed=seed, rules=rules, nuisance=nuisance, drift=drift)
+            if any(one.effect == parameter.parameter for one in told.findings):
+                return begun(told, parameter)
+        result = with_parameter(days, knowledge, result, parameter, rules)
+    verdict, findings = _verdict(completed, result, last, rules)
     stages = _stages(result, completed, logged)
     say("predicting unseen days")
     errors = _errors(stages)
@@ -124,6 +137,17 @@ def diagnose(
         Evidence(days, knowledge, first, result.estimates, {name: stage for name, (stage, _) in stages.items()}, runs),
         log,
     )
+
+
+def begun(later: Diagnosis, change: ParameterChange) -> Diagnosis:
+    """Return the diagnosis of the days since a parameter has changed, with the beginning that the whole log tells."""
+    findings = tuple(
+        wording.parameter(replace(change, share=one.parameters["change"], confounded=one.confounded))
+        if one.effect == change.parameter
+        else one
+        for one in later.findings
+    )
+    return replace(later, findings=findings, notes=(*later.notes, SINCE))
 
 
 def newest_weeks(log: Log, model: FittedModel, rules: DecisionRules) -> Log:
@@ -166,11 +190,12 @@ def log_days(log: Log, model: FittedModel) -> LogDays:
 
 
 def _verdict(
-    completed: Completed, kept: Sequence[Estimated], last: Round, rules: DecisionRules
+    completed: Completed, result: Corrected, last: Round, rules: DecisionRules
 ) -> tuple[Verdict, tuple[Finding, ...]]:
     findings = (
         *(wording.actuator(one) for one in completed.found),
-        *(wording.finding(one) for one in sorted(kept, key=lambda one: -one.effect_to_noise)),
+        *(wording.finding(one) for one in sorted(result.kept, key=lambda one: -one.effect_to_noise)),
+        *(() if result.parameter is None else (wording.parameter(result.parameter),)),
     )
     if last.patterns:
         return "unexplained", (*findings, wording.discrepancy(last.patterns, rules))

@@ -55,7 +55,8 @@ class Drift:
     days: float
     """From the middle of one log to that of the other, in the pairs that they were learned from."""
     null_gains: Mapping[str, float] = field(default_factory=dict)
-    """Largest gain of an effect in logs with nothing missing of greenhouses that the rates were not learned from."""
+    """Largest gain in logs with nothing missing of greenhouses that the rates were not learned from: of an effect, and,
+    where all else changes by physics alone, of a parameter (``parameter:name``)."""
     least_gain: float = 12.0
     """Gain that a change must have at least: so few of these logs have more, each by the gains of the others."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
@@ -64,6 +65,10 @@ class Drift:
     def needed_gain(self, effect: str) -> float:
         """Return what a change must gain: more, by some, than it did in any greenhouse in which nothing had changed."""
         return max(self.least_gain, OVER_NULL * self.null_gains.get(effect, 0.0))
+
+    def by_physics(self) -> Drift:
+        """Return the change that physics alone lets expect: what one parameter's own change is told from."""
+        return replace(self, rates={})
 
     def rate(self, key: str, expected: float, days: float) -> float:
         """Return the rate of a key after so many days; no less than after those that it was learned from.

@@ -55,13 +55,13 @@ def estimate(found: Round, rng: np.random.Generator) -> Estimated | None:
     design, null, hypothesis = found.design, found.null, found.cause.hypothesis
     gain = found.named.solution.gain - null.solution.gain
     (amplitude,) = found.named.amplitudes.tolist()
-    reach = _reach(design.rules) * linear.deviation_by_day(design.grams, found.named)
-    onset = _onset(design, null, hypothesis)
+    wide = reach(design.rules) * linear.deviation_by_day(design.grams, found.named)
+    onset = onset_interval(design, null, hypothesis.term)
     shape = _shape(design, null, hypothesis)
     return Estimated(
         hypothesis,
         ActiveTerm(hypothesis.effect, amplitude, shape, None if onset is None else onset.time),
-        Interval(amplitude, amplitude - reach, amplitude + reach, EFFECTS[hypothesis.effect].amplitude.unit),
+        Interval(amplitude, amplitude - wide, amplitude + wide, EFFECTS[hypothesis.effect].amplitude.unit),
         hypothesis.gain,
         onset,
         _confounded(design, null, hypothesis, gain, rng),
@@ -73,17 +73,17 @@ def estimate(found: Round, rng: np.random.Generator) -> Estimated | None:
 def with_refitted(one: Estimated, refitted: Refitted, rules: DecisionRules) -> Estimated:
     """Return the cause with refitted values and their intervals."""
     definition = EFFECTS[one.effect]
-    reach, amplitude = _reach(rules), refitted.term.amplitude
+    errors, amplitude = reach(rules), refitted.term.amplitude
     shapes = {}
     for shape in definition.shapes:
         value = refitted.term.shape[shape.name]
-        wide = reach * refitted.shape_deviation[shape.name]
+        wide = errors * refitted.shape_deviation[shape.name]
         shapes[shape.name] = Interval(value, max(value - wide, shape.low), min(value + wide, shape.high), shape.unit)
     form = rules.form_deviation * amplitude
     wide = normal_quantile(rules) * float(np.hypot(rules.deviation_inflation * refitted.deviation, form))
     unit = definition.amplitude.unit
     regimes = {
-        name: Interval(value, value - reach * deviation, value + reach * deviation, unit)
+        name: Interval(value, value - errors * deviation, value + errors * deviation, unit)
         for name, (value, deviation) in refitted.regimes.items()
     }
     interval = Interval(amplitude, amplitude - wide, amplitude + wide, unit)
@@ -102,7 +102,8 @@ def normal_quantile(rules: DecisionRules) -> float:
     return float(norm.ppf(0.5 + 0.5 * rules.confidence))
 
 
-def _reach(rules: DecisionRules) -> float:
+def reach(rules: DecisionRules) -> float:
+    """Return how many standard errors of a linear fit an interval reaches to either side: they are too small."""
     return normal_quantile(rules) * rules.deviation_inflation
 
 
@@ -154,9 +155,8 @@ def _shape(design: Design, null: Fit, hypothesis: Hypothesis) -> dict[str, float
     return {name: float(np.clip(-0.5 * curve[1] / curve[0], tried[0], tried[-1]))}
 
 
-def _onset(design: Design, null: Fit, hypothesis: Hypothesis) -> OnsetInterval | None:
+def onset_interval(design: Design, null: Fit, term: Term) -> OnsetInterval | None:
     """Return the beginning and its interval: days whose profile likelihood lies near the best (Wilks' theorem)."""
-    term = hypothesis.term
     if term.onset is None:
         return None
     days = list(range(1, design.split.days - 1))

@@ -54,8 +54,9 @@ class Finding:
     """One cause."""
 
     effect: str
-    """Name in the catalogue, of the actuator that the log lacks, or ``discrepancy``."""
-    kind: Literal["process", "sensor", "actuator", "discrepancy"]
+    """Name in the catalogue, of the actuator that the log lacks, of the parameter that has changed, or
+    ``discrepancy``."""
+    kind: Literal["process", "sensor", "actuator", "parameter", "discrepancy"]
     balances: tuple[str, ...]
     parameters: Mapping[str, Interval]
     onset: OnsetInterval | None

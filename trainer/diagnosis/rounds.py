@@ -9,15 +9,16 @@ import numpy as np
 
 from igrow.core.arrays import Floats
 from igrow.core.site import Site
-from igrow.trainer.diagnosis import history
+from igrow.trainer.diagnosis import history, parameter_change
 from igrow.trainer.diagnosis.change import changed
 from igrow.trainer.diagnosis.compare import Round, compare
 from igrow.trainer.diagnosis.correction import LogDays
 from igrow.trainer.diagnosis.design import Design, prepare
-from igrow.trainer.diagnosis.drift import Drift
+from igrow.trainer.diagnosis.drift import Drift, read_drift
 from igrow.trainer.diagnosis.estimate import Estimated, estimate, with_refitted, within_bounds
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, activate
 from igrow.trainer.diagnosis.nuisance import NuisanceSubspace, read_nuisance
+from igrow.trainer.diagnosis.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.refit import are_identifiable, refit
 from igrow.trainer.diagnosis.rules import HOUR, DecisionRules
 from igrow.trainer.diagnosis.structure import disagreement
@@ -62,6 +63,10 @@ class Search:
                 # No cause: the log itself stayed within all bounds.
                 return first, judged, found
             found = terms
+
+    def changed_parameter(self, _rng: np.random.Generator) -> ParameterChange | None:
+        """Return nothing: without a history nobody knows what a parameter was."""
+        return None
 
     def judge(self, design: Design, explained: float, rng: np.random.Generator, *, causes: bool) -> Round:
         """Return what one round finds."""
@@ -125,8 +130,16 @@ class Change(Search):
 
     def design(self, terms: Sequence[ActiveTerm], interval: float) -> Design:
         """Return the design of a model with terms, about the calibrated parameters."""
+        return self._expected(terms, self.drift or read_drift())
+
+    def changed_parameter(self, rng: np.random.Generator) -> ParameterChange | None:
+        """Return the parameter that has changed where no effect is missing."""
+        by_physics = (self.drift or read_drift()).by_physics()
+        return parameter_change.find(self._expected(self.knowledge.terms, by_physics), rng)
+
+    def _expected(self, terms: Sequence[ActiveTerm], drift: Drift) -> Design:
         plain = laid_out(self.days, self.site, self.history, terms, self.rules) if terms else self.plain
-        return history.expected(self.history, plain, self.misfit, self.without, self.drift)
+        return history.expected(self.history, plain, self.misfit, self.without, drift)
 
     def resolved(self) -> Design:
         """Return the first design: by the steps that the history was learned from."""

@@ -17,7 +17,9 @@ import numpy as np
 from igrow.core.arrays import Floats, Integers, Mask
 from igrow.trainer.diagnosis.candidates import Candidate, Pattern
 from igrow.trainer.diagnosis.design import Design
+from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX
 from igrow.trainer.diagnosis.linear import RESIDUAL, DailyGrams, Fit, Term
+from igrow.trainer.fit.climate import bounds as physical_bounds
 
 _EXPLAINED = 1e-6
 """Share of a column's curvature below which the null explains it altogether."""
@@ -151,7 +153,8 @@ def _largest_flipped(centred: Floats, spread: Floats, usable: Mask, rng: np.rand
 class Hypothesis:
     """One candidate (or pattern) as a term, with what it would gain in the model it was scored against."""
 
-    cause: Candidate | Pattern
+    cause: Candidate | Pattern | str
+    """A parameter by its name."""
     term: Term
     gain: float
     amplitude: float
@@ -160,13 +163,20 @@ class Hypothesis:
 
     @property
     def key(self) -> str:
-        """The effect at any shape, or the pattern: as own gains are kept."""
+        """The effect at any shape, the pattern, or the parameter: as gains where nothing had changed are kept."""
+        if isinstance(self.cause, str):
+            return PARAMETER_PREFIX + self.cause
         return self.cause.effect if isinstance(self.cause, Candidate) else self.cause.key
 
     @property
     def effect(self) -> str:
-        """Name of the effect; a pattern has none."""
+        """Name of the effect; nothing else has one."""
         return self.cause.effect if isinstance(self.cause, Candidate) else ""
+
+    @property
+    def parameter(self) -> str:
+        """Name of the parameter; nothing else has one."""
+        return self.cause if isinstance(self.cause, str) else ""
 
 
 def onset_days(design: Design) -> list[int | None]:
@@ -217,9 +227,21 @@ def score_patterns(
     return _best(scanned, design.patterns, none, list(range(count)), design.onset_price)
 
 
+def score_parameters(
+    design: Design, current: Fit, onsets: Sequence[int | None], rng: np.random.Generator
+) -> list[Hypothesis]:
+    """Return every parameter as a hypothesis, free within its bounds, the likeliest first."""
+    block = design.block("parameter")
+    values = np.array([design.line.parameters[name] for name in block.labels])
+    bounds = np.stack(physical_bounds(block.labels), axis=1) - values[:, None]
+    none: list[int | None] = [None] * len(block)
+    scanned = scan(design.grams, current, block.columns, none, onsets, bounds, rng, design.rules.flips)
+    return _best(scanned, block.labels, none, list(block.labels), design.onset_price)
+
+
 def _best(
     scanned: Scan,
-    causes: Sequence[Candidate] | Sequence[Pattern],
+    causes: Sequence[Candidate] | Sequence[Pattern] | Sequence[str],
     ageing: Sequence[int | None],
     groups: Sequence[object],
     onset_price: float,

@@ -11,7 +11,8 @@ from igrow.core.language.units import written
 from igrow.trainer.diagnosis.actuators import Replaced
 from igrow.trainer.diagnosis.candidates import UNIT_FLUX, Pattern
 from igrow.trainer.diagnosis.estimate import Estimated, normal_quantile
-from igrow.trainer.diagnosis.result import DISCREPANCY, Finding, Interval, plain
+from igrow.trainer.diagnosis.parameter_change import VISIBLE, ParameterChange
+from igrow.trainer.diagnosis.result import DISCREPANCY, Finding, Interval, OnsetInterval, plain
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.diagnosis.search import Hypothesis
 
@@ -87,16 +88,37 @@ def actuator(one: Replaced) -> Finding:
     )
 
 
+def parameter(one: ParameterChange) -> Finding:
+    """Return the finding of a parameter that has changed."""
+    visible, share = VISIBLE[one.parameter], one.share.value
+    told = f"{visible.title}: {100.0 * abs(share):.0f} % {'less' if share < 0.0 else 'more'}"
+    text = f"{told[0].upper()}{told[1:]} than at the calibration."
+    return Finding(
+        one.parameter,
+        "parameter",
+        visible.balances,
+        {"change": one.share},
+        one.onset,
+        one.p_value,
+        one.confounded,
+        (one.parameter,),
+        visible.check,
+        text if one.onset is None else f"Since {_day(one.onset)} {text[0].lower()}{text[1:]}",
+    )
+
+
 def sentence(one: Estimated) -> str:
     """Return the grower's sentence, with the beginning where there is one."""
     effect = EFFECTS[one.effect]
     said, amount = effect.told(one.amplitude.value)
     text = said.format(value=plain(amount), unit=written(effect.amplitude.unit))
-    if one.onset is not None:
-        # A day begins at solar midnight, which may be before midnight in UTC: its noon tells the date.
-        time = (one.onset.time + np.timedelta64(12, "h")).astype("datetime64[D]").item()
-        return f"Since {time.day} {time:%B} {text}."
-    return f"{text[0].upper()}{text[1:]}."
+    return f"{text[0].upper()}{text[1:]}." if one.onset is None else f"Since {_day(one.onset)} {text}."
+
+
+def _day(onset: OnsetInterval) -> str:
+    # A day begins at solar midnight, which may be before midnight in UTC: its noon tells the date.
+    time = (onset.time + np.timedelta64(12, "h")).astype("datetime64[D]").item()
+    return f"{time.day} {time:%B}"
 
 
 def separating_test(confounded: Sequence[str]) -> str:

@@ -121,8 +121,7 @@ def render_report(result: Diagnosis, language: str = "en") -> str:
 
 
 def _cause(result: Diagnosis, finding: Finding, language: Language) -> Cause:
-    known = finding.effect in EFFECTS
-    title = language.text(EFFECTS[finding.effect].title) if known else language.name(finding.effect)
+    title = sentences.title(finding.effect, language)
     site = result.model.site if result.log is None else result.log.known_site
     return Cause(
         finding,

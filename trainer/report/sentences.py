@@ -11,6 +11,7 @@ from igrow.core.effects import EFFECTS, Effect
 from igrow.core.language import N_, Language
 from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator.hybrid.measurement import PREDICTED
+from igrow.trainer.diagnosis.parameter_change import VISIBLE
 from igrow.trainer.diagnosis.persistence import misfits
 from igrow.trainer.diagnosis.result import DISCREPANCY, WORSE, Diagnosis, Finding
 from igrow.trainer.fit.omission import Omission
@@ -71,6 +72,15 @@ def cause(finding: Finding, language: Language) -> str:
     if finding.effect == DISCREPANCY:
         parts = [when(name, one.value, language) for name, one in finding.parameters.items()]
         return language.text("Something that the model does not know changes these: {parts}.", parts="; ".join(parts))
+    if finding.kind == "parameter":
+        share = finding.parameters["change"].value
+        text = (
+            N_("{parameter}: {share} % less than at the calibration")
+            if share < 0.0
+            else N_("{parameter}: {share} % more than at the calibration")
+        )
+        told = language.text(text, parameter=title(finding.effect, language), share=language.number(100.0 * abs(share)))
+        return _since(finding, told, language)
     if finding.effect not in EFFECTS:
         text = N_(
             "The log lacks this: {quantity}. What the climate computer's rules make of it explains much of the error."
@@ -78,7 +88,10 @@ def cause(finding: Finding, language: Language) -> str:
         return language.text(text, quantity=language.name(finding.effect))
     effect = EFFECTS[finding.effect]
     size = finding.parameters[effect.amplitude.name]
-    told = _told(effect, size.value, size.unit, language)
+    return _since(finding, _told(effect, size.value, size.unit, language), language)
+
+
+def _since(finding: Finding, told: str, language: Language) -> str:
     if finding.onset is not None:
         return language.text("Since {day}: {told}.", day=language.day(finding.onset.time), told=told)
     return language.text("{told}.", told=f"{told[0].upper()}{told[1:]}")
@@ -135,8 +148,15 @@ def _course(course: str, language: Language) -> str:
 def rivals(finding: Finding, language: Language) -> list[str]:
     """Return a sentence for each cause that is confounded with a finding in this log."""
     text = N_("It may as well be {cause}: in this log they cannot be told apart.")
-    others = [EFFECTS[name].title for name in finding.confounded if name != finding.effect and name in EFFECTS]
-    return [language.text(text, cause=language.text(title)) for title in others]
+    others = [name for name in finding.confounded if name != finding.effect and name in {*EFFECTS, *VISIBLE}]
+    return [language.text(text, cause=title(name, language)) for name in others]
+
+
+def title(cause: str, language: Language) -> str:
+    """Return what people call an effect, a parameter that has changed, or an actuator that a log lacks."""
+    if cause in EFFECTS:
+        return language.text(EFFECTS[cause].title)
+    return language.text(VISIBLE[cause].title) if cause in VISIBLE else language.name(cause)
 
 
 def checks(finding: Finding, language: Language) -> list[str]:
@@ -144,6 +164,8 @@ def checks(finding: Finding, language: Language) -> list[str]:
     if finding.kind == "actuator":
         return [language.text("Have it written into the log: {quantity}.", quantity=language.name(finding.effect))]
     tests = [EFFECTS[name].separating_test for name in (finding.effect, *finding.confounded) if name in EFFECTS]
+    if finding.kind == "parameter":
+        tests = [VISIBLE[name].check for name in finding.confounded]
     if not tests:
         tests = [N_("look at what happens in the greenhouse at these times and in this weather, and write it down")]
     told = (language.in_units(language.text(one)) for one in dict.fromkeys(tests))
