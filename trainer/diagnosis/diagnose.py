@@ -7,7 +7,7 @@ log, model --> knowledge --> design --> compare --> estimate --> refit --+--> co
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +19,6 @@ from igrow.trainer.data.log import Log
 from igrow.trainer.data.splits import split_days
 from igrow.trainer.diagnosis import freerun, history, sensitivity, wording
 from igrow.trainer.diagnosis.actuators import Completed, complete
-from igrow.trainer.diagnosis.compare import Round
 from igrow.trainer.diagnosis.correction import Corrected, LogDays, Stage, correct, corrected_model, with_parameter
 from igrow.trainer.diagnosis.design import prepare
 from igrow.trainer.diagnosis.drift import Drift
@@ -31,6 +30,7 @@ from igrow.trainer.diagnosis.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.result import Diagnosis, Finding, Verdict
 from igrow.trainer.diagnosis.rounds import search_of
 from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules
+from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.growth import built_in_crop, growth_since
 from igrow.trainer.fit.model import FittedModel
@@ -94,10 +94,13 @@ def diagnose(
     search = search_of(days, site, model, knowledge, hidden, rules, nuisance, drift)
     say("searching for causes")
     first, last, found = search.run(rng)
+    parameter = None if completed.found else search.changed_parameter(rng)
+    patterns = last.patterns
+    if parameter is not None and parameter.leads:
+        found, patterns = [], ()
     say("correcting the model")
-    result = correct(days, knowledge, found, last.patterns, site.longitude, rules)
-    if not (result.kept or last.patterns or completed.found):
-        parameter = search.changed_parameter(rng)
+    result = correct(days, knowledge, found, patterns, site.longitude, rules)
+    if not (result.kept or patterns):
         since = None if parameter is None else parameter.onset
         later = log if since is None else log.select(since.time)
         if parameter is not None and since is not None and later.days >= rules.least_days:
@@ -106,7 +109,7 @@ def diagnose(
             if any(one.effect == parameter.parameter for one in told.findings):
                 return begun(told, parameter)
         result = with_parameter(days, knowledge, result, parameter, rules)
-    verdict, findings = _verdict(completed, result, last, rules)
+    verdict, findings = _verdict(completed, result, patterns, rules)
     stages = _stages(result, completed, logged)
     say("predicting unseen days")
     errors = _errors(stages)
@@ -190,15 +193,15 @@ def log_days(log: Log, model: FittedModel) -> LogDays:
 
 
 def _verdict(
-    completed: Completed, result: Corrected, last: Round, rules: DecisionRules
+    completed: Completed, result: Corrected, patterns: Sequence[Hypothesis], rules: DecisionRules
 ) -> tuple[Verdict, tuple[Finding, ...]]:
     findings = (
         *(wording.actuator(one) for one in completed.found),
         *(wording.finding(one) for one in sorted(result.kept, key=lambda one: -one.effect_to_noise)),
         *(() if result.parameter is None else (wording.parameter(result.parameter),)),
     )
-    if last.patterns:
-        return "unexplained", (*findings, wording.discrepancy(last.patterns, rules))
+    if patterns:
+        return "unexplained", (*findings, wording.discrepancy(patterns, rules))
     if not findings:
         return "nothing", ()
     return ("ambiguous" if any(len(one.confounded) > 1 for one in findings) else "named"), findings

@@ -1,4 +1,4 @@
-"""A parameter's own change: what has changed in a greenhouse where no effect of the catalogue is missing.
+"""A parameter's own change: what the model has, but no longer as it is in the greenhouse.
 
 A whitened cover, lamps that were taken down, a blocked dosing line: the model has all of it, and only its numbers are
 no longer those of the greenhouse. Recalibration follows such a change without saying so. Asked here is which parameter
@@ -76,6 +76,8 @@ class ParameterChange:
     p_value: float
     confounded: tuple[str, ...]
     """Parameters that would explain the log as well, itself first."""
+    leads: bool
+    """It explains the log better than any effect does."""
 
 
 def find(design: Design, rng: np.random.Generator) -> ParameterChange | None:
@@ -98,6 +100,8 @@ def find(design: Design, rng: np.random.Generator) -> ParameterChange | None:
     if abs(size) < rules.least_parameter_change * abs(value):
         return None
     low, high = sorted(((size - wide) / value, (size + wide) / value))
+    effects = search.score_candidates(design, null, search.onset_days(design), rng)
+    largest = max((change.net_gain(design, one) for one in effects), default=0.0)
     margin = max(rules.confounded_gain, rules.confounded_share * best.gain)
     as_good = [
         one.parameter
@@ -110,6 +114,7 @@ def find(design: Design, rng: np.random.Generator) -> ParameterChange | None:
         onset_interval(design, null, best.term),
         best.p_value,
         (best.parameter, *as_good),
+        best.gain >= rules.parameter_over_effect * largest,
     )
 
 

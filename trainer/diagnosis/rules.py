@@ -67,10 +67,13 @@ class DecisionRules:
     pattern_over_change: float = _tuned(1.5, "times a change's gain at which a pattern replaces it")
     least_left_by_hour: float = _tuned(25.0, "gain of a pattern by the hour beside a change that unmakes its name")
 
-    # Which parameter has changed where no effect is missing.
+    # Which parameter has changed, where no effect is missing or none explains as much.
     least_parameter_change: float = _chosen(0.2, "share of its value by which a parameter must change to be named")
     least_parameter_gain: float = _tuned(20.0, "gain that its change must bring, all else changing by physics alone")
     parameter_over_null: float = _tuned(2.0, "times its largest gain where nothing had changed that it must bring")
+    parameter_over_effect: float = _tuned(
+        1.1, "times the largest gain of an effect at which it goes before all effects"
+    )
 
     # Time steps or hours.
     largest_disagreement: float = _fitted(
