@@ -22,6 +22,7 @@ from igrow.trainer.diagnosis.actuators import Completed, complete
 from igrow.trainer.diagnosis.correction import Corrected, LogDays, Stage, correct, corrected_model, with_parameter
 from igrow.trainer.diagnosis.design import prepare
 from igrow.trainer.diagnosis.drift import Drift
+from igrow.trainer.diagnosis.estimate import normal_quantile
 from igrow.trainer.diagnosis.evidence import Evidence
 from igrow.trainer.diagnosis.knowledge import activate, knowledge_of
 from igrow.trainer.diagnosis.nuisance import NuisanceSubspace, learn_discrepancy
@@ -117,6 +118,7 @@ def diagnose(
     moved = model.posterior.values, result.stages["corrected"].posterior.values
     crop = growth_since(log, days.record, moved, model.crop or built_in_crop())
     runs = {name: day for name, (stage, seen) in stages.items() if (day := seen.run(stage)) is not None}
+    corrected = corrected_model(model, result, findings, errors, knowledge.discrepancy, (start, end), crop)
     notes = (
         *((NOT_CALIBRATED,) if knowledge.transferred else ()),
         *((NEWEST,) if log is not given else ()),
@@ -133,7 +135,7 @@ def diagnose(
         errors,
         log.screened,
         model,
-        corrected_model(model, result, findings, errors, knowledge.discrepancy, (start, end), crop),
+        remembering(corrected, result.parameter, rules),
         first.design.untestable,
         logged.record.missing,
         notes,
@@ -151,6 +153,15 @@ def begun(later: Diagnosis, change: ParameterChange) -> Diagnosis:
         for one in later.findings
     )
     return replace(later, findings=findings, notes=(*later.notes, SINCE))
+
+
+def remembering(model: FittedModel, change: ParameterChange | None, rules: DecisionRules) -> FittedModel:
+    """Return a model whose history knows that a parameter has changed, so that it is no news in the next log."""
+    if change is None or model.history is None:
+        return model
+    value, share = model.history.parameters[change.parameter], change.share
+    deviation = 0.5 * (share.high - share.low) / normal_quantile(rules) * abs(value)
+    return replace(model, history=history.followed(model.history, change.parameter, share.value * value, deviation))
 
 
 def newest_weeks(log: Log, model: FittedModel, rules: DecisionRules) -> Log:

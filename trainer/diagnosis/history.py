@@ -23,6 +23,7 @@ from igrow.trainer.diagnosis.amplitudes import drift_within, keys, omission, rat
 from igrow.trainer.diagnosis.candidates import WEEKDAYS
 from igrow.trainer.diagnosis.design import JOINT, Design, History, blocks_of
 from igrow.trainer.diagnosis.drift import Drift, read_drift
+from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX
 from igrow.trainer.diagnosis.linear import DailyGrams, LinearModel
 from igrow.trainer.diagnosis.noise import Whitening
 from igrow.trainer.diagnosis.recalibration import averaging
@@ -212,6 +213,20 @@ def drifted(known: Discrepancy, plain: Design, learned: Drift) -> Gaussian:
     covariance = np.diag(prior**2)
     covariance[np.ix_(seen, seen)] = known.amplitudes.covariance[np.ix_(rows, rows)]
     return Gaussian(wanted, np.zeros(len(wanted)), covariance).widened(change_of(known, plain, learned))
+
+
+def followed(known: Discrepancy, parameter: str, change: float, deviation: float) -> Discrepancy:
+    """Return a history in which a parameter has changed: what is expected of the greenhouse from then on.
+
+    Args:
+        known: so far.
+        parameter: by name.
+        change: in its unit.
+        deviation: standard deviation of it.
+    """
+    here = np.array([name == PARAMETER_PREFIX + parameter for name in known.amplitudes.names])
+    moved = known.amplitudes.moved(known.amplitudes.mean + change * here).widened(deviation * here)
+    return replace(known, amplitudes=moved)
 
 
 def change_of(known: Discrepancy, plain: Design, learned: Drift) -> Floats:

@@ -232,7 +232,7 @@ def score_parameters(
 ) -> list[Hypothesis]:
     """Return every parameter as a hypothesis, free within its bounds, the likeliest first."""
     block = design.block("parameter")
-    values = np.array([design.line.parameters[name] for name in block.labels])
+    values = np.array([design.prior.values[name] for name in block.labels])
     bounds = np.stack(physical_bounds(block.labels), axis=1) - values[:, None]
     none: list[int | None] = [None] * len(block)
     scanned = scan(design.grams, current, block.columns, none, onsets, bounds, rng, design.rules.flips)

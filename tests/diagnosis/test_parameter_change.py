@@ -1,0 +1,154 @@
+"""A parameter's own change: named where it alone explains a log, with its size and its beginning, and no more."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from igrow.core.language import speak
+from igrow.core.simulator.hybrid.nominal import nominal
+from igrow.core.simulator.hybrid.parameters import PARAMETERS
+from igrow.core.telemetry import Telemetry, concatenate
+from igrow.trainer.data import Log, prepare_log
+from igrow.trainer.diagnosis import amplitudes, diagnose, history
+from igrow.trainer.diagnosis.design import Design, History
+from igrow.trainer.diagnosis.diagnose import history_of
+from igrow.trainer.diagnosis.drift import Drift
+from igrow.trainer.diagnosis.parameter_change import VISIBLE, find
+from igrow.trainer.fit import FittedModel, calibrate
+from igrow.trainer.fit.gaussian import Gaussian
+from igrow.trainer.report import sentences
+from tests.diagnosis.synthetic_design import BALANCES, PLAIN, Truth, make_design
+from tests.virtual_log import SITE, disturbances, virtual_log
+
+NAMES = ("transmissivity", "mass_heat_capacity", "leakage_wind")
+STEP, DAYS, KNOWN = 900.0, 44, 24
+
+
+def with_parameters(truth: Truth, seed: int, **null_gains: float) -> Design:
+    """A design of parameters of the simulator, one of which nobody can look at; columns are in a tenth of the value."""
+    design = make_design(truth, seed=seed)
+    block = replace(design.block("parameter"), labels=NAMES)
+    values = np.array([PARAMETERS[name].value for name in NAMES])
+    design = replace(
+        design,
+        prior=Gaussian(NAMES, values, np.diag((0.1 * values) ** 2)),
+        blocks={**design.blocks, "parameter": block},
+    )
+    columns = list(block.columns)
+    scaled = design.values.copy()
+    scaled[columns] /= 0.1 * values[:, None, None, None]
+    design = replace(design, values=scaled)
+    keys = amplitudes.keys(design)
+    deviation = np.concatenate([0.01 * values, np.full(len(keys) - len(values), 0.01)])
+    gains = {f"parameter:{name}": gain for name, gain in null_gains.items()}
+    known = History(
+        Gaussian(keys, np.zeros(len(keys)), np.diag(deviation**2)),
+        np.zeros_like(design.values[0]),
+        (PLAIN,) * BALANCES,
+        {},
+        drift=Drift({}, 42.0, gains),
+    )
+    _, solved = history.solve_jointly(replace(design, history=known))
+    return solved
+
+
+def test_the_parameter_that_has_changed_is_named_with_its_size() -> None:
+    found = find(with_parameters(Truth({}, {}, (-3.0, 0.0, 0.0)), 1), np.random.default_rng(0))
+    assert found is not None and found.leads
+    assert found.confounded == ("transmissivity",)
+    assert found.share.low < -0.3 < found.share.high
+    assert abs(found.share.value + 0.3) < 0.03
+
+
+def test_nothing_is_named_where_nothing_has_changed() -> None:
+    for seed in range(5):
+        assert find(with_parameters(Truth({}, {}), 10 + seed), np.random.default_rng(0)) is None
+
+
+def test_a_parameter_that_nobody_can_look_at_is_not_named() -> None:
+    assert find(with_parameters(Truth({}, {}, (0.0, 3.0, 0.0)), 2), np.random.default_rng(0)) is None
+
+
+def test_a_parameter_must_gain_far_more_than_where_nothing_had_changed() -> None:
+    truth = Truth({}, {}, (-3.0, 0.0, 0.0))
+    assert find(with_parameters(truth, 3, transmissivity=1e6), np.random.default_rng(0)) is None
+
+
+def test_an_effect_that_explains_more_goes_before_a_parameter() -> None:
+    found = find(with_parameters(Truth({"lamp_heat": 4.0}, {}, (-3.0, 0.0, 0.0)), 4), np.random.default_rng(0))
+    assert found is None or not found.leads
+
+
+def test_every_parameter_that_may_be_named_has_words_in_every_language() -> None:
+    english = speak("en", SITE.time_zone)
+    for name, visible in VISIBLE.items():
+        assert name in PARAMETERS and visible.balances
+        assert sentences.title(name, english) == visible.title
+        for code in ("nl", "de", "es", "zh"):
+            assert sentences.title(name, speak(code, SITE.time_zone)) != visible.title
+
+
+@pytest.fixture(scope="module")
+def log() -> tuple[Telemetry, Telemetry]:
+    """The same weeks twice: with the cover as it was, and with a third of its light taken."""
+    painted = nominal(SITE) | {"transmissivity": 0.67 * nominal(SITE)["transmissivity"]}
+    added = disturbances(DAYS, STEP, seed=5)
+    plain = virtual_log(DAYS, seed=5, step=STEP, added=added)
+    return plain, virtual_log(DAYS, seed=5, step=STEP, added=added, parameters=painted)
+
+
+@pytest.fixture(scope="module")
+def model(log: tuple[Telemetry, Telemetry]) -> FittedModel:
+    """Calibrated on the weeks before, with its history."""
+    plain, _ = log
+    before = prepare_log(plain.select(end=plain.time[0] + np.timedelta64(KNOWN, "D")), SITE)
+    fitted = calibrate(before)
+    return replace(fitted, history=history_of(before, fitted))
+
+
+def later(log: tuple[Telemetry, Telemetry], begins: int) -> Log:
+    """The weeks after the calibration, the cover painted from a day on."""
+    plain, painted = log
+    first = plain.time[0] + np.timedelta64(KNOWN, "D")
+    cut = first + np.timedelta64(begins, "D")
+    return prepare_log(concatenate([plain.select(first, cut), painted.select(start=cut)]), SITE)
+
+
+def test_a_painted_cover_is_told_and_is_no_news_afterwards(
+    log: tuple[Telemetry, Telemetry], model: FittedModel
+) -> None:
+    seen = later(log, 0)
+    told = diagnose(seen, model)
+    assert told.verdict == "named"
+    (finding,) = told.findings
+    assert (finding.effect, finding.kind, finding.onset) == ("transmissivity", "parameter", None)
+    change = finding.parameters["change"]
+    assert change.low < -0.33 < change.high
+    day = told.errors["air_temperature"]["24_h"]
+    assert day["corrected"] <= day["recalibrated"] * 1.02 < 0.7 * day["deployed"]
+    assert "less than at the calibration" in told.summary()
+    assert "licht door het dek" in sentences.cause(finding, speak("nl", SITE.time_zone)).lower()
+    assert sentences.checks(finding, speak("en", SITE.time_zone))
+    again = diagnose(seen, told.corrected)
+    assert all(one.effect != "transmissivity" for one in again.findings)
+
+
+def test_a_cover_that_is_painted_within_the_log_has_a_date(
+    log: tuple[Telemetry, Telemetry], model: FittedModel
+) -> None:
+    seen = later(log, 9)
+    told = diagnose(seen, model)
+    (finding,) = told.findings
+    assert finding.effect == "transmissivity" and finding.onset is not None
+    painted = seen.telemetry.time[0] + np.timedelta64(9, "D")
+    assert abs(finding.onset.time - painted) <= np.timedelta64(2, "D")
+    assert told.start >= finding.onset.time - np.timedelta64(1, "D")
+    assert finding.sentence.startswith("Since ")
+    assert finding.parameters["change"].low < -0.33 < finding.parameters["change"].high
+
+
+def test_the_cover_as_it_was_is_not_named(log: tuple[Telemetry, Telemetry], model: FittedModel) -> None:
+    assert diagnose(later(log, DAYS), model).verdict == "nothing"
