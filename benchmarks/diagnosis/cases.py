@@ -43,6 +43,13 @@ FORMS = {
     ),
 }
 """(exponent, threshold, delay in seconds) of the true effect against the catalogue's."""
+CHANGES: Mapping[str, tuple[float, tuple[str, ...]]] = {
+    "cover_transmission": (0.7, ("transmissivity",)),
+    "rail_exchange": (0.7, ("rail_pipe_heat_transfer",)),
+    "vent_area": (0.6, ("vent_wind", "vent_stack")),
+    "leakage": (3.0, ("leakage_still", "leakage_wind", "wind_infiltration")),
+}
+"""A parameter of the plant, what it is over before, and what is right to say of it."""
 REACHABLE = 1.5
 """ENR that a cause must be able to reach in a greenhouse to be drawn for it."""
 
@@ -53,7 +60,7 @@ class Case:
 
     name: str
     group: str
-    """nothing, single, sensor, pair, onset, outside or withheld."""
+    """nothing, single, sensor, pair, onset, outside, withheld or parameter."""
     greenhouse: str
     """Key of `greenhouses`."""
     seed: int
@@ -67,6 +74,8 @@ class Case:
     heavy_tails: bool = False
     wrong_noise: bool = False
     """Disturbances twice as large, with six times the correlation time, than the calibration saw."""
+    changed: str = ""
+    """Parameter of the plant that is another since the calibration, of `CHANGES`."""
 
 
 def draw(kind: str, count: int, units: Mapping[str, Mapping[str, float]], seed: int | None = None) -> list[Case]:

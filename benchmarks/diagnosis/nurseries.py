@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.diagnosis.cases import SEASONS, Case, hidden
+from benchmarks.diagnosis.cases import CHANGES, SEASONS, Case, hidden
 from benchmarks.diagnosis.greenhouses import OTHERS_SPREAD, VirtualGreenhouse, site_of
 from benchmarks.diagnosis.logs import REFERENCE_DAYS, Reference, disturbances, referenced
 from igrow.core.greenhouse import GreenhouseParameters, recipe, simulate_many
@@ -118,6 +118,9 @@ def later_logs(known: Sequence[Reference], cases: Sequence[Sequence[Case]], days
 def later(greenhouse: VirtualGreenhouse, case: Case) -> GreenhouseParameters:
     """Return the greenhouse as it is when the log of a case is taken."""
     plant = greenhouse.plant.varied(np.random.default_rng(case.seed), relative=DRIFT)
+    if case.changed:
+        share, _ = CHANGES[case.changed]
+        return replace(plant, **{case.changed: share * getattr(plant, case.changed)})
     if case.group != "clean":
         return plant
     return replace(plant, cover_transmission=plant.cover_transmission * CLEANED)

@@ -18,7 +18,7 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.diagnosis.cases import FORMS, SEASONS, Case, Turn
+from benchmarks.diagnosis.cases import CHANGES, FORMS, SEASONS, Case, Turn
 from benchmarks.diagnosis.logs import Reference
 from benchmarks.diagnosis.nurseries import calibrated, calibration_logs, later_logs, nursery
 from benchmarks.diagnosis.scoring import Outcome, judge
@@ -27,6 +27,7 @@ from igrow.core.effects import EFFECTS
 from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.diagnosis import DEFAULT
+from igrow.trainer.diagnosis.drift import read_drift
 
 CASES, DAYS = 60, 28
 SEEDS = {"tuning": 200_000, "scoring": 300_000}
@@ -36,6 +37,7 @@ GREENHOUSES = 6
 GROUPS = (
     ("nothing", 0.0, 0.13), ("noise", 0.0, 0.06), ("clean", 0.0, 0.06), ("single", 3.0, 0.1), ("single", 1.0, 0.25),
     ("single", 0.3, 0.12), ("onset", 1.5, 0.1), ("pair", 1.5, 0.06), ("outside", 3.0, 0.06), ("outside", 1.0, 0.06),
+    ("parameter", 0.0, 0.14),
 )  # fmt: skip
 """Group, ENR and share of the cases."""
 RULES = {"history": replace(DEFAULT, history=True), "in general": replace(DEFAULT, history=False)}
@@ -48,6 +50,7 @@ def draw(kind: str, first: int, count: int, units: Mapping[str, Mapping[str, flo
     rng = np.random.default_rng(first)
     turn, beyond = Turn(rng, list(EFFECTS)), Turn(rng, list(UNCATALOGUED))
     greenhouses = itertools.cycle(units)
+    changes = itertools.cycle(CHANGES)
     cases: list[Case] = []
     for group, size, share in GROUPS:
         for _ in range(max(1, round(share * count))):
@@ -69,6 +72,7 @@ def draw(kind: str, first: int, count: int, units: Mapping[str, Mapping[str, flo
                     onset_day=float(rng.uniform(7.0, 20.0)) if group == "onset" else None,
                     heavy_tails=bool(rng.random() < 0.5),
                     wrong_noise=group == "noise",
+                    changed=next(changes) if group == "parameter" else "",
                 )
             )
     return cases
@@ -91,6 +95,25 @@ def table(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int, str]]:
     named = [one for one in of("single", "onset") if one.confounded]
     share("right cause first, where a name was given", named, is_first, ">= .95")
     share("a pattern in place of a cause", of("single", "onset"), lambda one: one.verdict == "unexplained", "-")
+    for change, (factor, _) in CHANGES.items():
+        mine = [one for one in of("parameter") if one.case.changed == change]
+        share(f"right: {change} times {factor:g}", mine, is_first, "-")
+    share(
+        "a wrong name for a parameter's change",
+        of("parameter"),
+        lambda one: bool(one.confounded) and not is_first(one),
+        "-",
+    )
+    alone = [one for one in of("single", size=1.0) if one.expected_gain is not None]
+    enough = read_drift().least_gain
+    share(
+        "oracle: gain enough at ENR 1, were the structure right",
+        alone,
+        lambda one: (one.expected_gain or 0.0) >= enough,
+        "-",
+    )
+    known = [one for one in alone if one.known_gain is not None]
+    share("oracle: the same, parameters known", known, lambda one: (one.known_gain or 0.0) >= enough, "-")
     share("both of a pair", of("pair"), lambda one: set(one.case.causes) <= set(one.found), ">= .45")
     sizes = [abs(one.relative_size - 1.0) for one in outcomes if one.relative_size is not None]
     rows.append(("size, median relative error", float(np.median(sizes)) if sizes else np.nan, len(sizes), "<= .10"))
@@ -109,9 +132,16 @@ def table(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int, str]]:
 
 
 def is_first(one: Outcome) -> bool:
-    """Tell whether the first name is a true cause, or one that no log tells apart from it."""
-    return bool(one.found) and any(
-        one.found[0] == cause or any({one.found[0], cause} <= pair for pair in CONFOUNDED) for cause in one.case.causes
+    """Tell whether the first name is a true cause, one that no log tells apart from it, or its twin in the model."""
+    if not one.found:
+        return False
+    if one.case.changed:
+        return one.found[0] in CHANGES[one.case.changed][1]
+    return any(
+        one.found[0] == cause
+        or any({one.found[0], cause} <= pair for pair in CONFOUNDED)
+        or (cause in EFFECTS and one.found[0] in EFFECTS[cause].resembles)
+        for cause in one.case.causes
     )
 
 

@@ -94,7 +94,7 @@ def judge(case: Case, telemetry: Telemetry, reference: Reference, rules: Decisio
         case,
         diagnosis.verdict,
         found,
-        tuple(one.confounded for one in causes),
+        tuple(one.confounded for one in diagnosis.findings if one.kind in {"process", "sensor", "parameter"}),
         relative,
         covered,
         onset_error,
