@@ -77,6 +77,10 @@ def test_a_parameter_must_gain_far_more_than_where_nothing_had_changed() -> None
     assert find(with_parameters(truth, 3, transmissivity=1e6), np.random.default_rng(0)) is None
 
 
+def test_a_change_to_less_than_nothing_is_none() -> None:
+    assert find(with_parameters(Truth({}, {}, (-11.0, 0.0, 0.0)), 6), np.random.default_rng(0)) is None
+
+
 def test_an_effect_that_explains_more_goes_before_a_parameter() -> None:
     found = find(with_parameters(Truth({"lamp_heat": 4.0}, {}, (-3.0, 0.0, 0.0)), 4), np.random.default_rng(0))
     assert found is None or not found.leads

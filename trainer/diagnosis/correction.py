@@ -19,7 +19,7 @@ from igrow.trainer.diagnosis import freerun
 from igrow.trainer.diagnosis.candidates import Pattern, pattern_fluxes
 from igrow.trainer.diagnosis.estimate import Estimated
 from igrow.trainer.diagnosis.freerun import FreeRuns
-from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, activate, drift
+from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, activate, drift, home_drift
 from igrow.trainer.diagnosis.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.refit import REGIMES
 from igrow.trainer.diagnosis.result import Finding, Interval
@@ -181,20 +181,29 @@ def _judged(log: LogDays, one: Estimated, current: Stage, trial: Stage) -> Estim
 def with_parameter(
     log: LogDays, knowledge: Knowledge, result: Corrected, parameter: ParameterChange | None, rules: DecisionRules
 ) -> Corrected:
-    """Return a correction with a parameter that has changed, free by its value unless unseen days speak against it."""
+    """Return a correction with a parameter that has changed, where it alone makes unseen days better.
+
+    Recalibration may have followed the change: it stays where freeing the parameter beside it adds nothing.
+    """
     if parameter is None:
         return result
-    prior, current = knowledge.prior, result.stages["corrected"]
-    value = drift(prior.values, 1.0, rules) * np.array([name == parameter.parameter for name in prior.names])
+    values, recalibrated = knowledge.posterior.values, result.stages["corrected"]
+    free = drift(values, 1.0, rules) * np.array([name == parameter.parameter for name in knowledge.prior.names])
+    by_physics = knowledge.posterior.widened(home_drift(values, rules))
     try:
-        trial = Stage(log.fit(prior.widened(value), current.terms, current.posterior.values), current.terms)
+        without, alone, beside = (
+            Stage(log.fit(prior, recalibrated.terms), recalibrated.terms)
+            for prior in (by_physics, by_physics.widened(free), knowledge.prior.widened(free))
+        )
     except DivergenceError:
-        trial = current
-    before, after = log.run(current), log.run(trial)
-    if before is not None and after is not None and freerun.skill(before, after) < 0.0:
-        # Recalibration has followed the change already.
-        trial = current
-    return replace(result, stages={**result.stages, "corrected": trial}, parameter=parameter)
+        return result
+    old, new, before, after = (log.run(one) for one in (without, alone, recalibrated, beside))
+    if old is None or new is None or before is None or after is None:
+        return replace(result, parameter=parameter)
+    if freerun.skill(old, new) < rules.least_skill:
+        return result
+    corrected = beside if freerun.skill(before, after) >= 0.0 else recalibrated
+    return replace(result, stages={**result.stages, "corrected": corrected}, parameter=parameter)
 
 
 def _with_patterns(

@@ -19,6 +19,7 @@ from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.estimate import onset_interval, reach
 from igrow.trainer.diagnosis.result import Interval, OnsetInterval
 from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.fit.climate import bounds
 
 _COVER = N_("compare the light above the cover and below it; look for dirt, shading paint and wet glass")
 _GAPS = N_("look for open panes, doors and gaps, and compare a calm night with a windy one")
@@ -97,9 +98,11 @@ def find(design: Design, rng: np.random.Generator) -> ParameterChange | None:
     value = design.prior.values[best.parameter]
     wide = reach(rules) * linear.deviation_by_day(design.grams, named)
     size = float(named.amplitudes[0])
-    if abs(size) < rules.least_parameter_change * abs(value):
+    low, high = (float(one[0]) for one in bounds([best.parameter]))
+    if abs(size) < rules.least_parameter_change * abs(value) or not low < value + size < high:
+        # What asks for more than there can be is something else.
         return None
-    low, high = sorted(((size - wide) / value, (size + wide) / value))
+    least, most = sorted(((size - wide) / value, (size + wide) / value))
     effects = search.score_candidates(design, null, search.onset_days(design), rng)
     largest = max((change.net_gain(design, one) for one in effects), default=0.0)
     margin = max(rules.confounded_gain, rules.confounded_share * best.gain)
@@ -110,7 +113,7 @@ def find(design: Design, rng: np.random.Generator) -> ParameterChange | None:
     ]
     return ParameterChange(
         best.parameter,
-        Interval(size / value, low, high, "1"),
+        Interval(size / value, least, most, "1"),
         onset_interval(design, null, best.term),
         best.p_value,
         (best.parameter, *as_good),
