@@ -324,7 +324,8 @@ class Site:
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z0-9][a-z0-9-]{0,62}", self.name):
-            raise SettingError(f"name is {self.name!r}: small letters, digits and hyphens are needed", "name")
+            needed = "small letters, digits and hyphens are needed, 63 at most"
+            raise SettingError(f"name is {self.name!r}: {needed}", "name")
         try:
             zone(self.time_zone)
         except IgrowError as error:

@@ -156,6 +156,21 @@ async def test_there_is_nothing_else_to_be_had(visitor: Visitor, path: str):
     assert (await visitor.get(path)).status == 404
 
 
+async def test_a_flood_of_alarms_hides_nothing_and_keeps_the_climate_near(visitor: Visitor):
+    """Forty alarms stood before the first temperature; the worst still do, the others fold away beneath them."""
+    levels = ("notice", "warning", "critical")
+    many = [alarm(f"alarm {number}", f"alarm number {number}", levels[number % 3]) for number in range(40)]
+    visitor.told.said = state(alarms=many)
+    await visitor.sign_in()
+    body = (await visitor.get()).body
+    shown, folded = body.split('<details id="more-alarms"><summary>More alarms: 34</summary>')
+    assert shown.count('<li class="critical">') == 6
+    assert '<li class="notice">' not in shown
+    assert folded.split("</details>")[0].count('value="acknowledge"') == 34
+    visitor.told.said = state(alarms=many[:6])
+    assert "More alarms" not in (await visitor.get()).body
+
+
 async def test_what_the_daemon_says_cannot_become_markup(visitor: Visitor):
     evil = "<script>alert(1)</script>"
     visitor.told.said = state(
