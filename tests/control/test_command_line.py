@@ -307,7 +307,7 @@ def test_unit_numbers_are_read():
 
 def test_a_plan_is_printed_as_a_table():
     plan = Plan(
-        0.0, 0.0, 3600.0, {"heating_setpoint": (18.0, 19.0)}, 7200.0, "b1", 0.5, 0.25, True,
+        0.0, 0.0, 3600.0, {"heating_setpoint": (18.0, 19.0)}, 7200.0, "b1", 0.5, 0.25, leaves_range=True,
         predicted={"air_temperature": (18.5, 19.25)},
     )  # fmt: skip
     from zoneinfo import ZoneInfo
