@@ -18,7 +18,7 @@ from igrow.core.language import N_
 from igrow.trainer.data.log import Log
 from igrow.trainer.data.splits import split_days
 from igrow.trainer.diagnosis import freerun, history, sensitivity, wording
-from igrow.trainer.diagnosis.actuators import Completed, complete
+from igrow.trainer.diagnosis.actuators import REPLACEABLE, Completed, complete
 from igrow.trainer.diagnosis.correction import Corrected, LogDays, Stage, correct, corrected_model, with_parameter
 from igrow.trainer.diagnosis.design import prepare
 from igrow.trainer.diagnosis.drift import Drift
@@ -95,7 +95,9 @@ def diagnose(
     search = search_of(days, site, model, knowledge, hidden, rules, nuisance, drift)
     say("searching for causes")
     first, last, found = search.run(rng)
-    parameter = None if completed.found else search.changed_parameter(rng)
+    # A parameter can stand in for an actuator that the log lacks, found or not.
+    lacking = not set(REPLACEABLE).isdisjoint(logged.record.missing)
+    parameter = None if lacking else search.changed_parameter(rng)
     patterns = last.patterns
     if parameter is not None and parameter.leads:
         found, patterns = [], ()
