@@ -37,7 +37,7 @@ GREENHOUSES = 6
 GROUPS = (
     ("nothing", 0.0, 0.13), ("noise", 0.0, 0.06), ("clean", 0.0, 0.06), ("single", 3.0, 0.1), ("single", 1.0, 0.25),
     ("single", 0.3, 0.12), ("onset", 1.5, 0.1), ("pair", 1.5, 0.06), ("outside", 3.0, 0.06), ("outside", 1.0, 0.06),
-    ("parameter", 0.0, 0.14),
+    ("parameter", 0.0, 0.2),
 )  # fmt: skip
 """Group, ENR and share of the cases."""
 RULES = {"history": replace(DEFAULT, history=True), "in general": replace(DEFAULT, history=False)}

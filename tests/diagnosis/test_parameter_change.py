@@ -83,7 +83,7 @@ def test_a_change_to_less_than_nothing_is_none() -> None:
 
 def test_an_effect_that_explains_more_goes_before_a_parameter() -> None:
     found = find(with_parameters(Truth({"lamp_heat": 4.0}, {}, (-3.0, 0.0, 0.0)), 4), np.random.default_rng(0))
-    assert found is None or not found.leads
+    assert found is not None and not found.leads
 
 
 def test_every_parameter_that_may_be_named_has_words_in_every_language() -> None:
@@ -154,6 +154,14 @@ def test_a_cover_that_is_painted_within_the_log_has_a_date(
     assert told.start >= finding.onset.time - np.timedelta64(1, "D")
     assert finding.sentence.startswith("Since ")
     assert finding.parameters["change"].low < -0.33 < finding.parameters["change"].high
+
+
+def test_a_cover_that_was_painted_some_days_ago_waits_for_a_later_log(
+    log: tuple[Telemetry, Telemetry], model: FittedModel
+) -> None:
+    # Fewer days than a diagnosis needs: no set of parameters is right for this log.
+    told = diagnose(later(log, DAYS - KNOWN - 6), model)
+    assert all(one.kind != "parameter" for one in told.findings)
 
 
 def test_the_cover_as_it_was_is_not_named(log: tuple[Telemetry, Telemetry], model: FittedModel) -> None:

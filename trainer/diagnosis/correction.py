@@ -179,14 +179,12 @@ def _judged(log: LogDays, one: Estimated, current: Stage, trial: Stage) -> Estim
 
 
 def with_parameter(
-    log: LogDays, knowledge: Knowledge, result: Corrected, parameter: ParameterChange | None, rules: DecisionRules
+    log: LogDays, knowledge: Knowledge, result: Corrected, parameter: ParameterChange, rules: DecisionRules
 ) -> Corrected:
     """Return a correction with a parameter that has changed, where it alone makes unseen days better.
 
     Recalibration may have followed the change: it stays where freeing the parameter beside it adds nothing.
     """
-    if parameter is None:
-        return result
     values, recalibrated = knowledge.posterior.values, result.stages["corrected"]
     free = drift(values, 1.0, rules) * np.array([name == parameter.parameter for name in knowledge.prior.names])
     by_physics = knowledge.posterior.widened(home_drift(values, rules))

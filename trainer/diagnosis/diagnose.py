@@ -46,7 +46,6 @@ NEWEST = N_(
     "Within more than six weeks a crop changes: what has changed since the calibration was looked for in the newest "
     "six."
 )
-
 SINCE = N_("The errors are of the days since then: before, the greenhouse was another.")
 
 
@@ -99,18 +98,24 @@ def diagnose(
     lacking = not set(REPLACEABLE).isdisjoint(logged.record.missing)
     parameter = None if lacking else search.changed_parameter(rng)
     patterns = last.patterns
+    if parameter is not None and parameter.onset is not None:
+        if parameter.leads or not (found or patterns):
+            # One set of parameters is none for a log of two greenhouses: the one that is there now counts.
+            later = log.select(parameter.onset.time)
+            if later.days >= rules.least_days:
+                told = diagnose(
+                    later, model, without=without, seed=seed, rules=rules, nuisance=nuisance, drift=drift,
+                    progress=progress,
+                )  # fmt: skip
+                if any(one.effect == parameter.parameter for one in told.findings):
+                    return begun(told, parameter)
+        # What the days since then alone do not bear out, or are too few to, is left to a later log.
+        parameter = None
     if parameter is not None and parameter.leads:
         found, patterns = [], ()
     say("correcting the model")
     result = correct(days, knowledge, found, patterns, site.longitude, rules)
-    if not (result.kept or patterns):
-        since = None if parameter is None else parameter.onset
-        later = log if since is None else log.select(since.time)
-        if parameter is not None and since is not None and later.days >= rules.least_days:
-            # One set of parameters is none for a log of two greenhouses: the one that is there now counts.
-            told = diagnose(later, model, without=without, seed=seed, rules=rules, nuisance=nuisance, drift=drift)
-            if any(one.effect == parameter.parameter for one in told.findings):
-                return begun(told, parameter)
+    if parameter is not None and not (result.kept or patterns):
         result = with_parameter(days, knowledge, result, parameter, rules)
     verdict, findings = _verdict(completed, result, patterns, rules)
     stages = _stages(result, completed, logged)

@@ -151,7 +151,7 @@ def _largest_flipped(centred: Floats, spread: Floats, usable: Mask, rng: np.rand
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """One candidate (or pattern) as a term, with what it would gain in the model it was scored against."""
+    """One candidate, pattern or parameter as a term, with what it would gain in the model it was scored against."""
 
     cause: Candidate | Pattern | str
     """A parameter by its name."""
