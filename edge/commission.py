@@ -7,6 +7,7 @@ the daemon pulls the plug on itself: it stops its heartbeat and checks that the 
 from __future__ import annotations
 
 import asyncio
+import math
 import time
 from datetime import timedelta
 from typing import Protocol
@@ -149,7 +150,8 @@ class Commissioning:
             before = (await plc.read([name]))[name].value
             if before is None:
                 continue
-            step = max(rule.resolution, rule.dead_band, 0.02 * (rule.high - rule.low))
+            # In whole steps of the register, so that the person is asked for the very value that it will show.
+            step = rule.resolution * math.ceil(max(rule.dead_band, 0.02 * (rule.high - rule.low)) / rule.resolution)
             target = before + step if before + step <= rule.high else before - step
             target = min(max(target, rule.low), rule.high)
             if not self._dialogue.ask(f"May {name} be set from {before:g} to {target:g} for a moment, and back?"):
@@ -202,6 +204,10 @@ class Commissioning:
             await asyncio.sleep(1.2 * self._fallback_after)
             if not self._dialogue.ask("Is the PLC on its own safe setpoints?"):
                 self._wrong.append("the PLC did not fall back when the heartbeat stopped")
+            elif others := await self._own_setpoints(plc):
+                self._wrong.append(
+                    f"without plc_fallback a fallback is known by `safe` alone, and {others} differ from it"
+                )
             return
         await self._watch_fallback(plc)
         await writer.heartbeat()
@@ -217,9 +223,19 @@ class Commissioning:
                 return
             await asyncio.sleep(min(5.0, self._fallback_after / 20.0))
         self._dialogue.tell(f"the PLC fell back after {time.monotonic() - began:.0f} s")
-        readings = await plc.read(self._configuration.setpoints)
-        for name, reading in readings.items():
-            self._dialogue.tell(f"  its own {_shown(name, reading)}")
+        await self._own_setpoints(plc)
+
+    async def _own_setpoints(self, plc: RegisterPlc) -> str:
+        """Show the setpoints that the PLC uses in its fallback; return those that are not the site's safe ones."""
+        others = []
+        for name, reading in (await plc.read(self._configuration.setpoints)).items():
+            rule = self._configuration.guard_rules.points[name]
+            told = ""
+            if reading.value is not None and not rule.same(reading.value, rule.safe):
+                told = f"; `safe` in the site's file is {rule.safe:g}: best the same"
+                others.append(name)
+            self._dialogue.tell(f"  its own {_shown(name, reading)}{told}")
+        return ", ".join(others)
 
 
 def _shown(name: str, reading: Reading) -> str:

@@ -41,9 +41,11 @@ class Watched(Plant):
         self.plc.write = watched
 
 
-async def walk(tmp_path, person, *, pace=None, only_read=False, prepare=lambda plant: None):
+async def walk(tmp_path, person, *, pace=None, only_read=False, prepare=lambda plant: None, edit=lambda text: text):
     port = free_port()
     path = write_files(tmp_path, port)
+    register_map = tmp_path / "map.yaml"
+    register_map.write_text(edit(register_map.read_text()))
     # Fifteen minutes of plant time pass in a second or so.
     plant = Watched(tmp_path, port, pace=pace or Realtime(900.0))
     await plant.up()
@@ -61,7 +63,32 @@ async def test_a_plc_that_does_everything_right_passes(tmp_path):
     passed, _ = await walk(tmp_path, person)
     assert passed, person.lines
     assert any("fell back after" in line for line in person.lines)
-    assert any("its own heating_setpoint = 17 degC" in line for line in person.lines)
+    assert any(line.strip() == "its own co2_setpoint = 400 ppm" for line in person.lines)
+
+
+async def test_a_person_is_asked_for_the_value_that_the_register_will_show(tmp_path):
+    def in_tenths(text):
+        return text.replace(
+            "address: 0, type: float32, unit: degC, writable",
+            "address: 0, type: int16, scale: 0.1, unit: degC, writable",
+        )
+
+    person = Script()
+    passed, _ = await walk(tmp_path, person, edit=in_tenths)
+    assert passed, person.lines
+    assert "Does the PLC show heating_setpoint = 17.4?" in person.questions
+
+
+@pytest.mark.parametrize("has_bit", [True, False])
+async def test_safe_setpoints_of_the_plc_that_are_not_the_sites_are_told(tmp_path, has_bit):
+    person = Script()
+    passed, _ = await walk(
+        tmp_path, person, edit=lambda text: text if has_bit else text.replace("plc_fallback", "rain")
+    )
+    assert "  its own heating_setpoint = 17 degC; `safe` in the site's file is 18: best the same" in person.lines
+    # The bit tells a fallback; without it nothing but these values does.
+    assert passed == has_bit
+    assert has_bit or any("heating_setpoint differ from it" in line for line in person.lines)
 
 
 async def test_a_person_compares_a_screenful_at_a_time_and_never_what_moves(tmp_path):
