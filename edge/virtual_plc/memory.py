@@ -88,7 +88,7 @@ class DeviceMemory:
         if point.type is DataType.BIT:
             (word,) = table.read(point.address, 1)
             mask = 1 << point.bit
-            table.put(point.address, [word | mask if round(value) else word & ~mask])
+            table.put(point.address, [word | mask if value >= 0.5 else word & ~mask])
             return
         try:
             table.put(point.address, encode(point, value))
@@ -97,7 +97,9 @@ class DeviceMemory:
 
 
 def _substitute(point: Point, value: float) -> tuple[int, ...]:
-    """Return what a device shows that cannot show `value`: "no value" for NaN, else the end of its scale."""
+    """Return what a device shows that cannot show `value`: "no value" for NaN (off, of one bit), or its scale's end."""
+    if point.type is DataType.BOOL:
+        return (int(value >= 0.5),)
     if point.type in (DataType.FLOAT32, DataType.FLOAT64):
         return encode_raw(math.nan, point.type, point.order)
     if math.isnan(value):

@@ -16,7 +16,7 @@ from igrow.core.quantities import SETPOINTS
 from igrow.edge.bus.errors import AddressRefusedError, BusError, NoValueError
 from igrow.edge.bus.plc import RegisterPlc
 from igrow.edge.bus.protocol import Priority, ReadRequest, WriteRequest
-from igrow.edge.registers.loading import load_register_map
+from igrow.edge.registers.loading import load_register_map, parse_register_map
 from igrow.edge.registers.model import Function
 from igrow.edge.virtual_plc.pace import Lockstep, Pace, Realtime, parse_pace
 from igrow.edge.virtual_plc.virtual_plc import SAFE_SETPOINTS, VirtualPlc
@@ -213,3 +213,14 @@ def test_a_pace_is_read(text: str, pace: Pace) -> None:
 def test_a_wrong_pace_is_told_what_is_right(text: str) -> None:
     with pytest.raises(IgrowError, match="realtime, speed=N"):
         parse_pace(text)
+
+
+def test_a_plc_of_one_coil_is_served_like_any_other() -> None:
+    coil = parse_register_map(
+        "title: a relay\nsource: this test\nbuses: {line: {transport: tcp, host: 127.0.0.1, port: 5020}}\n"
+        "devices: {relay: {bus: line, device_id: 1}}\n"
+        'points:\n  lamp_on: {device: relay, function: coil, address: 0, type: bool, unit: "1", writable: true}\n'
+        '  rain: {device: relay, function: input, address: 0, type: bit, bit: 3, unit: "1"}\n'
+    )
+    virtual = VirtualPlc(ToyPlant(), coil, Realtime(1.0))
+    assert virtual.memory.value("lamp_on") == 0.0
