@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import sqlite3
-from collections.abc import Sequence
-from contextlib import closing
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -160,19 +160,27 @@ class TelemetryFile:
 
 def read_file(path: Path, start: int, end: int) -> Telemetry:
     """Read a telemetry file that another thread or process may be writing; raises sqlite3.Error."""
-    with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=5.0)) as connection:
-        # A store that is just being made has its file before its tables.
-        made = connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'rows'").fetchone()
-        return _read(connection, start, end) if made else concatenate([])
+    with _rows_of(path) as connection:
+        return concatenate([]) if connection is None else _read(connection, start, end)
 
 
 def read_first_time(path: Path, start: int) -> int | None:
     """Return the whole second of the first row at or after `start` milliseconds, or None; raises sqlite3.Error."""
+    query = "SELECT min(milliseconds) FROM rows WHERE milliseconds >= ?"
+    with _rows_of(path) as connection:
+        found = None if connection is None else connection.execute(query, (start,)).fetchone()[0]
+    return None if found is None else int(found) // 1000
+
+
+@contextmanager
+def _rows_of(path: Path) -> Iterator[sqlite3.Connection | None]:
+    """Open a file's rows to be read, None before the first: a store makes its folder, the file and its tables."""
+    if path.parent.is_dir() and not path.exists():
+        yield None
+        return
     with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=5.0)) as connection:
         made = connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'rows'").fetchone()
-        query = "SELECT min(milliseconds) FROM rows WHERE milliseconds >= ?"
-        found = connection.execute(query, (start,)).fetchone()[0] if made else None
-    return None if found is None else int(found) // 1000
+        yield connection if made else None
 
 
 def salvage(damaged: Path, connection: sqlite3.Connection) -> int:

@@ -26,7 +26,7 @@ from igrow.edge.store import (
     restore,
 )
 from igrow.edge.store.packing import pack, unpack_good
-from igrow.edge.store.store import TELEMETRY_FILE
+from igrow.edge.store.store import TELEMETRY_FILE, first_row_time
 from igrow.edge.store.telemetry_file import TelemetryFile
 from tests.store.store_helpers import START, values, write_record
 
@@ -117,8 +117,7 @@ def test_telemetry_is_committed_once_a_minute_and_not_before(tmp_path: Path) -> 
     store = SqliteStore(tmp_path)
     for index in range(12):
         store.append(START + 5 * index, values(20.0))
-    with pytest.raises(StoreError):
-        read_telemetry(tmp_path, 0.0, 8e9)
+    assert len(read_telemetry(tmp_path, 0.0, 8e9)) == 0
     store.append(START + 60, values(20.0))
     assert len(read_telemetry(tmp_path, 0.0, 8e9)) == 13
 
@@ -248,3 +247,10 @@ def test_an_export_of_a_folder_without_a_store_says_so(tmp_path: Path) -> None:
 def test_a_store_that_is_just_being_made_has_no_rows_yet(tmp_path: Path) -> None:
     (tmp_path / "telemetry.db").touch()
     assert len(read_telemetry(tmp_path, 0.0, 8e9)) == 0
+
+
+def test_a_store_whose_first_row_is_still_to_come_is_an_empty_log(tmp_path: Path) -> None:
+    assert len(read_telemetry(tmp_path, 0.0, 8e9)) == 0
+    assert first_row_time(tmp_path, 0.0) is None
+    with pytest.raises(StoreError, match="the log cannot be read"):
+        read_telemetry(tmp_path / "nowhere", 0.0, 8e9)
