@@ -27,6 +27,9 @@ def why_not_open(settings: BusSettings, error: Exception) -> str:
     where = settings.serial_port or f"{settings.host}:{settings.port}"
     if isinstance(error, TimeoutError):
         return f"no connection to {where} within {settings.timeout:g} s"
+    if settings.serial_port and isinstance(error, OSError) and error.errno in (errno.EAGAIN, errno.EBUSY):
+        # The lock that pyserial takes is said to be a resource that is unavailable for now.
+        return f"no connection to {where}: another program has it open"
     if isinstance(error, OSError) and error.strerror:
         return f"no connection to {where}: {words(error)}"
     return str(error)

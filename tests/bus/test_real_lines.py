@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import datetime
+import fcntl
 import os
 import pty
 import ssl
@@ -78,6 +79,21 @@ async def test_a_serial_port_that_is_not_there_is_named() -> None:
     with pytest.raises(NotConnectedError):
         await bus.read(ReadRequest(1, Function.INPUT, 0, 1), Priority.CONTROL)
     await bus.close()
+
+
+async def test_a_serial_port_that_another_has_open_is_said_to_be_taken(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    far, near = pty.openpty()
+    fcntl.flock(near, fcntl.LOCK_EX)
+    bus = ModbusBus(BusSettings("line", Transport.RTU, serial_port=os.ttyname(near), parity=Parity.NONE))
+    bus.start()
+    with pytest.raises(NotConnectedError):
+        await bus.read(ReadRequest(1, Function.INPUT, 0, 1), Priority.CONTROL)
+    assert f"no connection to {os.ttyname(near)}: another program has it open" in caplog.text
+    await bus.close()
+    os.close(near)
+    os.close(far)
 
 
 def make_certificate(folder: Path) -> tuple[Path, Path]:
