@@ -40,11 +40,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print a line for each bundle, or leave a wish for the daemon, which sees it while it runs or when it starts."""
-    folder = configuration_of(options).state_folder / "updates"
+    configuration = configuration_of(options)
+    folder = configuration.state_folder / "updates"
     state = load_state(folder / "state.json")
     if options.action == "list":
-        for line in describe(state, folder / "bundles", read_wishes(folder)):
-            print(line)
+        lines = describe(state, folder / "bundles", read_wishes(folder))
+        if not lines and configuration.bundle_folder is not None:
+            lines = [f"no bundle yet: the daemon begins with the one in {configuration.bundle_folder}"]
+        print(*lines or ["no bundle: the grower's recipe rules"], sep="\n")
         return 0
     _DONE[options.action](folder, state)
     print(_SAID[options.action].format(active=state.active or "no bundle", previous=state.previous))
@@ -70,7 +73,7 @@ def describe(state: UpdateState, shelf: Path, wishes: Wishes | None = None) -> l
             said = str(error)
         lines.append(f"{step:<22}  {identity}  {said}")
     lines += [f"{'refused':<22}  {identity}  {reason}" for identity, reason in state.rejected.items()]
-    return lines or ["no bundle: the grower's recipe rules"]
+    return lines
 
 
 def _step_of_active(state: UpdateState, wishes: Wishes) -> str:

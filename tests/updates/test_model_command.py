@@ -23,8 +23,6 @@ def path(tmp_path: Path) -> Path:
 
 
 def test_each_bundle_has_its_line(tmp_path: Path, path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["model", "list", str(path)]) == 0
-    assert "no bundle" in capsys.readouterr().out
     shelf = tmp_path / "state" / "updates" / "bundles"
     shelf.mkdir(parents=True)
     made = [write_tiny_bundle(tmp_path / str(offset), offset=offset) for offset in (5.0, 6.0)]
@@ -39,6 +37,21 @@ def test_each_bundle_has_its_line(tmp_path: Path, path: Path, capsys: pytest.Cap
     assert lines[1].startswith(f"in the shadow           {made[1].identity}")
     assert lines[2].startswith("previous                gone")
     assert lines[3] == "refused                 bad  worse in the shadow run"
+
+
+@pytest.mark.parametrize(
+    ("bundle", "said"),
+    [
+        ("built_in", "no bundle yet: the daemon begins with the one in "),
+        ("null", "no bundle: the grower's recipe rules"),
+    ],
+)
+def test_before_the_daemon_first_starts_it_is_said_what_it_will_begin_with(
+    path: Path, capsys: pytest.CaptureFixture[str], bundle: str, said: str
+) -> None:
+    path.write_text(f"{path.read_text()}bundle: {bundle}\n")
+    assert main(["model", "list", str(path)]) == 0
+    assert capsys.readouterr().out.startswith(said)
 
 
 def test_what_is_pinned_or_to_go_back_is_shown_before_the_daemon_has_done_it(
