@@ -26,7 +26,6 @@ from igrow.edge.page.pages import Pages
 from igrow.edge.page.sessions import Session, Sessions, Tries
 
 _log = logging.getLogger("igrow.edge.page")
-COOKIE = "igrow-page"
 MOST_CONNECTIONS = 64
 """At once; more are hung up on without a word."""
 MOST_OF_ONE = 24
@@ -64,6 +63,11 @@ class PageServer:
         except OSError as error:
             raise IgrowError(f"page: port {port} of {address}: {error.strerror or error}") from None
         self.port = self._server.sockets[0].getsockname()[1]
+
+    @property
+    def _cookie(self) -> str:
+        """Its name is the compartment's, as a browser keeps the cookies of all ports of a machine together."""
+        return f"igrow-page-{self._pages.configuration().site.name}"
 
     async def close(self) -> None:
         """Stop listening and turn visitors away."""
@@ -134,7 +138,7 @@ class PageServer:
         if found is not None:
             return found
         password = await self._aside(self._pages.password)
-        session = self._sessions.find(request.cookie(COOKIE), None if password is None else password.digest)
+        session = self._sessions.find(request.cookie(self._cookie), None if password is None else password.digest)
         if request.path == "/sign-in":
             return self._pages.sign_in(say, has_password=password is not None)
         if request.path != "/":
@@ -155,7 +159,7 @@ class PageServer:
         if request.path == "/sign-in":
             return await self._sign_in(request)
         password = await self._aside(self._pages.password)
-        secret = request.cookie(COOKIE)
+        secret = request.cookie(self._cookie)
         session = self._sessions.find(secret, None if password is None else password.digest)
         if session is None:
             return see("/sign-in")
@@ -163,7 +167,7 @@ class PageServer:
             raise RequestRefusedError("403 Forbidden", "the form is not of this session: load the page again")
         if request.path == "/sign-out":
             self._sessions.end(secret)
-            return see("/", {"Set-Cookie": f"{COOKIE}=; Max-Age=0; Path=/; HttpOnly; SameSite=Strict"})
+            return see("/", {"Set-Cookie": f"{self._cookie}=; Max-Age=0; Path=/; HttpOnly; SameSite=Strict"})
         if request.path != "/act":
             raise RequestRefusedError("404 Not Found", "there is nothing to do there")
         return await self._act(request, session)
@@ -210,7 +214,7 @@ class PageServer:
         _log.info("%s has signed in (%s)", who, request.address)
         secret = self._sessions.begin(who, password.digest)
         age = int(self._pages.configuration().file.page.session.total_seconds())
-        return see("/", {"Set-Cookie": f"{COOKIE}={secret}; Max-Age={age}; Path=/; HttpOnly; SameSite=Strict"})
+        return see("/", {"Set-Cookie": f"{self._cookie}={secret}; Max-Age={age}; Path=/; HttpOnly; SameSite=Strict"})
 
     async def _aside(self, work: Callable[[], T]) -> T:
         return await self._run(self._threads, work)

@@ -231,8 +231,21 @@ async def test_a_guessed_or_an_ended_session_is_none(visitor: Visitor):
     await visitor.post("/sign-out", {"token": await visitor.token()})
     visitor.cookie = kept
     assert "Sign out" not in (await visitor.get()).body
-    visitor.cookie = "igrow-page=guess"
+    visitor.cookie = f"{kept.partition('=')[0]}=guess"
     assert "Sign out" not in (await visitor.get()).body
+
+
+async def test_pages_of_two_compartments_on_one_machine_keep_their_visitors_apart(visitor: Visitor, tmp_path):
+    await visitor.sign_in()
+    other = write_house(tmp_path / "other")
+    (tmp_path / "other" / "site.yaml").write_text((tmp_path / "site.yaml").read_text().replace("name: ", "name: b-"))
+    write_password(tmp_path / "other" / "state", HASHED)
+    server = PageServer(pages_of(other, Told()))
+    await server.start("127.0.0.1", 0)
+    elsewhere = Visitor(tmp_path / "other", Told(), server)
+    await elsewhere.sign_in()
+    assert elsewhere.cookie.partition("=")[0] != visitor.cookie.partition("=")[0]
+    await server.close()
 
 
 async def test_a_new_password_signs_everybody_out_at_once(visitor: Visitor):

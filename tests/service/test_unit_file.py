@@ -10,7 +10,8 @@ from pathlib import Path
 from igrow.edge.daemon_file import STATUS_PORT
 from tests import needs
 
-UNIT = Path(__file__).resolve().parents[2] / "systemd" / "igrow-edge.service"
+ROOT = Path(__file__).resolve().parents[2]
+UNIT = ROOT / "systemd" / "igrow-edge.service"
 
 
 def service() -> dict[str, list[str]]:
@@ -71,3 +72,19 @@ def test_the_unit_is_readable_as_an_ini_file_apart_from_repeated_keys() -> None:
     parser.optionxform = lambda optionstr: optionstr
     parser.read_string(UNIT.read_text())
     assert parser.sections() == ["Unit", "Service", "Install"]
+
+
+def test_the_units_of_a_further_compartment_share_nothing_with_the_first(tmp_path: Path) -> None:
+    page = (ROOT / "docs" / "installation.md").read_text()
+    edit = re.search(r"sed ('s\|/etc/igrow/.*?') \|", page, re.DOTALL)
+    assert edit is not None
+    for unit in ("igrow-edge", "igrow-page"):
+        first = (ROOT / "systemd" / f"{unit}.service").read_text()
+        program = tmp_path / "edit"
+        program.write_text(edit[1].strip("'"))
+        made = subprocess.run(["sed", "-f", program], input=first, capture_output=True, text=True, check=True).stdout
+        settings = [line for line in made.splitlines() if "=" in line and not line.startswith("#")]
+        own = [line for line in settings if line not in first.splitlines()]
+        assert not [line for line in settings if re.search(r"/etc/igrow/|/igrow-edge$|Directory=igrow$|842[01]", line)]
+        assert len(own) == len([line for line in first.splitlines() if line not in made.splitlines()])
+        assert any("/etc/igrow-b/daemon.yaml" in line for line in own)
