@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from igrow.core.language import speak
+from igrow.core.simulator.hybrid import climate
 from igrow.core.simulator.hybrid.nominal import nominal
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
+from igrow.core.simulator.hybrid.record import observe
 from igrow.core.telemetry import Telemetry, concatenate
 from igrow.trainer.data import Log, prepare_log
-from igrow.trainer.diagnosis import amplitudes, diagnose, history
+from igrow.trainer.diagnosis import Diagnosis, Finding, amplitudes, diagnose, history
 from igrow.trainer.diagnosis.design import Design, History
 from igrow.trainer.diagnosis.diagnose import history_of
 from igrow.trainer.diagnosis.drift import Drift
@@ -20,6 +22,7 @@ from igrow.trainer.diagnosis.parameter_change import VISIBLE, find
 from igrow.trainer.fit import FittedModel, calibrate
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.report import sentences
+from igrow.trainer.report.worth import worth
 from tests.diagnosis.synthetic_design import BALANCES, PLAIN, Truth, make_design
 from tests.virtual_log import SITE, disturbances, virtual_log
 
@@ -121,6 +124,29 @@ def later(log: tuple[Telemetry, Telemetry], begins: int) -> Log:
     return prepare_log(concatenate([plain.select(first, cut), painted.select(start=cut)]), SITE)
 
 
+def costs(told: Diagnosis, finding: Finding) -> None:
+    """A darker greenhouse needs more heat, and the lamps' electricity for the sun's light that it lost."""
+    found = worth(told, finding)
+    assert found is not None and told.evidence is not None
+    assert found.heat > 0.0
+    record, now = told.evidence.log.record, told.evidence.stages["corrected"].posterior.values["transmissivity"]
+    drivers = [
+        climate.derive(
+            np,
+            observe(record, told.model.posterior.values, {}),
+            record.inputs,
+            told.model.posterior.values | {"transmissivity": value},
+            record.lamp_efficacy,
+        )
+        for value in (now / (1.0 + finding.parameters["change"].value), now)
+    ]
+    lost = (drivers[0]["par"] - drivers[1]["par"])[record.usable].mean()
+    assert found.lamp_light == pytest.approx(lost * 604_800.0 / record.lamp_efficacy / 3.6e6, rel=1e-3)
+    assert found.spread is not None and found.spread[0] < 1.0 < found.spread[1]
+    crop = replace(finding, effect="assimilation_maximum")
+    assert worth(told, crop) is None
+
+
 def test_a_painted_cover_is_told_and_is_no_news_afterwards(
     log: tuple[Telemetry, Telemetry], model: FittedModel
 ) -> None:
@@ -136,6 +162,7 @@ def test_a_painted_cover_is_told_and_is_no_news_afterwards(
     assert "less than at the calibration" in told.summary()
     assert "licht door het dek" in sentences.cause(finding, speak("nl", SITE.time_zone)).lower()
     assert sentences.checks(finding, speak("en", SITE.time_zone))
+    costs(told, finding)
     # Pipes that nobody logged can look like a cover that changed.
     assert all(one.kind != "parameter" for one in diagnose(seen.without("rail_pipe_temperature"), model).findings)
     again = diagnose(seen, told.corrected)

@@ -2,13 +2,14 @@
 
 The greenhouse is held at the climate that the log shows. What its heating must then supply is what the balance of heat
 lacks without the pipes, and the same goes for CO2 while it is dosed; a cause takes the difference between the corrected
-model with and without it. Light that is lost is priced as the electricity that the lamps would need for as much.
+model with and without it, a parameter that has changed that between its value now and at the calibration. Light that is
+lost is priced as the electricity that the lamps would need for as much.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,11 +20,14 @@ from igrow.core.simulator.hybrid.record import Record, observe
 from igrow.core.site import Site
 from igrow.trainer.diagnosis.correction import Stage
 from igrow.trainer.diagnosis.knowledge import activate
+from igrow.trainer.diagnosis.parameter_change import VISIBLE
 from igrow.trainer.diagnosis.result import DISCREPANCY, Diagnosis, Finding
 
 _WEEK = 604_800.0
 _PAID: Mapping[str, str] = {"heating_valve_leak": "heat", "co2_valve_leak": "co2"}
 """Effects that bring something in which is paid for, whether it is wanted or not."""
+OF_THE_CROP = frozenset(name for name in VISIBLE if name.startswith(("assimilation", "respiration", "transpiration")))
+"""Parameters whose change costs growth, which no balance counts: less CO2 taken up saves nothing."""
 _PAR_PER_GLOBAL = 2.1
 """Photons of PAR in outdoor radiation, umol J-1."""
 
@@ -49,17 +53,10 @@ def worth(result: Diagnosis, finding: Finding) -> Worth | None:
     if result.evidence is None or "corrected" not in result.evidence.stages:
         return None
     record, stage, site = result.evidence.log.record, result.evidence.stages["corrected"], result.model.site
-    active = activate(record, stage.terms)
-    if finding.effect == DISCREPANCY:
-        reduced = Stage(stage.posterior, stage.terms)
-        since = np.ones(len(record), dtype=bool)
-    elif finding.effect in active:
-        reduced = Stage(
-            stage.posterior, tuple(term for term in stage.terms if term.effect != finding.effect), added=stage.added
-        )
-        since = np.ones(len(record), dtype=bool) if finding.onset is None else record.time >= finding.onset.time
-    else:
+    reduced = _without(stage, finding)
+    if reduced is None:
         return None
+    since = np.ones(len(record), dtype=bool) if finding.onset is None else record.time >= finding.onset.time
     counted = since & record.usable
     if not counted.any():
         return None
@@ -83,8 +80,24 @@ def worth(result: Diagnosis, finding: Finding) -> Worth | None:
     )
 
 
+def _without(stage: Stage, finding: Finding) -> Stage | None:
+    """Return the corrected model without what was found; None where nothing of it can be counted."""
+    if finding.effect == DISCREPANCY:
+        return replace(stage, added={})
+    if any(term.effect == finding.effect for term in stage.terms):
+        return replace(stage, terms=tuple(term for term in stage.terms if term.effect != finding.effect))
+    if finding.kind != "parameter" or finding.effect in OF_THE_CROP:
+        return None
+    posterior, here = stage.posterior, np.array([name == finding.effect for name in stage.posterior.names])
+    before = posterior.mean / (1.0 + here * finding.parameters["change"].value)
+    return replace(stage, posterior=posterior.moved(before))
+
+
 def _needed(record: Record, stage: Stage) -> dict[str, Floats]:
-    """Return what holds the logged climate, (n,): heat in W m-2, CO2 in kg m-2 s-1; and light lost, umol m-2 s-1."""
+    """Return what holds the logged climate, (n,): heat, W m-2, and CO2, kg m-2 s-1; and the sun's light that lacks.
+
+    The light, umol m-2 s-1, is what the crop has less than none lost: negative.
+    """
     effects, parameters = activate(record, stage.terms), stage.posterior.values
     state = observe(record, parameters, effects)
     drivers = climate.derive(np, state, record.inputs, parameters, record.lamp_efficacy)
@@ -96,8 +109,9 @@ def _needed(record: Record, stage: Stage) -> dict[str, Floats]:
     net = climate.balances(np, state, unheated, parameters, added)
     heat = np.maximum(-_course(net["air_temperature"][0], record), 0.0)
     dosed = np.asarray(record.inputs["co2_dosing"]) > 0.0
-    co2 = np.where(dosed, np.maximum(-_course(net["co2_concentration"][0], record), 0.0), 0.0)
-    light = _course(added.get("light_loss", 0.0), record) * drivers["radiation_inside"] * _PAR_PER_GLOBAL
+    short = np.maximum(-_course(net["co2_concentration"][0], record), 0.0) / parameters["dosing_share"]
+    co2 = np.where(dosed, short, 0.0)
+    light = -(1.0 - _course(added.get("light_loss", 0.0), record)) * drivers["radiation_inside"] * _PAR_PER_GLOBAL
     return {"heat": heat, "co2": co2, "light": light}
 
 
