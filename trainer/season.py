@@ -91,6 +91,15 @@ def plan_season(
     return plan
 
 
+def first_day(site: Site, today: datetime.date) -> datetime.date:
+    """Return the day from which on a season is planned: today for a crop that bears, else the day of its planting.
+
+    A young crop is only known on the day of its planting.
+    """
+    planted = site.crop.planting_date
+    return today if (today - planted).days >= BEARING else planted
+
+
 class _Partial:
     """Genes that were found already, in a file."""
 

@@ -39,12 +39,13 @@ def diagnosed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Put a diagnosis of no time in the place of the real one; collects the bundles that it is asked to build on."""
     asked: list[str] = []
 
-    def diagnose(site, log, bundle, target, drift):
+    def diagnose(site, log, bundle, target, now, drift):
         asked.append(bundle.identity)
         offset = 10.0 + len(asked)
 
-        def write(folder: Path) -> None:
+        def write(folder: Path) -> tuple[str, ...]:
             write_tiny_bundle(folder, site="house", offset=offset)
+            return ()
 
         return Diagnosed("named", ("wind_infiltration",), 0.2, (), write)
 

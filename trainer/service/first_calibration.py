@@ -15,7 +15,7 @@ import numpy as np
 from igrow.core.bundle import Bundle
 from igrow.core.errors import IgrowError
 from igrow.core.site import Site
-from igrow.trainer.service import history
+from igrow.trainer.service import history, seasons
 from igrow.trainer.service.archive import Archive, SiteLog
 from igrow.trainer.service.recalibration import LEAST_GAIN, Publish, Turn, bundle_in_force
 
@@ -85,17 +85,19 @@ def _calibrate(
 
     prepared = prepare_log(log.telemetry, site, name=site.name)
     model = calibrate(prepared, population=None if population is None else read_population(population))
-    gain = _gain(prepared, model, read_model(bundle, site))
+    gain, notes = _gain(prepared, model, read_model(bundle, site)), (*log.notes, *model.notes)
 
     def turn(note: str, *, published: bool = False) -> Turn:
-        return Turn(site.name, now, "calibrated", published, note, gain=gain, notes=(*log.notes, *model.notes))
+        return Turn(site.name, now, "calibrated", published, note, gain=gain, notes=notes)
 
     if gain < LEAST_GAIN:
         return turn(f"the bundle in force stays: on unseen weeks the calibration is only {100 * gain:.1f} % better")
     fresh = folder / "bundles" / now.strftime("%Y%m%dT%H%M%SZ")
     fresh.parent.mkdir(parents=True, exist_ok=True)
+    model, unplanned = seasons.with_season(model, now)
     export(model, fresh)
     publish_bundle(fresh)
+    notes += unplanned
     return turn(f"published {fresh.name}: {100 * gain:.1f} % less error a day ahead on unseen weeks", published=True)
 
 

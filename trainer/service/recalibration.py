@@ -1,8 +1,8 @@
 """Recalibration of one site: its log against the model in force; a better one is published; what happened is kept.
 
-    archive --> diagnose against the bundle in force --> better? --> publish --> history
-                                ^                                       |
-                                +--------- the gateway's reports <------+
+    archive --> diagnose against the bundle in force --> better? --> season --> publish --> history
+                                ^                                                  |
+                                +--------------- the gateway's reports <-----------+
 
 `<state>/sites/<site>` holds `bundles/` with what was published, the newest last, `history.jsonl` with one line a run,
 and the last diagnosis. A bundle that the gateway refused, or took back, is not built upon.
@@ -18,13 +18,14 @@ import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from igrow.core.bundle import Bundle, BundleError, default_bundle_folder, read_bundle
 from igrow.core.errors import IgrowError
 from igrow.core.site import Site
-from igrow.trainer.service import history
+from igrow.trainer.service import history, seasons
 from igrow.trainer.service.archive import Archive, SiteLog
 
 COMMAND = "recalibrate"
@@ -134,7 +135,7 @@ def _run(
     if len(log.telemetry) == 0:
         raise IgrowError(f"no telemetry of site {site.name} in the last {days} days: nothing was collected of it")
     bundle, unreadable = bundle_in_force(folder, log.reports)
-    outcome = _diagnose(site, log, bundle, folder / "diagnosis", drift)
+    outcome = _diagnose(site, log, bundle, folder / "diagnosis", now, drift)
     notes += unreadable + outcome.notes
 
     def turn(note: str, *, published: bool = False) -> Turn:
@@ -142,19 +143,20 @@ def _run(
 
     if outcome.write_bundle is None:
         return turn("; ".join(outcome.notes) or "nothing to publish")
-    if outcome.gain < LEAST_GAIN:
-        return turn(
-            f"the bundle in force stays: the new model is only {100 * outcome.gain:.1f} % better on unseen days"
-        )
-    if publish_bundle is None:
-        return turn(f"a model with {100 * outcome.gain:.1f} % less error a day ahead on unseen days was found")
+    better = outcome.gain >= LEAST_GAIN
+    gain = f"{100 * outcome.gain:.1f} %"
+    if publish_bundle is None and better:
+        return turn(f"a model with {gain} less error a day ahead on unseen days was found")
+    if publish_bundle is None or not (better or seasons.lacking(bundle, site, now)):
+        return turn(f"the bundle in force stays: the new model is only {gain} better on unseen days")
     fresh = folder / "bundles" / now.strftime("%Y%m%dT%H%M%SZ")
     fresh.parent.mkdir(parents=True, exist_ok=True)
-    outcome.write_bundle(fresh)
+    write = outcome.write_bundle if better else partial(_write_again, bundle, site, now)
+    notes += write(fresh)
     publish_bundle(fresh)
     forget_old(fresh.parent, bundle.folder)
-    note = f"published {fresh.name}: {100 * outcome.gain:.1f} % less error a day ahead on unseen days"
-    return turn(note, published=True)
+    why = f"{gain} less error a day ahead on unseen days" if better else "the model in force, with the season planned"
+    return turn(f"published {fresh.name}: {why}", published=True)
 
 
 @dataclass(frozen=True)
@@ -165,11 +167,11 @@ class Diagnosed:
     causes: tuple[str, ...]
     gain: float
     notes: tuple[str, ...]
-    write_bundle: Callable[[Path], None] | None
-    """Writes the corrected model as a bundle; None where there is none."""
+    write_bundle: Callable[[Path], tuple[str, ...]] | None
+    """Writes the corrected model with its season as a bundle, and returns notes; None where there is none."""
 
 
-def _diagnose(site: Site, log: SiteLog, bundle: Bundle, target: Path, drift: Path | None) -> Diagnosed:
+def _diagnose(site: Site, log: SiteLog, bundle: Bundle, target: Path, now: datetime, drift: Path | None) -> Diagnosed:
     """Diagnose a log against a bundle, and write diagnosis and report to `target`."""
     from igrow.trainer.data import prepare_log  # noqa: PLC0415  (scipy is slow to import)
     from igrow.trainer.diagnosis import diagnose  # noqa: PLC0415
@@ -183,11 +185,24 @@ def _diagnose(site: Site, log: SiteLog, bundle: Bundle, target: Path, drift: Pat
     write_bundle = None
     if diagnosis.verdict != "data_fault":
 
-        def write_bundle(folder: Path) -> None:
-            export(diagnosis.corrected, folder)
+        def write_bundle(folder: Path) -> tuple[str, ...]:
+            model, notes = seasons.with_season(diagnosis.corrected, now)
+            export(model, folder)
+            return notes
 
     causes = tuple(one.effect for one in diagnosis.findings)
     return Diagnosed(diagnosis.verdict, causes, relative_gain(diagnosis.errors), tuple(diagnosis.notes), write_bundle)
+
+
+def _write_again(bundle: Bundle, site: Site, now: datetime, folder: Path) -> tuple[str, ...]:
+    """Write the model in force as a bundle with its season; raises IgrowError where none can be planned."""
+    from igrow.trainer.exporting import export, read_model  # noqa: PLC0415
+
+    model, notes = seasons.with_season(read_model(bundle, site), now)
+    if notes:
+        raise IgrowError("; ".join(notes))
+    export(model, folder)
+    return ()
 
 
 def relative_gain(errors: Mapping[str, Mapping[str, Mapping[str, float]]]) -> float:

@@ -1,0 +1,95 @@
+"""The loop's bundles carry their season: planned with what is published, and once where nothing else is better."""
+
+from __future__ import annotations
+
+import datetime
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from igrow.core.bundle import default_bundle_folder, read_bundle
+from igrow.core.planner.season import SeasonPlan
+from igrow.core.site import Crop, Site
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.exporting import read_model
+from igrow.trainer.season import plan_season
+from igrow.trainer.service import recalibration, seasons
+from igrow.trainer.service.archive import Archive
+from igrow.trainer.service.recalibration import Diagnosed, recalibrate
+
+CROP = Crop(planting_date=datetime.date(2020, 2, 10), end_date=datetime.date(2020, 4, 25))
+SITE = Site(name="house", latitude=52.0, longitude=4.5, crop=CROP)
+NOON = datetime.datetime(2020, 3, 1, 12, tzinfo=datetime.UTC)
+
+
+@pytest.fixture(autouse=True)
+def _a_short_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(seasons, "plan_season", partial(plan_season, generations=3))
+
+
+def with_crop(**changed: Any) -> Site:
+    return replace(SITE, crop=replace(CROP, **changed))
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"end_date": None},
+        {"planting_date": datetime.date(2020, 3, 2)},
+        {"end_date": datetime.date(2020, 3, 20)},
+        {"end_date": datetime.date(2020, 2, 20)},
+    ],
+    ids=["no end", "not planted yet", "nearly over", "over"],
+)
+def test_no_season_is_lacking_where_none_can_be_planned(changed: dict[str, datetime.date | None]) -> None:
+    built_in = read_bundle(default_bundle_folder())
+    assert seasons.lacking(built_in, SITE, NOON)
+    assert not seasons.lacking(built_in, with_crop(**changed), NOON)
+
+
+def test_a_season_that_cannot_be_planned_is_said_and_the_one_before_stays() -> None:
+    built_in = read_bundle(default_bundle_folder())
+    model = read_model(built_in, SITE)
+    planned, notes = seasons.with_season(model, NOON)
+    assert notes == () and planned.season is not None
+    endless = replace(planned, site=with_crop(end_date=None))
+    same, notes = seasons.with_season(endless, NOON)
+    assert same.season is planned.season
+    assert notes == (
+        "no season is planned: house: crop.end_date is not set: a season that has no end cannot be planned",
+    )
+
+
+def test_the_season_of_a_crop_that_bears_begins_today_and_that_of_a_young_one_with_its_planting() -> None:
+    model = read_model(read_bundle(default_bundle_folder()), SITE)
+    young, _ = seasons.with_season(model, NOON)
+    assert young.season is not None and young.season.start == np.datetime64("2020-02-10T00:00:00")
+    old = replace(model, site=with_crop(planting_date=datetime.date(2019, 12, 1)))
+    bearing, _ = seasons.with_season(old, NOON)
+    assert bearing.season is not None and bearing.season.start == np.datetime64("2020-03-01T00:00:00")
+    assert bearing.season.covers(np.datetime64("2020-03-01T12:00:00"))
+
+
+def test_a_model_in_force_that_has_no_season_is_published_once_with_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    archive = Archive(tmp_path / "archive")
+    time = np.datetime64("2020-02-20T00:00:00") + np.arange(0, 9 * 86_400, 600).astype("timedelta64[s]")
+    archive.add_telemetry("house", Telemetry(time, {"air_temperature": np.full(len(time), 20.0)}))
+
+    def nothing_better(*_: object) -> Diagnosed:
+        return Diagnosed("nothing", (), 0.0, (), lambda _: pytest.fail("a worse model was written"))
+
+    monkeypatch.setattr(recalibration, "_diagnose", nothing_better)
+    published: list[Path] = []
+    turn = recalibrate(SITE, archive, tmp_path / "state", published.append, now=NOON)
+    assert turn.published and turn.note.endswith("the model in force, with the season planned")
+    (folder,) = published
+    season = SeasonPlan.of(read_bundle(folder))
+    assert season is not None and season.covers(np.datetime64("2020-03-01T12:00:00"))
+    again = recalibrate(SITE, archive, tmp_path / "state", published.append, now=NOON, force=True)
+    assert not again.published and again.note.startswith("the bundle in force stays")

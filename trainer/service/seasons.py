@@ -1,0 +1,49 @@
+"""The season in every bundle that the loop publishes: a day that is planned without it knows an average price alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+from zoneinfo import ZoneInfo
+
+import numpy as np
+
+from igrow.core.bundle import Bundle
+from igrow.core.errors import IgrowError
+from igrow.core.planner.season import SeasonPlan
+from igrow.core.site import Site
+from igrow.trainer.season import SHORTEST, first_day, plan_season
+
+if TYPE_CHECKING:
+    from igrow.trainer.fit import FittedModel
+
+
+def lacking(bundle: Bundle, site: Site, now: datetime) -> bool:
+    """Tell whether a site's crop stands in a season of which the bundle in force knows nothing."""
+    crop, today = site.crop, now.astimezone(ZoneInfo(site.time_zone)).date()
+    if crop.end_date is None or today < crop.planting_date:
+        return False
+    if (crop.end_date - today).days < SHORTEST:
+        return False
+    season = SeasonPlan.of(bundle) if bundle.manifest.site == site.name else None
+    return season is None or not season.covers(np.datetime64(now.replace(tzinfo=None), "s"))
+
+
+def with_season(model: FittedModel, now: datetime) -> tuple[FittedModel, tuple[str, ...]]:
+    """Return a model with what is left of the season planned on its own simulator, and a sentence where it cannot be.
+
+    It then keeps the season that it had. Takes a minute or two.
+    """
+    from igrow.trainer.exporting import export  # noqa: PLC0415  (onnx is slow to import)
+
+    site = model.site
+    today = now.astimezone(ZoneInfo(site.time_zone)).date()
+    try:
+        with TemporaryDirectory() as scratch:
+            bundle = export(model, Path(scratch) / "simulator")
+            return replace(model, season=plan_season(site, bundle, begins=first_day(site, today))), ()
+    except IgrowError as error:
+        return model, (f"no season is planned: {error}",)
