@@ -88,6 +88,7 @@ class ModbusBus:
         await self._supervisor.close()
         if self._finishing is not None:
             await asyncio.wait((self._finishing,))
+        self._link.retire()
 
     async def read(self, request: ReadRequest, priority: Priority) -> tuple[int, ...]:
         """Return exactly `request.count` registers or bits; raises BusError."""

@@ -7,11 +7,12 @@ import errno
 import os
 import ssl
 
+from igrow.edge.bus.addresses import Addresses
 from igrow.edge.hand_off import HandOff
 from igrow.edge.registers.model import BusSettings, Transport
 
 
-async def open_socket(settings: BusSettings, protocol: asyncio.Protocol, aside: HandOff) -> None:
+async def open_socket(settings: BusSettings, protocol: asyncio.Protocol, addresses: Addresses, aside: HandOff) -> None:
     """Connect `protocol` by TCP or TLS; the disk that holds certificates is not waited for by the event loop.
 
     Raises OSError, ValueError or LateError.
@@ -19,7 +20,21 @@ async def open_socket(settings: BusSettings, protocol: asyncio.Protocol, aside: 
     tls = await aside.run(lambda: _tls_context(settings)) if settings.transport is Transport.TLS else None
     name = (settings.server_name or settings.host) if tls else None
     loop = asyncio.get_running_loop()
-    await loop.create_connection(lambda: protocol, settings.host, settings.port, ssl=tls, server_hostname=name)
+    end = loop.time() + settings.timeout
+    candidates = await addresses.now(settings.timeout / 2)
+    for left in range(len(candidates), 0, -1):
+        # One after the other, each with its share of the time: a PLC may bear one connection only, so two that are
+        # tried at once could shut each other out.
+        host = candidates[-left]
+        try:
+            async with asyncio.timeout((end - loop.time()) / left):
+                await loop.create_connection(lambda: protocol, host, settings.port, ssl=tls, server_hostname=name)
+        except OSError:
+            if left == 1:
+                raise
+        else:
+            addresses.worked(host)
+            return
 
 
 def why_not_open(settings: BusSettings, error: Exception) -> str:

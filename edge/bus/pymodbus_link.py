@@ -25,6 +25,7 @@ from pymodbus.pdu.register_message import (
     WriteSingleRegisterRequest,
 )
 
+from igrow.edge.bus.addresses import Addresses
 from igrow.edge.bus.answer_check import (
     MisfitError,
     TornStreamError,
@@ -92,6 +93,7 @@ class PymodbusLink(asyncio.Protocol):
         self._last_byte = 0.0
         self._opened = asyncio.Event()
         self._aside = HandOff(f"bus {settings.name}")
+        self._addresses = Addresses(settings.host)
         self._loop = asyncio.get_running_loop()
         self.owed: OwedAnswers | None = None
         """What the line may still say to requests that were given up; None where answers are numbered."""
@@ -115,7 +117,7 @@ class PymodbusLink(asyncio.Protocol):
                     port = (settings.serial_port, settings.baudrate, settings.parity, settings.stop_bits)
                     await open_serial_port(self, *port, self._aside)
                 else:
-                    await open_socket(settings, self, self._aside)
+                    await open_socket(settings, self, self._addresses, self._aside)
                 await self._opened.wait()  # pyserial's transport reports in a later turn of the event loop
         except (OSError, TimeoutError, ValueError, LateError) as error:
             raise NotConnectedError(f"bus {settings.name}: {why_not_open(settings, error)}") from error
@@ -128,6 +130,12 @@ class PymodbusLink(asyncio.Protocol):
             self._fail(ConnectionLostError(f"bus {self._settings.name}: the line was closed"))
             drop(transport)
             self._on_lost()
+
+    def retire(self) -> None:
+        """Drop the line for good, and let go of the threads that open it; one that hangs is left behind."""
+        self.close()
+        self._aside.close(0.0)
+        self._addresses.close()
 
     async def read(self, request: ReadRequest) -> tuple[int, ...]:
         """Return the registers or bits asked for; raises BusError."""

@@ -8,6 +8,7 @@ import datetime
 from dataclasses import dataclass
 
 from igrow.core.yaml_schema import setting
+from igrow.edge.host_names import check_host
 
 _SECOND = datetime.timedelta(seconds=1)
 _HOUR = datetime.timedelta(hours=1)
@@ -29,3 +30,7 @@ class MqttSettings:
     override_for: datetime.timedelta = setting(
         low=60 * _SECOND, high=24 * _HOUR, default=2 * _HOUR, help="how long such an override lasts"
     )
+
+    def __post_init__(self) -> None:
+        if self.host is not None:
+            check_host(self.host)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from igrow.core.yaml_schema import setting
+from igrow.edge.host_names import check_host
 from igrow.edge.registers.model import BusSettings, Parity, Transport
 
 _ZERO = timedelta(0)
@@ -20,8 +21,15 @@ _TIMEOUT = "longest wait for an answer"
 _GAP = "rest between two requests on the bus"
 
 
+class _OverNetwork:
+    host: str
+
+    def __post_init__(self) -> None:
+        check_host(self.host)
+
+
 @dataclass(frozen=True)
-class TcpBus:
+class TcpBus(_OverNetwork):
     """A device or gateway that speaks Modbus TCP."""
 
     transport: Literal["tcp"] = setting(help="how the bus carries its frames")
@@ -32,7 +40,7 @@ class TcpBus:
 
 
 @dataclass(frozen=True)
-class RtuOverTcpBus:
+class RtuOverTcpBus(_OverNetwork):
     """A converter that carries the frames of a serial line over TCP."""
 
     transport: Literal["rtu_over_tcp"] = setting(help="how the bus carries its frames")
@@ -59,7 +67,7 @@ class RtuBus:
 
 
 @dataclass(frozen=True)
-class TlsBus:
+class TlsBus(_OverNetwork):
     """Modbus TCP inside TLS (Modbus/TCP Security)."""
 
     transport: Literal["tls"] = setting(help="how the bus carries its frames")
