@@ -54,9 +54,12 @@ class Reloading:
 
     async def _read(self) -> Configuration:
         # A thread of its own each time: one that hung in an earlier attempt is left behind.
-        reading = HandOff("configuration").run(lambda: load_configuration(self._path))
-        with contextlib.suppress(TimeoutError):
-            return await asyncio.wait_for(reading, RELOAD_SECONDS)
+        aside = HandOff("configuration")
+        try:
+            with contextlib.suppress(TimeoutError):
+                return await asyncio.wait_for(aside.run(lambda: load_configuration(self._path)), RELOAD_SECONDS)
+        finally:
+            aside.close(0.0)
         raise IgrowError(f"{self._path}: its files could not be read within {RELOAD_SECONDS:g} s")
 
 
