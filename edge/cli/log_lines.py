@@ -13,7 +13,18 @@ JOURNAL_SECONDS = 1.0
 _JOURNAL_PRIORITY = {logging.DEBUG: 7, logging.INFO: 6, logging.WARNING: 4, logging.ERROR: 3, logging.CRITICAL: 2}
 
 
-class _JournalFormatter(logging.Formatter):
+class _OneLine(logging.Formatter):
+    """Shows what does not print in what somebody else may have named (a topic, a file), so that it passes for no line.
+
+    A traceback keeps its lines.
+    """
+
+    def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - logging's own name
+        line = super().formatMessage(record)
+        return "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in line)
+
+
+class _JournalFormatter(_OneLine):
     """Begins each line with its priority, as journald reads it (sd-daemon(3)); journald adds the time itself."""
 
     def format(self, record: logging.LogRecord) -> str:
@@ -51,7 +62,7 @@ def set_up_logging(*, verbose: bool) -> JournalHandler:
     if os.environ.get("JOURNAL_STREAM"):
         handler.setFormatter(_JournalFormatter("%(message)s"))
     else:
-        handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s", "%H:%M:%S"))
+        handler.setFormatter(_OneLine("%(asctime)s %(levelname)s %(message)s", "%H:%M:%S"))
     logging.basicConfig(level=logging.DEBUG if verbose else logging.INFO, handlers=[handler], force=True)
     logging.captureWarnings(True)
     # The library repeats at ERROR what our bus reports better.

@@ -7,6 +7,7 @@ import asyncio
 
 from igrow.core.errors import IgrowError
 from igrow.edge.cli.common import add_configuration, configuration_of
+from igrow.edge.cli.log_lines import set_up_logging
 from igrow.edge.status.client import fetch
 
 EXAMPLE = "igrow-edge mqtt /etc/igrow/daemon.yaml"
@@ -26,5 +27,9 @@ def run(options: argparse.Namespace) -> int:
         from igrow.edge.mqtt.bridge import run_bridge  # noqa: PLC0415 - an extra that control does not need
     except ImportError:
         raise IgrowError("MQTT needs aiomqtt: install igrow[mqtt]") from None
-    asyncio.run(run_bridge(configuration, lambda: fetch(configuration.file.status.port)))
+    journal = set_up_logging(verbose=False)
+    try:
+        asyncio.run(run_bridge(configuration, lambda: fetch(configuration.file.status.port)))
+    finally:
+        journal.close()
     return 0

@@ -23,6 +23,18 @@ FIRST_PAUSE, LONGEST_PAUSE = 1.0, 60.0
 """Seconds between two attempts to connect; each failure doubles the pause."""
 PATIENCE = 10.0
 """Seconds that the broker may take for one message."""
+PAUSE_AFTER_COMMAND = 0.2
+"""Seconds: however many messages a broker sends, few are looked at and told of, and those too many are lost."""
+_library = logging.getLogger("igrow.edge.mqtt.library")
+_library.setLevel(logging.CRITICAL)  # it says of each message of a flood what is said here once
+
+
+class _Client(aiomqtt.Client):
+    """Passes over a message whose topic is no text: the library would stumble over it again and again, for ever."""
+
+    def _on_message(self, client: Any, userdata: Any, message: Any) -> None:
+        with contextlib.suppress(ValueError):
+            super()._on_message(client, userdata, message)
 
 
 async def run_bridge(configuration: Configuration, fetch: Callable[[], Mapping[str, Any]]) -> None:
@@ -39,10 +51,10 @@ async def run_bridge(configuration: Configuration, fetch: Callable[[], Mapping[s
         pause = min(2.0 * pause, LONGEST_PAUSE)
 
 
-def _client(configuration: Configuration) -> aiomqtt.Client:
+def _client(configuration: Configuration) -> _Client:
     settings, site = configuration.file.mqtt, configuration.site.name
     assert settings.host is not None
-    return aiomqtt.Client(
+    return _Client(
         settings.host,
         settings.port,
         identifier=f"igrow-{site}",
@@ -51,6 +63,7 @@ def _client(configuration: Configuration) -> aiomqtt.Client:
         tls_context=ssl.create_default_context() if settings.tls else None,
         will=aiomqtt.Will(f"{base(settings.prefix, site)}/available", "offline", qos=1, retain=True),
         timeout=PATIENCE,
+        logger=_library,
         max_queued_incoming_messages=100,
         max_queued_outgoing_messages=1000,
     )
@@ -71,7 +84,7 @@ async def _publish_all(
     client: aiomqtt.Client, configuration: Configuration, fetch: Callable[[], Mapping[str, Any]]
 ) -> None:
     settings, site = configuration.file.mqtt, configuration.site.name
-    at = base(settings.prefix, site)
+    at, complained = base(settings.prefix, site), ""
     commands = asyncio.create_task(_take_commands(client, configuration, at))
     try:
         if settings.discovery is not None:
@@ -87,9 +100,12 @@ async def _publish_all(
             try:
                 state = await asyncio.to_thread(fetch)
             except IgrowError as error:
-                _log.warning("%s", error)
+                if str(error) != complained:  # once, and not every ten seconds of a long night
+                    _log.warning("%s", error)
+                complained = str(error)
                 await client.publish(f"{at}/available", "offline", qos=1, retain=True)
             else:
+                complained = ""
                 await client.publish(f"{at}/state", state_payload(state), qos=0, retain=True)
                 await client.publish(f"{at}/available", "online", qos=1, retain=True)
             done, _ = await asyncio.wait({commands}, timeout=settings.every.total_seconds())
@@ -107,11 +123,12 @@ async def _take_commands(client: aiomqtt.Client, configuration: Configuration, a
     commands = Commands(configuration)
     await client.subscribe(f"{at}/set/+", qos=1)
     async for message in client.messages:
-        if message.retain:
-            continue  # left there by somebody at some time: no word of this moment
+        if message.retain or not message.topic.matches(f"{at}/set/+"):
+            continue  # left there by somebody at some time: no word of this moment; or nothing that we asked for
         payload = message.payload if isinstance(message.payload, bytes) else b""
         setpoint = str(message.topic).rpartition("/")[2]
         _log.warning("%s", await asyncio.to_thread(commands.take, setpoint, payload, time.monotonic()))
+        await asyncio.sleep(PAUSE_AFTER_COMMAND)
 
 
 def _cancelled() -> bool:
