@@ -17,7 +17,7 @@ $(STAMP): pyproject.toml
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[edge,trainer,exchange,postgresql,dev]'
 	@touch $@
 
-demo: $(STAMP) ## Run the whole loop on a virtual greenhouse with an undeclared effect (five minutes).
+demo: $(STAMP) ## Run the whole loop on a virtual greenhouse with an undeclared effect (seven minutes).
 	$(BIN)/python config/demo/run.py --out out/demo
 
 test: $(STAMP) ## Run the tests (at most 10 minutes).

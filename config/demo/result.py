@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 from igrow.core.bundle import read_bundle
 from igrow.core.planner.objective import Objective, Outcome
+from igrow.core.planner.season import SeasonPlan
+from igrow.core.planner.season.worth import CropWorth
 from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator.hindcast import HindcastPredictor
 from igrow.core.site import Site, load_site
@@ -51,7 +53,9 @@ def summarise(out: Path, effect: str, days: Days) -> str:
     since = adoption_day(adopted, log)
     diagnosis = json.loads((out / "diagnosis/diagnosis.json").read_text())
     nothing = json.loads((out / "nothing-diagnosis/diagnosis.json").read_text())
-    money = compare_money(site, log, recipe_season(out), exchange.events, since)
+    money = compare_money(
+        site, log, recipe_season(out), exchange.events, since, (SeasonPlan.of(first), SeasonPlan.of(corrected))
+    )
     result = {
         "effect": effect,
         "verdict": diagnosis["verdict"],
@@ -106,10 +110,10 @@ def recipe_season(out: Path) -> Telemetry:
     return to_grid(read_csv(next((out / "recipe").glob("*.csv.gz"))), 300)
 
 
-def obtained(site: Site, log: Telemetry, days: NDArray[np.int64], co2: float) -> NDArray[np.float64]:
+def obtained(site: Site, log: Telemetry, seasons: dict[int, SeasonPlan | None], co2: float) -> NDArray[np.float64]:
     """Return what each day was worth by the planner's own rules, from what was measured, EUR m-2.
 
-    The crop has had `co2` kg m-2 when the log begins.
+    The days have the season of the bundle that was in force; the crop has had `co2` kg m-2 when the log begins.
     """
     physical = site.greenhouse
     rail = np.maximum(log["rail_pipe_temperature"] - log["air_temperature"], 0.0)
@@ -124,13 +128,23 @@ def obtained(site: Site, log: Telemetry, days: NDArray[np.int64], co2: float) ->
     } | {name: log[name] for name in (*PREDICTED, "leaf_area_index")}
     had = co2 + dosed(log)
     worth = []
-    for day in days:
+    for day, season in seasons.items():
         rows = slice(day * DAY, (day + 1) * DAY)
         means = {name: np.nanmean(values[rows].reshape(24, 12), axis=1)[None, None] for name, values in hourly.items()}
         outcome = Outcome(**means, outside=np.zeros((1, 1, 24)))
         time = log.time[rows][::12]
-        worth.append(float(Objective(site, time, had[day]).value(outcome).profit[0, 0]))
+        value = Objective(site, time, had[day], crop_worth(site, log, day, season))
+        worth.append(float(value.value(outcome).profit[0, 0]))
     return np.array(worth)
+
+
+def crop_worth(site: Site, log: Telemetry, day: int, season: SeasonPlan | None) -> CropWorth | None:
+    """Return what a season says that the crop of a log is worth when a day begins; None without one."""
+    if season is None:
+        return None
+    counted = {name: float(log[name][day * DAY]) for name in ("leaf_area_index", "plant_load")}
+    before = log["air_temperature"][max(day - 1, 0) * DAY : max(day, 1) * DAY]
+    return season.worth(site, log.time[day * DAY], counted, float(np.nanmean(before)))
 
 
 def dosed(log: Telemetry) -> NDArray[np.float64]:
@@ -139,10 +153,18 @@ def dosed(log: Telemetry) -> NDArray[np.float64]:
     return np.append(0.0, np.cumsum(rows.reshape(-1, DAY).sum(axis=1) / 12.0))
 
 
-def compare_money(site: Site, log: Telemetry, recipe: Telemetry, events: Any, since: int | None) -> dict[str, Any]:
+def compare_money(
+    site: Site,
+    log: Telemetry,
+    recipe: Telemetry,
+    events: Any,
+    since: int | None,
+    seasons: tuple[SeasonPlan | None, SeasonPlan | None] = (None, None),
+) -> dict[str, Any]:
     """Return expected and obtained worth, plan against recipe, EUR m-2 per day, before and after the adoption.
 
-    Days of weather differ more than plan and recipe do: the gain has the standard error of its days.
+    Days of weather differ more than plan and recipe do: the gain has the standard error of its days. `seasons` are
+    those of the first bundle and of the one that was adopted.
     """
     days = min(len(log), len(recipe)) // DAY
     plans: dict[int, Any] = {}
@@ -157,7 +179,8 @@ def compare_money(site: Site, log: Telemetry, recipe: Telemetry, events: Any, si
     expected, usual = (np.array([plans[day][key] for day in number]) for key in ("expected_profit", "recipe_profit"))
     # Both houses were one until the first plan.
     co2 = plans[number[0]]["co2_before"] - float(dosed(log)[number[0]])
-    plan, other = obtained(site, log, number, co2), obtained(site, recipe, number, co2)
+    by_day = {day: seasons[since is not None and day >= since] for day in number.tolist()}
+    plan, other = obtained(site, log, by_day, co2), obtained(site, recipe, by_day, co2)
     spans = {"all": number >= 0}
     if since is not None:
         spans = {"first bundle": number < since, "corrected bundle": number >= since}

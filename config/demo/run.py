@@ -1,10 +1,10 @@
 """The whole loop on a virtual greenhouse in which something breaks that the simulator does not know.
 
-The first bundle is calibrated on four weeks of the greenhouse's own log. A daemon then controls it over Modbus, and all
-is well, until on a given day something breaks: the prediction error climbs. Two weeks later the trainer reads the log,
-names what is missing and since when, and publishes the corrected simulator; the daemon checks it, runs it in the shadow
-and adopts it, and the error falls. Beside it: the same greenhouse under the grower's recipe, and had nothing broken,
-when nothing may be found. Every step is a command that a user would type.
+The first bundle is calibrated on four weeks of the greenhouse's own log, and its season planned. A daemon then controls
+it over Modbus, and all is well, until on a given day something breaks: the prediction error climbs. Two weeks later the
+trainer reads the log, names what is missing and since when, and publishes the corrected simulator; the daemon checks
+it, runs it in the shadow and adopts it, and the error falls. Beside it: the same greenhouse under the grower's recipe,
+and had nothing broken, when nothing may be found. Every step is a command that a user would type.
 """
 
 from __future__ import annotations
@@ -237,7 +237,11 @@ def prepare(demo: Demo) -> None:
         ["igrow-trainer", "generate", *demo.plant, "--start", demo.day(-7 * WEEKS_BEFORE), "--days",
          str(7 * WEEKS_BEFORE), "--out", "before"],
     )  # fmt: skip
-    demo.run("calibrate", ["igrow-trainer", "calibrate", "before", "--site", "site.yaml", "--out", "first-bundle"])
+    demo.run("calibrate", ["igrow-trainer", "calibrate", "before", "--site", "site.yaml", "--out", "calibrated"])
+    demo.run(
+        "season",
+        ["igrow-trainer", "season", "--site", "site.yaml", "--bundle", "calibrated", "--out", "first-bundle"],
+    )
 
 
 def free_port() -> int:

@@ -93,8 +93,9 @@ def explain(
     """Return why a plan is as it is; the arguments are those of `optimise`, and what it returned.
 
     A change is taken back alone, so that changes which need each other (lamps and their CO2) do not add up to the
-    whole. Of a search that looked beyond the plan's own `horizon` (h), the money is that of its hours; a change that
-    begins within them is told with all that it does until the search's end.
+    whole. What the recipe brings is told of a greenhouse that has always followed it. Of a search that looked beyond
+    the plan's own `horizon` (h), the money is that of its hours; a change that begins within them is told with all
+    that it does until the search's end.
     """
     horizon = horizon or len(result.setpoints)
     recipe, template = result.recipe, result.template
@@ -125,7 +126,7 @@ def explain(
         )
     changes.sort(key=lambda change: -abs(change.gain.mean))
     own = objective.first(horizon)
-    planned, followed = (own.value(one.first(horizon)).balance for one in (result.outcome, result.recipe_outcome))
+    planned, followed = (own.value(one.first(horizon)).balance for one in (result.outcome, result.baseline))
     gain = planned.net_profit[:, 0] - followed.net_profit[:, 0]
     return Explanation(_amounts(planned), _amounts(followed), _amount(gain), tuple(changes[:MOST]))
 

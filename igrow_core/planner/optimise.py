@@ -62,7 +62,7 @@ class PlanResult:
     expected_profit: float
     """EUR m-2 over the horizon, mean over the ensemble, without penalties and doubt."""
     recipe_profit: float
-    """The same if the recipe were followed."""
+    """The same of the `baseline`."""
     doubt: float
     """Standard deviation of the gain over the recipe, over the ensemble, EUR m-2."""
     leaves_range: bool
@@ -78,7 +78,13 @@ class PlanResult:
     recipe_valuation: Valuation
     """The recipe's."""
     recipe_outcome: Outcome
-    """What the simulator expects of the recipe, arrays (M, 1, H)."""
+    """What the simulator expects of the recipe from now on, arrays (M, 1, H)."""
+    baseline: Outcome
+    """What it expects of the recipe had it led the day before, too, arrays (M, 1, H).
+
+    After a plan that burned its lamps in the evening the recipe has to keep its own dark until the night's hours are
+    full: a loss of that one morning, which a greenhouse that follows the recipe day by day never has.
+    """
     objective: Objective
     """By which both were valued."""
     recipe: Setpoints
@@ -91,9 +97,9 @@ class PlanResult:
     """By hour and setpoint: the crop's limits that kept it from what the search asked for."""
 
     def profits(self, hours: int) -> tuple[float, float]:
-        """Return what plan and recipe are expected to earn in the first hours, EUR m-2, mean over the ensemble."""
+        """Return what plan and `baseline` are expected to earn in the first hours, EUR m-2, mean over the ensemble."""
         objective = self.objective.first(hours)
-        plan, recipe = (objective.value(one.first(hours)).profit.mean() for one in (self.outcome, self.recipe_outcome))
+        plan, recipe = (objective.value(one.first(hours)).profit.mean() for one in (self.outcome, self.baseline))
         return float(plan), float(recipe)
 
 
@@ -191,11 +197,14 @@ def optimise(
     plan = course.setpoints[0]
     outcome, valuation = simulate(plan[None])
     _, doubt = cautious(valuation, recipe_valuation, site.planning.caution)
+    baseline, baseline_valuation = recipe_outcome, recipe_valuation
+    if state.memory is not None:
+        baseline, baseline_valuation = simulate(_led_before(template, site, state.time, forecast, recipe)[None])
     return PlanResult(
         setpoints=plan,
         time=time,
         expected_profit=float(valuation.profit.mean()),
-        recipe_profit=float(recipe_valuation.profit.mean()),
+        recipe_profit=float(baseline_valuation.profit.mean()),
         doubt=float(doubt[0]),
         leaves_range=bool((outcome.outside > 0).any()),
         follows_recipe=follows_recipe,
@@ -204,12 +213,21 @@ def optimise(
         valuation=valuation,
         recipe_valuation=recipe_valuation,
         recipe_outcome=recipe_outcome,
+        baseline=baseline,
         objective=objective,
         recipe=followed,
         template=template,
-        evaluations=evaluations + 1,
+        evaluations=evaluations + 2,
         binding=course.binding(),
     )
+
+
+def _led_before(template: Template, site: Site, time: np.datetime64, forecast: Floats, recipe: Setpoints) -> Setpoints:
+    """Return the recipe (H, 4) from a time on within all limits, as if it had led the day before under the same sun."""
+    before = for_site(site, time - np.timedelta64(24, "h"), 24, radiation=forecast[:24, RADIATION])
+    led = before.follow(recipe[None, :24], np.full(len(SETPOINTS), np.nan))
+    setpoints: Setpoints = template.follow(recipe[None], led.setpoints[:, -1], led.memory).setpoints[0]
+    return setpoints
 
 
 def _first_candidates(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from igrow.core.errors import IgrowError
-from igrow.core.planner import Budget, NumpyGeneration, Objective, PlanningState, optimise
+from igrow.core.planner import Budget, NumpyGeneration, Objective, PlanningState, PlanResult, optimise
 from igrow.core.planner.objective import Simulator
 from igrow.core.planner.onnx_generation import OnnxGeneration
 from igrow.core.planner.template import for_site
@@ -80,6 +80,26 @@ def test_a_recipe_that_nothing_beats_is_the_plan(site, state, weather, recipe) -
     assert second.follows_recipe
     np.testing.assert_array_equal(second.setpoints, first.setpoints)
     assert second.expected_profit == second.recipe_profit
+
+
+def test_a_recipe_is_not_charged_for_the_evening_of_the_plan_before(site, state, weather, recipe) -> None:
+    morning = recipe.copy()
+    morning[:, 2] = np.tile(np.arange(24) < 16, HOURS // 24)
+    evening = recipe.copy()
+    evening[:, 2] = np.tile(np.arange(24) >= 8, HOURS // 24)
+    before = for_site(site, START - np.timedelta64(24, "h"), 24)
+
+    def after(led: np.ndarray) -> PlanResult:
+        memory = before.follow(led[None, :24], np.full(4, np.nan)).memory
+        found: PlanResult = plan(ToySimulator(), site, replace(state, memory=memory), weather, morning)
+        return found
+
+    kept, changed = after(morning), after(evening)
+    # The night's dark hours are still to come, whoever leads now; a greenhouse under the recipe has had them.
+    assert changed.recipe[:, 2].sum() < morning[:, 2].sum() == kept.recipe[:, 2].sum()
+    assert changed.recipe_profit == kept.recipe_profit == pytest.approx(float(kept.recipe_valuation.profit.mean()))
+    assert changed.recipe_profit > float(changed.recipe_valuation.profit.mean())
+    assert changed.expected_profit >= float(changed.recipe_valuation.profit.mean())
 
 
 def test_doubt_about_the_lamps_keeps_a_cautious_planner_from_them(site, state, weather, recipe) -> None:
