@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -151,19 +151,52 @@ def test_a_workbook_with_the_times_across_is_read(tmp_path: Path, log: Telemetry
     assert_reads_as(tmp_path, log, export="export.xlsx")
 
 
-def test_of_a_workbook_with_a_sheet_a_day_the_others_are_named(tmp_path: Path, log: Telemetry, capsys) -> None:
-    """One day was read, and nothing said of the rest."""
+def workbook(path: Path, sheets: Mapping[str, pd.DataFrame]) -> None:
+    with pd.ExcelWriter(path) as book:
+        for name, frame in sheets.items():
+            frame.to_excel(book, sheet_name=name, index=False)
+
+
+def test_the_days_of_a_workbook_with_a_sheet_each_are_joined(tmp_path: Path, log: Telemetry, capsys) -> None:
+    """One day was read, and the others named alone."""
     frame = written(log, PLAIN)
-    with pd.ExcelWriter(tmp_path / "export.xlsx") as book:
-        for row in range(0, 3 * 48, 48):
-            frame.iloc[row : row + 48].to_excel(book, sheet_name=f"day {row // 48 + 1}", index=False)
-        pd.DataFrame({"legend": ["T", "RH"], "meaning": ["temperature", "humidity"]}).to_excel(
-            book, sheet_name="legend"
-        )
+    legend = pd.DataFrame({"legend": ["T", "RH"], "meaning": ["temperature", "humidity"]})
+    # A day's sheet ends with the midnight that the next one begins with.
+    days = {f"day {day + 1}": frame.iloc[48 * day : 48 * (day + 1) + 1] for day in range(14)}
+    workbook(tmp_path / "export.xlsx", {"legend": legend, **days})
+    assert imported(tmp_path, "--date-order", "dmy", export="export.xlsx") == 0
+    told = capsys.readouterr().out
+    assert "14 sheets, 'day 1' to 'day 14'" in told
+    assert "have readings too" not in told
+    assert_reads_as(tmp_path, log, export="export.xlsx")
+    # A sheet that is added later is read too.
+    assert "sheet" not in (tmp_path / "export.mapping.yaml").read_text().partition("\n")[2]
+
+
+def test_of_workbooks_with_a_sheet_a_month_in_a_folder_all_are_read(tmp_path: Path, log: Telemetry) -> None:
+    frame, folder = written(log, PLAIN), tmp_path / "years"
+    folder.mkdir()
+    for year, rows in (("2019", frame.iloc[:336]), ("2020", frame.iloc[336:])):
+        workbook(folder / f"{year}.xlsx", {f"week {year}": rows.iloc[:240], f"rest of {year}": rows.iloc[240:]})
+    assert imported(tmp_path, "--date-order", "dmy", export="years") == 0
+    assert_reads_as(tmp_path, log, export="years")
+
+
+@pytest.mark.parametrize("kind", ["compartments", "columns"])
+def test_sheets_of_the_same_times_or_of_other_columns_are_named_and_not_joined(
+    tmp_path: Path, log: Telemetry, capsys, kind: str
+) -> None:
+    frame = written(log, PLAIN)
+    other = {
+        "compartments": {"Afd 1": frame, "Afd 2": frame.iloc[:-10]},
+        "columns": {"Afd 1": frame.iloc[:400], "Afd 2": frame.iloc[400:, :-1]},
+    }[kind]
+    workbook(tmp_path / "export.xlsx", other)
     imported(tmp_path, "--date-order", "dmy", export="export.xlsx")
     told = capsys.readouterr().out
-    assert "note: sheet 'day 1' alone is read; 'day 2', 'day 3' have readings too: --sheet reads another" in told
-    imported(tmp_path, "--date-order", "dmy", "--sheet", "day 2", "--force", export="export.xlsx")
+    assert "note: sheet 'Afd 1' alone is read; 'Afd 2' have readings too, in other columns or of the same times" in told
+    assert len(read_log(tmp_path / "export.xlsx").telemetry) == len(other["Afd 1"])
+    imported(tmp_path, "--date-order", "dmy", "--sheet", "Afd 2", "--force", export="export.xlsx")
     assert "alone is read" not in capsys.readouterr().out
 
 

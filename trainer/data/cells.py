@@ -127,7 +127,7 @@ def read_cells(
     Raises:
         IgrowError: the file cannot be read, or has no such sheet.
     """
-    if path.name.lower().endswith(EXCEL) and not is_text(path):
+    if is_workbook(path):
         table = _workbook(path, sheet)
     elif path.name.lower().endswith(".parquet"):
         table = _parquet(path)
@@ -140,6 +140,22 @@ def read_cells(
             table = [(row, reader.line_num) for row in reader]
         except csv.Error as error:
             raise IgrowError(f"{path}:{reader.line_num}: cannot be read as a table: {error}") from None
+    return _cells(path, table, transposed=transposed)
+
+
+def read_sheets(path: Path, *, transposed: bool = False) -> dict[str, Cells]:
+    """Return the cells of each sheet of a workbook, in its order; raises IgrowError where it cannot be read."""
+    book = _open_workbook(path)
+    return {name: _cells(path, _rows_of(book, name), transposed=transposed) for name in book.sheet_names}
+
+
+def is_workbook(path: Path) -> bool:
+    """Tell whether a file has sheets."""
+    return path.name.lower().endswith(EXCEL) and not is_text(path)
+
+
+def _cells(path: Path, table: Sequence[tuple[list[str], int]], *, transposed: bool) -> Cells:
+    """Return a table's cells without the rows that have no text."""
     if transposed:
         columns = zip_longest(*(row for row, _ in table), fillvalue="")
         table = [(list(column), number) for number, column in enumerate(columns, 1)]
@@ -155,11 +171,6 @@ def unquoted(text: str) -> str:
         line.strip() == f'"{own}"' and '"' not in own.replace('""', "") for line, own in zip(lines, inside, strict=True)
     )
     return "\n".join(own.replace('""', '"') for own in inside) if lines and whole else text
-
-
-def sheets(path: Path) -> list[str]:
-    """Return the names of a workbook's sheets."""
-    return list(_open_workbook(path).sheet_names)
 
 
 def _open_workbook(path: Path) -> Any:
@@ -179,7 +190,11 @@ def _workbook(path: Path, sheet: str | None) -> list[tuple[list[str], int]]:
         raise IgrowError(f"{path}: no sheet {sheet!r}; it has {', '.join(names)}")
     if not names:
         raise IgrowError(f"{path}: the workbook has no sheet")
-    rows = book.get_sheet_by_name(sheet or names[0]).to_python(skip_empty_area=False)
+    return _rows_of(book, sheet or names[0])
+
+
+def _rows_of(book: Any, sheet: str) -> list[tuple[list[str], int]]:
+    rows = book.get_sheet_by_name(sheet).to_python(skip_empty_area=False)
     return [([_text(cell) for cell in row], line) for line, row in enumerate(rows, 1)]
 
 

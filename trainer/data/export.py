@@ -12,7 +12,7 @@ from igrow.core.arrays import Floats, Times
 from igrow.core.errors import IgrowError
 from igrow.core.local_time import to_local
 from igrow.core.telemetry import Telemetry
-from igrow.trainer.data.cells import read_cells
+from igrow.trainer.data.cells import Cells, is_workbook, read_cells, read_sheets
 from igrow.trainer.data.export_table import ExportTable, as_table, chosen_rows, held, with_rows
 from igrow.trainer.data.fault import DataFault
 from igrow.trainer.data.mapping import ColumnMapping, ExportMapping, TimeColumn
@@ -34,6 +34,16 @@ def read(path: Path, mapping: ExportMapping) -> Merged:
     Raises:
         IgrowError: a column is not there, or a cell is no number or no time.
     """
+    return read_tables(_tables(path, mapping), mapping)
+
+
+def _tables(path: Path, mapping: ExportMapping) -> list[ExportTable]:
+    """Return the table of a file: of a workbook, where no sheet is named, one for each that has all columns."""
+    if mapping.sheet is None and is_workbook(path):
+        found = [_columns(cells, mapping) for cells in read_sheets(path, transposed=mapping.transposed).values()]
+        tables = [one for one in found if one is not None and mapping.names <= set(one.columns)]
+        if tables:
+            return tables
     cells = read_cells(
         path,
         delimiter=mapping.delimiter,
@@ -41,7 +51,14 @@ def read(path: Path, mapping: ExportMapping) -> Merged:
         sheet=mapping.sheet,
         transposed=mapping.transposed,
     )
-    return read_table(chosen_rows(as_table(cells, mapping.header, mapping.first_row), mapping.only), mapping)
+    return [as_table(cells, mapping.header, mapping.first_row)]
+
+
+def _columns(cells: Cells, mapping: ExportMapping) -> ExportTable | None:
+    try:
+        return as_table(cells, mapping.header, mapping.first_row)
+    except IgrowError:
+        return None
 
 
 def read_table(table: ExportTable, mapping: ExportMapping) -> Merged:

@@ -92,7 +92,7 @@ class ExportMapping:
     decimal: str = setting(default=".", help="decimal sign of numbers")
     missing: tuple[str, ...] = setting(default=MISSING, help="texts that stand for no value")
     encoding: str = setting(default="utf-8", help="of a text file")
-    sheet: str | None = setting(default=None, help="of a workbook; the first, where none is named")
+    sheet: str | None = setting(default=None, help="of a workbook; all with these columns, where none is named")
     header: tuple[int, ...] = setting(default=(1,), low=1, help="lines that together name the columns")
     first_row: int | None = setting(default=None, low=2, help="line of the first reading; the one after the header")
     transposed: bool = setting(default=False, help="whether times stand across, with a line for each sensor")
@@ -106,6 +106,15 @@ class ExportMapping:
             raise SettingError(f"decimal is {self.decimal!r}: . or , is needed", "decimal")
         if not self.header:
             raise SettingError("header is empty: the line with the columns' names is needed", "header")
+
+    @property
+    def names(self) -> set[str]:
+        """The columns of an export that are read."""
+        if self.long is not None:
+            read = [self.long.name, self.long.value]
+        else:
+            read = [name for rule in self.columns.values() for name in (rule.column, *rule.add)]
+        return {self.time.column, *filter(None, [self.time.time_of_day]), *read, *self.only}
 
 
 def load(path: Path) -> ExportMapping:

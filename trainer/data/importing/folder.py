@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from igrow.core.errors import IgrowError
-from igrow.trainer.data.cells import Cells, read_cells
-from igrow.trainer.data.export_table import ExportTable
+from igrow.trainer.data.cells import Cells, is_workbook, read_cells, read_sheets
+from igrow.trainer.data.export_table import ExportTable, as_table
 from igrow.trainer.data.importing.layout import Layout, find_layout
+from igrow.trainer.data.importing.sheets import go_on
+
+Head = list[list[str]]
+"""The lines with the names and units of a file."""
 
 
 def alike(paths: Sequence[Path], sheet: str | None = None) -> list[list[Path]]:
@@ -19,27 +24,45 @@ def alike(paths: Sequence[Path], sheet: str | None = None) -> list[list[Path]]:
     Raises:
         IgrowError: a file that is of no known layout cannot be understood.
     """
-    groups: list[tuple[Layout, list[list[str]], list[Path]]] = []
+    groups: list[tuple[Layout, Head, list[Path]]] = []
     for path in paths:
-        group = next((files for layout, head, files in groups if _head(path, layout) == head), None)
+        group = next((files for layout, head, files in groups if _has_head(path, layout, head)), None)
         if group is not None:
             group.append(path)
         else:
             layout, cells = find_layout(path, sheet)
-            groups.append((layout, _lines(cells, layout), [path]))
+            groups.append((replace(layout, sheet=sheet), head_of(cells, layout), [path]))
     return [files for _, _, files in groups]
 
 
-def further_cells(paths: Sequence[Path], layout: Layout) -> Iterator[Cells]:
+def further_cells(paths: Sequence[Path], layout: Layout, head: Head) -> Iterator[Cells]:
     """Yield the cells of files of one layout."""
     for path in paths:
-        yield read_cells(
-            path,
-            delimiter=layout.delimiter,
-            encoding=layout.encoding,
-            sheet=layout.sheet,
-            transposed=layout.transposed,
-        )
+        yield from cells_like(path, layout, head).values()
+
+
+def cells_like(path: Path, layout: Layout, head: Head) -> dict[str, Cells]:
+    """Return the cells of a file by its sheets: of a workbook, where no sheet is named, those of all with a head.
+
+    Raises:
+        IgrowError: it cannot be read so.
+    """
+    if is_workbook(path) and layout.sheet is None:
+        found = read_sheets(path, transposed=layout.transposed)
+        return {name: cells for name, cells in found.items() if head_of(cells, layout) == head}
+    cells = read_cells(
+        path, delimiter=layout.delimiter, encoding=layout.encoding, sheet=layout.sheet, transposed=layout.transposed
+    )
+    return {layout.sheet or "": cells}
+
+
+def whole(path: Path, layout: Layout, cells: Cells) -> tuple[Layout, dict[str, Cells]]:
+    """Return a layout for all sheets of a workbook that go on where the found one ends, and the cells by sheet."""
+    every = replace(layout, sheet=None)
+    found = {} if layout.sheet is None else cells_like(path, every, head_of(cells, layout))
+    if len(found) < 2 or not go_on([as_table(one, layout.header, layout.first_row) for one in found.values()]):
+        return layout, {layout.sheet or "": cells}
+    return every, found
 
 
 def joined(tables: Sequence[ExportTable]) -> ExportTable:
@@ -51,14 +74,15 @@ def joined(tables: Sequence[ExportTable]) -> ExportTable:
     return ExportTable(first.path, columns, [line for table in tables for line in table.lines])
 
 
-def _head(path: Path, layout: Layout) -> list[list[str]] | None:
-    """Return the lines with the names of a file, where it is read by a layout; None where it cannot be."""
-    try:
-        return _lines(next(further_cells([path], layout)), layout)
-    except IgrowError:
-        return None
-
-
-def _lines(cells: Cells, layout: Layout) -> list[list[str]]:
+def head_of(cells: Cells, layout: Layout) -> Head:
+    """Return the lines with the names and units of a file."""
     told = {*layout.header, layout.units}
     return [row for row, line in zip(cells.rows, cells.lines, strict=True) if line in told]
+
+
+def _has_head(path: Path, layout: Layout, head: Head) -> bool:
+    """Tell whether a file, read by a layout, has a head."""
+    try:
+        return any(head_of(cells, layout) == head for cells in cells_like(path, layout, head).values())
+    except IgrowError:
+        return False

@@ -16,9 +16,10 @@ import charset_normalizer
 
 from igrow.core.errors import IgrowError
 from igrow.trainer.data import vocabulary
-from igrow.trainer.data.cells import EXCEL, Cells, is_text, read_bytes, read_cells, sheets, unquoted
+from igrow.trainer.data.cells import Cells, is_text, is_workbook, read_bytes, read_cells, unquoted
 from igrow.trainer.data.fixed_places import stands_at_fixed_places
 from igrow.trainer.data.importing.first_reading import first_reading, is_value, times_stand_across
+from igrow.trainer.data.importing.sheets import fullest_sheet
 
 DELIMITERS = (";", "\t", "|", ",")
 """In the order in which they are believed: a comma may be a decimal sign."""
@@ -59,8 +60,8 @@ def find_layout(path: Path, sheet: str | None = None) -> tuple[Layout, Cells]:
         encoding = find_encoding(read_bytes(path))
         text = read_bytes(path).decode(encoding, errors="replace").removeprefix("\ufeff")
         delimiter = " " if stands_at_fixed_places(text) else find_delimiter(unquoted(text))
-    elif path.name.lower().endswith(EXCEL) and sheet is None:
-        sheet = _fullest_sheet(path)
+    elif is_workbook(path) and sheet is None:
+        sheet = fullest_sheet(path)
     cells = read_cells(path, delimiter=delimiter, encoding=encoding, sheet=sheet)
     transposed = times_stand_across(cells)
     if transposed:
@@ -163,26 +164,6 @@ def find_decimal(columns: Sequence[Sequence[str]]) -> str:
 
 def _is_decimal(digits: str) -> bool:
     return len(re.findall(r"[.,]", digits)) == 1 and _GROUPED.fullmatch(digits) is None
-
-
-def other_sheets(path: Path, chosen: str) -> list[str]:
-    """Return the other sheets of a workbook that have readings."""
-    found = []
-    for name in sheets(path):
-        try:
-            first_reading(read_cells(path, sheet=name))
-        except IgrowError:
-            continue
-        found += [name] if name != chosen else []
-    return found
-
-
-def _fullest_sheet(path: Path) -> str | None:
-    """Return the sheet with most cells, None where there is one alone."""
-    names = sheets(path)
-    if len(names) < 2:
-        return None
-    return max(names, key=lambda name: sum(len(row) for row in read_cells(path, sheet=name).rows))
 
 
 def _header(cells: Cells, first: int) -> tuple[list[int], int | None]:

@@ -16,10 +16,11 @@ from igrow.trainer.data.importing import columns as names
 from igrow.trainer.data.importing.capacity import add_lamp_power, by_capacity
 from igrow.trainer.data.importing.compartments import chosen_compartment, rows_of_one
 from igrow.trainer.data.importing.error_codes import MEASURED, error_codes
-from igrow.trainer.data.importing.folder import further_cells, joined
-from igrow.trainer.data.importing.layout import Layout, find_layout, other_sheets
+from igrow.trainer.data.importing.folder import further_cells, head_of, joined, whole
+from igrow.trainer.data.importing.layout import Layout, find_layout
 from igrow.trainer.data.importing.long_table import find_long, units_beside
 from igrow.trainer.data.importing.question import Answers, Question
+from igrow.trainer.data.importing.sheets import unread
 from igrow.trainer.data.importing.texts import ColumnTexts, column_texts
 from igrow.trainer.data.importing.time_format import (
     TimeForm,
@@ -48,6 +49,8 @@ class Proposal:
     mapping: ExportMapping
     tables: tuple[ExportTable, ...]
     """Of the file and of further ones."""
+    sheets: tuple[str, ...]
+    """Of a workbook that has several, those that are read."""
     units: Mapping[str, str]
     """Quantity -> the unit that its column is taken to be in; empty where nothing tells it."""
     given: frozenset[str]
@@ -105,7 +108,12 @@ def propose(
     answers = answers or Answers()
     draft = _Draft()
     layout, cells = find_layout(path, answers.sheet)
-    tables = [as_table(one, layout.header, layout.first_row) for one in (cells, *further_cells(further, layout))]
+    head, sheets = head_of(cells, layout), {answers.sheet or "": cells}
+    if answers.sheet is None:
+        layout, sheets = whole(path, layout, cells)
+    of_layout = (*sheets.values(), *further_cells(further, layout, head))
+    tables = [as_table(one, layout.header, layout.first_row) for one in of_layout]
+    read_sheets = tuple(filter(None, sheets))
     table = joined(tables)
     unit_line = _unit_line(cells.rows, cells.lines, layout, table)
     time = find_time(dict(table.columns))
@@ -133,12 +141,8 @@ def propose(
     matches = names.side_by_side(names.find_matches(labels, unit_line))
     compartment = chosen_compartment(matches, answers, draft.questions)
     names.check_given(answers.columns, labels)
-    others = other_sheets(path, layout.sheet) if layout.sheet is not None and answers.sheet is None else []
-    if others:
-        draft.notes.append(
-            f"sheet {layout.sheet!r} alone is read; {', '.join(map(repr, others[:4]))}{', ...' * (len(others) > 4)} "
-            "have readings too: --sheet reads another; each saved as a CSV in one folder, they are read together"
-        )
+    if answers.sheet is None and read_sheets:
+        draft.notes += filter(None, [unread(path, read_sheets)])
     body = _Body(table, labels, long, layout.decimal)
     assigned = names.assign(matches, compartment, answers.columns)
     mapped, units = _mapped(body, assigned, site, answers, draft)
@@ -179,6 +183,7 @@ def propose(
         layout,
         mapping,
         tuple(tables),
+        read_sheets,
         units,
         frozenset(answers.units),
         unused,

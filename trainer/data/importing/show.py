@@ -9,6 +9,7 @@ from dataclasses import fields
 import numpy as np
 
 from igrow.core.quantities import CLIMATE, QUANTITIES, WEATHER
+from igrow.trainer.data.cells import is_text
 from igrow.trainer.data.grid import own_step
 from igrow.trainer.data.importing.check import Checked
 from igrow.trainer.data.importing.proposal import Proposal
@@ -29,7 +30,7 @@ def understood(proposal: Proposal, checked: Checked) -> list[str]:
     line = "times across, column" if layout.transposed else "line"
     names = f"names in {line} {' and '.join(map(str, layout.header))}"
     units = f", units in {line.rsplit(maxsplit=1)[-1]} {layout.units}" if layout.units else ""
-    kind = f"sheet {layout.sheet!r}" if layout.sheet else f"{layout.encoding}, {_shown(layout.delimiter)} between cells"
+    kind = _kind(proposal)
     lines.append(f"layout: {kind}, decimal {_shown(layout.decimal)}, {names}{units}")
     day = (
         mapping.time.column
@@ -116,3 +117,15 @@ def _value(value: object) -> str:
     if isinstance(value, dict):
         return "{" + ", ".join(f"{_value(name)}: {_value(one)}" for name, one in value.items()) + "}"
     return json.dumps(value, ensure_ascii=False)
+
+
+def _kind(proposal: Proposal) -> str:
+    """Return which sheets of a workbook are read, or how a text is written."""
+    sheets, layout = proposal.sheets, proposal.layout
+    if len(sheets) > 1:
+        return f"{len(sheets)} sheets, {sheets[0]!r} to {sheets[-1]!r}"
+    if sheets:
+        return f"sheet {sheets[0]!r}"
+    if not is_text(proposal.path):
+        return "Parquet" if proposal.path.suffix.lower() == ".parquet" else "a workbook"
+    return f"{layout.encoding}, {_shown(layout.delimiter)} between cells"
