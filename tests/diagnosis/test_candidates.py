@@ -170,3 +170,9 @@ def test_a_pipe_sensor_can_be_off_in_a_house_without_a_grow_pipe(record: Record)
     none = replace(one, missing=(*one.missing, "rail_pipe_temperature"))
     assert sensitivity.is_measured(one, offset)
     assert not sensitivity.is_measured(none, offset)
+
+
+def test_a_leak_may_be_hidden_where_the_log_has_no_wind_and_not_where_it_has(line: Linearisation) -> None:
+    blind = replace(line, record=replace(line.record, missing=(*line.record.missing, "wind_speed", "wind_direction")))
+    assert candidates.hidden_by_missing_weather(line) == ()
+    assert candidates.hidden_by_missing_weather(blind) == ("wind_infiltration",)

@@ -124,6 +124,17 @@ def test_the_report_is_one_page_that_fetches_nothing(leak: Diagnosis, tmp_path: 
     assert document == leak.to_json()
 
 
+def test_without_wind_a_leak_is_among_what_it_could_be_whatever_is_named(leaky_log: Log) -> None:
+    """Vents that do not close were named alone, in other such logs sensors of humidity and temperature."""
+    lacking = {"wind_speed", "outdoor_humidity", "co2_dosing"}
+    kept = [name for name in leaky_log.telemetry.columns if name not in lacking]
+    result = diagnose(prepare_log(leaky_log.telemetry.only(kept), SITE), model_in_force())
+    assert result.verdict == "ambiguous"
+    assert all("wind_infiltration" in one.confounded[1:] for one in result.findings)
+    assert "calm with a windy night" in result.findings[0].separating_test
+    assert "it could be wind_infiltration" in result.summary()
+
+
 def test_an_effect_that_is_taken_out_is_not_named(leaky_log: Log) -> None:
     result = diagnose(leaky_log, model_in_force(), without=["wind_infiltration"])
     assert "wind_infiltration" not in [one.effect for one in result.findings]

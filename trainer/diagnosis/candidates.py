@@ -232,6 +232,22 @@ def _is_visible(line: Linearisation, column: Floats) -> bool:
     return bool(np.any(np.abs(column[line.runs.weight]) > _VISIBLE))
 
 
+def hidden_by_missing_weather(line: Linearisation) -> tuple[str, ...]:
+    """Return the effects that may be what another cause is named for, as the log lacks the weather that they follow.
+
+    A leak that grows with the wind makes the air colder and drier. Where the log has no wind, a sensor that is off or a
+    vent that does not close is the best that is left. They are those that every model has to some extent, as a
+    parameter (`Effect.resembles`): any greenhouse may have come by more of it.
+    """
+    found = [
+        Candidate(effect.name, tuple((shape.name, shape.typical) for shape in effect.shapes))
+        for effect in EFFECTS.values()
+        if effect.resembles and effect.drivers[0] in WEATHER and effect.drivers[0] in line.record.missing
+    ]
+    columns = _columns(line, found)
+    return tuple(one.effect for one, column in zip(found, columns, strict=True) if _is_visible(line, column))
+
+
 def _is_blind(line: Linearisation, effect: Effect) -> bool:
     """Tell whether the log lacks a driver for which nothing can stand in.
 

@@ -19,6 +19,7 @@ from igrow.trainer.data.log import Log
 from igrow.trainer.data.splits import split_days
 from igrow.trainer.diagnosis import freerun, history, sensitivity, wording
 from igrow.trainer.diagnosis.actuators import REPLACEABLE, Completed, complete
+from igrow.trainer.diagnosis.candidates import hidden_by_missing_weather
 from igrow.trainer.diagnosis.correction import Corrected, LogDays, Stage, correct, corrected_model, with_parameter
 from igrow.trainer.diagnosis.design import prepare
 from igrow.trainer.diagnosis.drift import Drift
@@ -94,6 +95,8 @@ def diagnose(
     search = search_of(days, site, model, knowledge, hidden, rules, nuisance, drift)
     say("searching for causes")
     first, last, found = search.run(rng)
+    rivals = hidden_by_missing_weather(first.design.line)
+    found = [replace(one, confounded=(*one.confounded, *rivals)) for one in found]
     # A parameter can stand in for an actuator that the log lacks, found or not.
     lacking = not set(REPLACEABLE).isdisjoint(logged.record.missing)
     parameter = None if lacking else search.changed_parameter(rng)
