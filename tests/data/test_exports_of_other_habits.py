@@ -200,6 +200,49 @@ def test_sheets_of_the_same_times_or_of_other_columns_are_named_and_not_joined(
     assert "alone is read" not in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(
+    ("am", "pm", "form"),
+    [
+        ("a.\u00a0m.", "p.\u00a0m.", "{} {}"), ("vorm.", "nachm.", "{} {}"), ("VM", "NM", "{} {}"),
+        ("上午", "下午", "{1} {0}"), ("午前", "午後", "{1}{0}"), ("오전", "오후", "{1} {0}"), ("πμ", "μμ", "{} {}"),
+        ("da manhã", "da tarde", "{} {}"),
+        ("AM", "PM", "{1} {0}"), ("fm", "em", "{1} {0}"),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("columns", [1, 2])
+def test_the_halves_of_the_day_are_read_in_other_languages(
+    tmp_path: Path, log: Telemetry, am: str, pm: str, form: str, columns: int
+) -> None:
+    """A column of `01:30 nachm.` was taken for one of compartments."""
+    frame, when = written(log, PLAIN).drop(columns="Time"), local(log)
+    hours = [form.format(f"{one:%I:%M}", am if one.hour < 12 else pm) for one in when]
+    if columns == 2:
+        frame.insert(0, "Hour", hours)
+        frame.insert(0, "Date", when.strftime("%d-%m-%Y"))
+    else:
+        frame.insert(0, "Time", [f"{day} {hour}" for day, hour in zip(when.strftime("%d-%m-%Y"), hours, strict=True)])
+    frame.to_csv(tmp_path / "export.csv", index=False)
+    assert imported(tmp_path, "--date-order", "dmy") == 0
+    assert_reads_as(tmp_path, log)
+
+
+def test_a_clock_from_0_to_11_has_its_noon(tmp_path: Path, log: Telemetry) -> None:
+    frame, when = written(log, PLAIN), local(log)
+    frame["Time"] = [f"{one:%Y/%m/%d} {('午前', '午後')[one.hour >= 12]}{one.hour % 12}:{one:%M}" for one in when]
+    frame.to_csv(tmp_path / "export.csv", index=False)
+    assert imported(tmp_path) == 0
+    assert_reads_as(tmp_path, log)
+
+
+def test_times_of_day_with_a_word_that_nobody_knows_are_named(tmp_path: Path, log: Telemetry, capsys) -> None:
+    frame, when = written(log, PLAIN).drop(columns="Time"), local(log)
+    frame.insert(0, "Hour", [f"{one:%I:%M} {('asubuhi', 'jioni')[one.hour >= 12]}" for one in when])
+    frame.insert(0, "Date", when.strftime("%d-%m-%Y"))
+    frame.to_csv(tmp_path / "export.csv", index=False)
+    assert imported(tmp_path) == 2
+    assert "'Hour' has times of day with a word that is not known, such as '01:00 asubuhi'" in capsys.readouterr().err
+
+
 def test_of_a_reading_that_is_missing_at_fixed_places_no_other_moves(tmp_path: Path, log: Telemetry) -> None:
     frame = written(log, TERSE, "%Y-%m-%dT%H:%M").astype(object)
     frame.iloc[100:110, 3] = ""

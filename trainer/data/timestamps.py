@@ -14,6 +14,7 @@ import numpy as np
 
 from igrow.core.arrays import Times
 from igrow.core.local_time import from_local
+from igrow.trainer.data.day_halves import with_english_halves
 from igrow.trainer.data.vocabulary import folded, month_names, weekday_names
 from igrow.trainer.data.zone_abbreviations import ahead_of_utc, split
 
@@ -122,6 +123,7 @@ def dates_alone(texts: Sequence[str]) -> set[int]:
 
     They head a day, or stand before its mean or its sum.
     """
+    texts = [with_english_halves(text) for text in texts]
     clocked = [found[1] for text in texts if (found := _CLOCKED.match(text)) is not None]
     if len(clocked) < 0.5 * len(texts) or not any(map(_MIDNIGHT.search, texts)):
         return set()
@@ -158,7 +160,7 @@ def _formatted(text: str, form: str) -> datetime.datetime:
         text = with_english_months(text)
         form = re.sub(r"%b\.", "%b", form)
     if "%p" in form:
-        text = re.sub(r"\b([ap])\.\s?m\.?", r"\1m", text, flags=re.IGNORECASE)
+        text = with_english_halves(text)
     try:
         return datetime.datetime.strptime(text, form)
     except ValueError:

@@ -71,6 +71,12 @@ def weekday_names() -> frozenset[str]:
 
 
 @cache
+def halves_of_day() -> Mapping[str, str]:
+    """Return ``am`` or ``pm`` for each word that stands for it."""
+    return {word: half for half, words in _table()["halves"].items() for word in words}
+
+
+@cache
 def zone_hours() -> Mapping[str, float]:
     """Return the hours ahead of UTC of the abbreviations that are of one zone alone."""
     return {name: float(hours) for name, hours in _table()["zones"]["hours"].items()}

@@ -9,7 +9,8 @@ from collections.abc import Callable, Sequence
 from igrow.core.errors import IgrowError
 from igrow.trainer.data import vocabulary
 from igrow.trainer.data.cells import Cells
-from igrow.trainer.data.importing.time_format import is_clock, looks_like_time, parts_of_time, spread
+from igrow.trainer.data.importing.odd_times import parts_of_time, spread
+from igrow.trainer.data.importing.time_format import is_clock, looks_like_time
 from igrow.trainer.data.mapping import MISSING
 
 _SAMPLE = 400

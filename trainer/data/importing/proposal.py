@@ -19,17 +19,11 @@ from igrow.trainer.data.importing.error_codes import MEASURED, error_codes
 from igrow.trainer.data.importing.folder import further_cells, head_of, joined, whole
 from igrow.trainer.data.importing.layout import Layout, find_layout
 from igrow.trainer.data.importing.long_table import find_long, units_beside
+from igrow.trainer.data.importing.odd_times import what_is_odd
 from igrow.trainer.data.importing.question import Answers, Question
 from igrow.trainer.data.importing.sheets import unread
 from igrow.trainer.data.importing.texts import ColumnTexts, column_texts
-from igrow.trainer.data.importing.time_format import (
-    TimeForm,
-    find_time,
-    half_of_day,
-    parts_of_time,
-    spread,
-    why_none,
-)
+from igrow.trainer.data.importing.time_format import TimeForm, find_time
 from igrow.trainer.data.importing.told_units import like_the_others, unit_of_cells
 from igrow.trainer.data.importing.zone import find_zone, zones_asked
 from igrow.trainer.data.mapping import MISSING, ColumnMapping, ExportMapping, LongTable, TimeColumn
@@ -117,15 +111,9 @@ def propose(
     table = joined(tables)
     unit_line = _unit_line(cells.rows, cells.lines, layout, table)
     time = find_time(dict(table.columns))
-    if time is None:
-        raise IgrowError(f"{path}: {why_none(dict(table.columns))}")
-    parts = [one for one in parts_of_time(table.columns) if one not in (time.column, time.time_of_day)]
-    if time.form.endswith("%H") and parts:
-        raise IgrowError(f"{path}: {spread((time.column, str(time.time_of_day), *parts))}")
-    half = half_of_day(dict(table.columns))
-    if half is not None and "%p" not in time.form:
-        columns = [one for one in (time.column, time.time_of_day, half) if one is not None]
-        raise IgrowError(f"{path}: {spread(columns)}")
+    odd = what_is_odd(table.columns, time)
+    if odd is not None or time is None:
+        raise IgrowError(f"{path}: {odd}")
     time = _ordered(time, answers, draft)
     table = readings(table, TimeColumn(time.column, time.time_of_day, time.form))[0]
     long = find_long(table, (time.column, time.time_of_day), layout.decimal)

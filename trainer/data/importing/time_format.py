@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import datetime
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from igrow.trainer.data import vocabulary
+from igrow.trainer.data.day_halves import with_english_halves
 from igrow.trainer.data.timestamps import (
     EXCEL,
     ISO,
@@ -29,15 +30,13 @@ _LEAST_READ = 0.98
 """Share of a column's texts that a form must read."""
 _LEAST_DATED = 0.8
 """Share of a column's texts that have a digit, if it is a time."""
-_CLOCK = re.compile(r"\d{1,2}[:.h]\d{2}([:.]\d{2})?([.,]\d+)?(\s?[ap]\.?\s?m\.?)?(\s?(uhr|hrs?|hs?|u))?", re.IGNORECASE)
+_CLOCK = re.compile(r"\d{1,2}[:.h]\d{2}([:.]\d{2})?([.,]\d+)?(\s?[ap]m)?(\s?(uhr|hrs?|hs?|u))?", re.IGNORECASE)
 _DATE = re.compile(
     r"(\d{1,4}[-/.年]\s?\d{1,2}[-/.月]\s?\d{1,4}日?|\d{8}|(?:19|20)\d\d-[0-3]\d\d|\d{1,2}[-\s.]+[^\W\d_]{3,}\.?[-\s]+\d{2,4}|"
     r"[^\W\d_]{3,}\.?\s+\d{1,2},?\s+\d{4})(\D.*)?"
 )
 _COMPACT = re.compile(r"(19|20)\d\d(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])([01]\d|2[0-4])[0-5]\d([0-5]\d)?")
 """Year to minute or second without a sign between them."""
-_PARTS = ("year", "month", "day", "day_of_year", "hour", "minute")
-_HALF = re.compile(r"[ap]\.?\s?m\.?", re.IGNORECASE)
 _TOKEN = re.compile(r"\d+|[^\W\d_]+|[^\w]+|_")
 
 
@@ -71,7 +70,12 @@ def looks_like_time(text: str) -> bool:
 
 def is_clock(text: str) -> bool:
     """Tell whether a cell is a time of day."""
-    return _CLOCK.fullmatch(text) is not None
+    return _CLOCK.fullmatch(with_english_halves(text)) is not None
+
+
+def has_clock(text: str) -> bool:
+    """Tell whether a cell has a time of day in it."""
+    return re.search(r"(?<!\d)\d{1,2}:\d{2}(?!\d)", text) is not None
 
 
 def find_time(columns: dict[str, Sequence[str]]) -> TimeForm | None:
@@ -98,36 +102,6 @@ def find_time(columns: dict[str, Sequence[str]]) -> TimeForm | None:
                     continue
         found.append((likely, _best(name, None, forms, texts)))
     return max(found, key=lambda one: one[0])[1] if found else None
-
-
-def half_of_day(columns: dict[str, Sequence[str]]) -> str | None:
-    """Return the column that tells the half of the day alone, AM or PM, or None where there is none."""
-    return next((name for name, texts in columns.items() if _all_halves([text for text in texts if text])), None)
-
-
-def _all_halves(texts: Sequence[str]) -> bool:
-    return bool(texts) and all(_HALF.fullmatch(text) for text in set(texts))
-
-
-def parts_of_time(names: Iterable[str]) -> tuple[str, ...]:
-    """Return the names of columns that hold the year, the month, the day, the hour or the minute alone."""
-    parts = [word for kind in _PARTS for word, _ in vocabulary.time_words(kind)]
-    return tuple(name for name in names if vocabulary.folded(name) in parts)
-
-
-def spread(parts: Sequence[str]) -> str:
-    """Return what is said of a time that stands in so many columns."""
-    return f"its time stands in {len(parts)} columns ({', '.join(parts)}): join them in one, such as 2020-02-01 13:30"
-
-
-def why_none(columns: dict[str, Sequence[str]]) -> str:
-    """Return why no column of a table is a time, in a line."""
-    for name, texts in columns.items():
-        first, *rest = [text for text in texts if text] or [""]
-        strange = next((text for text in rest if not looks_like_time(text)), None)
-        if first and looks_like_time(first) and strange is not None:
-            return f"no column is a time: {name!r} begins with {first!r}, but has {strange!r} too"
-    return f"no column is a time; it has {', '.join(columns)}"
 
 
 def _sample(texts: Sequence[str]) -> list[str]:
@@ -209,7 +183,7 @@ def _reads(texts: Sequence[str], form: str) -> bool:
 
 def _written_forms(texts: Sequence[str]) -> list[str]:
     """Return the strptime forms that the first text may have, by the order of day, month and year."""
-    tokens = _TOKEN.findall(with_english_months(without_weekday(texts[0])))
+    tokens = _TOKEN.findall(with_english_halves(with_english_months(without_weekday(texts[0]))))
     numbers = [position for position, token in enumerate(tokens) if token.isdigit()]
     months = [p for p, token in enumerate(tokens) if vocabulary.folded(token) in vocabulary.month_names()]
     if numbers and len(tokens[numbers[0]]) == 8:
@@ -240,9 +214,7 @@ def _written_forms(texts: Sequence[str]) -> list[str]:
 def _clock_after(tokens: Sequence[str], start: int, form: str) -> str | None:
     """Return a form with the time of day that follows the date, or None for what is no time of day."""
     signs = iter(("%H", "%M", "%S", "%f"))
-    rest = re.sub(r"([ap])\.\s?m\.?", r"\1m", "".join(tokens[start:]), flags=re.IGNORECASE)
-    tokens, start = _TOKEN.findall(rest), 0
-    half = any(re.fullmatch(r"[ap]m", token, re.IGNORECASE) for token in tokens)
+    half = any(re.fullmatch(r"[ap]m", token, re.IGNORECASE) for token in tokens[start:])
     compact = [token for token in tokens[start:] if token.isdigit()]
     if len(compact) == 1 and len(compact[0]) in (4, 6):
         signs = iter(("%H%M" if len(compact[0]) == 4 else "%H%M%S",))
