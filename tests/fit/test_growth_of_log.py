@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from igrow.core.local_time import to_local
 from igrow.core.simulator.crop import CropStages
 from igrow.core.simulator.growth import GrowthFit, prior_of
 from igrow.core.site import Crop
@@ -62,6 +63,18 @@ def test_weekly_counts_of_growth_tell_how_fast_the_crop_grows(telemetry: Telemet
     assert expected == pytest.approx(grown(telemetry, before)[-1], rel=0.05)
     assert stages.covariance is not None
     assert stages.covariance[0, 0] < prior_of(before)[0, 0]
+
+
+def test_a_total_of_every_hour_is_read_from_midnight_to_midnight(telemetry: Telemetry, before: CropStages) -> None:
+    """Read at noon, each day's growth stood beside the light of half another day: light seemed to be worth little."""
+    running = grown(telemetry, before)
+    first, _ = growth_days(prepare_log(telemetry, SITE).record(), PARAMETERS, SITE.time_zone)
+    since = (to_local(telemetry.time, SITE.time_zone) - first) / np.timedelta64(1, "D")
+    each_hour = np.interp(since, np.arange(len(running) + 1), np.append(0.0, running))
+    counts = counts_of(telemetry.with_columns({"net_growth": each_hour}), None, first, len(running), SITE.time_zone)
+    inner = counts[1:-1]
+    assert [one.first for one in inner] == list(range(1, len(inner) + 1))
+    np.testing.assert_allclose([one.amount for one in inner], np.diff(running)[: len(inner)], rtol=0.02)
 
 
 def test_a_log_that_counts_nothing_leaves_what_is_known_of_other_crops_and_says_so(

@@ -154,11 +154,13 @@ def counts_of(
     for name, kind in (("net_growth", "grown"), ("fruit_fresh_weight", "picked")):
         known = np.isfinite(table.columns.get(name, np.empty(0)))
         if known.sum() > 1:
-            # A value belongs to the end of the day before it, or to the beginning of its own, whichever is nearer.
-            local = to_local(table.time[known], time_zone)
-            at = np.round((local - first) / np.timedelta64(1, "D")).astype(np.int64)
-            last = np.append(np.flatnonzero(np.diff(at)), len(at) - 1)
-            return _between(at[last], table[name][known][last], kind, days)
+            # A value belongs to the end of the day before it, or to the beginning of its own, whichever is nearer; of
+            # those that belong to one midnight, to which a total of every minute has a thousand, the nearest counts.
+            local = (to_local(table.time[known], time_zone) - first) / np.timedelta64(1, "D")
+            at = np.round(local).astype(np.int64)
+            nearest = np.lexsort((np.abs(local - at), at))
+            midnights, place = np.unique(at[nearest], return_index=True)
+            return _between(midnights, table[name][known][nearest[place]], kind, days)
     if harvests is None or "class_a" not in harvests:
         return []
     picked = np.nan_to_num(harvests["class_a"])
