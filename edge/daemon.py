@@ -142,6 +142,9 @@ class Daemon:
         self._earlier = None
         try:
             remember(control, earlier.result())
+        except IgrowError as error:
+            text = "what was set by hand before the start cannot be read, so all setpoints are left as they stand"
+            self._leave_all_alone(control, f"{text}: {error}")
         except Exception:
             text = "what was noted before the start makes no sense, so all setpoints are left as they stand"
             log.exception("%s", text)

@@ -29,8 +29,6 @@ class Ledger:
         self._files = tuple(LedgerFile(folder / name, max_bytes=max_bytes, synchronous=synchronous) for name in NAMES)
         self._reserve = folder / "reserve.bin"
         self._since_reserve = 0
-        self.reports: list[str] = []
-        """What was cured since the owner last emptied this list, one line each."""
         self._next = 1
         self._numbered = False
         """The files have told their last sequence number; until then numbers are provisional."""
@@ -43,7 +41,23 @@ class Ledger:
         if all(file.problem for file in self._files):
             count = max(len(file.waiting) for file in self._files)
             return f"{count} events wait in memory: {self._files[0].problem}"
-        return next((f"one copy of the events fails: {f.problem}" for f in self._files if f.problem), "")
+        problems = (file.problem or file.taken_away for file in self._files)
+        return next((f"one copy of the events fails: {problem}" for problem in problems if problem), "")
+
+    @property
+    def unreadable(self) -> str:
+        """Empty where what was noted before can be read, or nothing was; else one line."""
+        if not all(file.problem for file in self._files):
+            return ""
+        try:
+            there = any(file.path.exists() for file in self._files)
+        except OSError:
+            there = True
+        return self._files[0].problem if there else ""
+
+    def take_reports(self) -> list[str]:
+        """Return what was cured since this was last asked for, one line each."""
+        return [text for file in self._files for text in file.take_reports()]
 
     def add(self, category: str, time: float | None, body: Mapping[str, object]) -> None:
         """Write one record to both files."""
@@ -70,7 +84,7 @@ class Ledger:
         file = min(self._files, key=lambda candidate: (bool(candidate.problem), len(candidate.waiting)))
         for line in reversed([line for line in file.waiting if line[1] == category]):
             yield record_of(line)
-        with suppress(sqlite3.Error):
+        with suppress(sqlite3.Error, OSError):
             yield from newest_in(file.open(), category)
 
     def last_time(self) -> float | None:
@@ -126,7 +140,7 @@ class Ledger:
         (twin,) = (other for other in self._files if other is not file)
         lines = all_lines(twin)
         file.insert(lines)
-        self.reports.append(
+        file.report(
             f"{file.path.name} was damaged ({describe(error)}); set aside as {aside.name}, "
             f"{len(lines)} records restored from {twin.path.name}"
         )

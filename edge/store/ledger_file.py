@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from igrow.edge.store.database import Synchronous, open_database
+from igrow.edge.store.database_file import DatabaseFile
 
 SCHEMA = """
 CREATE TABLE IF NOT EXISTS records (
@@ -39,34 +40,27 @@ class Record:
 Line = tuple[int, str, float | None, str]
 
 
-class LedgerFile:
+class LedgerFile(DatabaseFile):
     """One of the twins."""
 
     def __init__(self, path: Path, *, max_bytes: int, synchronous: Synchronous) -> None:
-        self.path = path
+        super().__init__(path)
         self._max_bytes = max_bytes
         self._synchronous: Synchronous = synchronous
-        self._connection: sqlite3.Connection | None = None
         self.waiting: deque[Line] = deque(maxlen=WAITING)
         self.problem = ""
 
     def open(self) -> sqlite3.Connection:
         """Return the connection; raises sqlite3.Error, OSError."""
-        if self._connection is None:
-            self._connection = open_database(
+        return self.in_place() or self.use(
+            open_database(
                 self.path,
                 max_bytes=self._max_bytes,
                 synchronous=self._synchronous,
                 schema=SCHEMA,
                 log_pages=LOG_PAGES,
             )
-        return self._connection
-
-    def close(self) -> None:
-        """Let go of the file; `open` takes it again."""
-        if self._connection is not None:
-            self._connection.close()
-        self._connection = None
+        )
 
     def number_after(self, last: int) -> None:
         """Move the numbers of what waits behind those that the files have."""

@@ -92,6 +92,7 @@ class SqliteStore:
             if not self._batch:
                 return
             try:
+                self.folder.mkdir(parents=True, exist_ok=True)
                 # The last free space belongs to the ledger.
                 if shutil.disk_usage(self.folder).free < RESERVE_BYTES:
                     raise OSError("the disk is full")
@@ -158,8 +159,10 @@ class SqliteStore:
             return found[::-1]
 
     def earlier(self, log_seconds: float) -> Earlier:
-        """Return what an earlier run has left, with the log of so many seconds before its end."""
+        """Return what an earlier run has left, with the log of so many seconds before its end; raises StoreError."""
         with self._lock:
+            if why := self._ledger.unreadable:
+                raise StoreError(f"{self.folder}: {why}")
             time = self._ledger.last_time()
             end = 0.0 if time is None else time + DAY
             # A day more on both sides: rows are committed before and after records are.
@@ -188,7 +191,7 @@ class SqliteStore:
     @property
     def health(self) -> str:
         """Empty when all is well, else one line that says what is not."""
-        return "; ".join(filter(None, (self._ledger.problem, self._problem)))
+        return "; ".join(filter(None, (self._ledger.problem, self._problem or self._telemetry.taken_away)))
 
     def close(self) -> None:
         """Commit what is held and close."""
@@ -204,9 +207,7 @@ class SqliteStore:
 
     def _report(self) -> None:
         """Turn what the files cured by themselves into events."""
-        reports = self._telemetry.reports + self._ledger.reports
-        self._telemetry.reports, self._ledger.reports = [], []
-        for text in reports:
+        for text in self._telemetry.take_reports() + self._ledger.take_reports():
             self._ledger.add("event", None, {"kind": "store_repaired", "detail": {"text": text}})
             log_event("store_repaired", {"text": text})
 

@@ -20,6 +20,7 @@ from igrow.edge.store.database import (
     open_database,
     set_aside,
 )
+from igrow.edge.store.database_file import DatabaseFile
 from igrow.edge.store.packing import Row, unpack_good
 
 SCHEMA = """
@@ -34,17 +35,14 @@ _SALVAGE_TRIES = 4096
 """Ranges of time that are looked at in a damaged file."""
 
 
-class TelemetryFile:
+class TelemetryFile(DatabaseFile):
     """One SQLite file of telemetry. Methods raise sqlite3.Error for what they could not cure themselves."""
 
     def __init__(self, path: Path, *, max_bytes: int, synchronous: Synchronous) -> None:
-        self.path = path
+        super().__init__(path)
         self._max_bytes = max_bytes
         self._synchronous: Synchronous = synchronous
-        self._connection: sqlite3.Connection | None = None
         self._layouts: dict[tuple[str, ...], int] = {}
-        self.reports: list[str] = []
-        """What was cured since the owner last emptied this list, one line each."""
 
     def add(self, rows: Sequence[Row]) -> None:
         """Commit rows together; one of a time that is there already, after a clock stepped back, goes right behind it.
@@ -75,21 +73,19 @@ class TelemetryFile:
 
     def close(self) -> None:
         """Close; the next call opens again."""
-        if self._connection is not None:
-            self._connection.close()
-        self._connection = None
+        super().close()
         self._layouts = {}
 
     def _open(self) -> sqlite3.Connection:
-        if self._connection is None:
-            try:
-                self._connection = self._connect()
-            except sqlite3.Error as error:
-                if not is_damage(error):
-                    raise
-                self._start_over(error)
-        assert self._connection is not None
-        return self._connection
+        if connection := self.in_place():
+            return connection
+        self._layouts = {}
+        try:
+            return self.use(self._connect())
+        except sqlite3.Error as error:
+            if not is_damage(error):
+                raise
+            return self._start_over(error)
 
     def _connect(self) -> sqlite3.Connection:
         return open_database(self.path, max_bytes=self._max_bytes, synchronous=self._synchronous, schema=SCHEMA)
@@ -143,7 +139,7 @@ class TelemetryFile:
         connection.execute("PRAGMA incremental_vacuum").fetchall()
         return True
 
-    def _start_over(self, error: sqlite3.Error) -> None:
+    def _start_over(self, error: sqlite3.Error) -> sqlite3.Connection:
         """Set the damaged file aside and carry over what can still be read."""
         self.close()
         try:
@@ -151,11 +147,10 @@ class TelemetryFile:
         except OSError as failure:
             # A disk that refuses the rename is read-only or gone: the owner keeps rows in memory and retries.
             raise sqlite3.OperationalError(f"{self.path}: {failure.strerror}") from error
-        self._connection = self._connect()
-        saved = salvage(aside, self._connection)
-        self.reports.append(
-            f"{self.path.name} was damaged ({describe(error)}); set aside as {aside.name}, {saved} rows saved"
-        )
+        connection = self.use(self._connect())
+        saved = salvage(aside, connection)
+        self.report(f"{self.path.name} was damaged ({describe(error)}); set aside as {aside.name}, {saved} rows saved")
+        return connection
 
 
 def read_file(path: Path, start: int, end: int) -> Telemetry:

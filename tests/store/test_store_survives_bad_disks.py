@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import random
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -107,6 +108,30 @@ def test_only_the_two_newest_damaged_files_are_kept(tmp_path: Path) -> None:
         "telemetry.db.corrupt-4",
         "telemetry.db.corrupt-5",
     ]
+
+
+@pytest.mark.parametrize("how", ["removed", "moved", "another"])
+def test_files_that_are_taken_away_while_in_use_are_written_anew_with_their_rows(tmp_path: Path, how: str) -> None:
+    folder = tmp_path / "store"
+    store = SqliteStore(folder)
+    for index in range(100):
+        store.append(START + 5 * index, values(20.0))
+    store.record_event(START, "before", {})
+    store.flush()
+    if how == "removed":
+        shutil.rmtree(folder)
+    else:
+        folder.rename(tmp_path / "away")
+    if how == "another":
+        fill(folder, rows=3, events=300)
+    store.append(START + 1000.0, values(21.0))
+    store.flush()
+    store.record_event(START, "after", {})
+    store.close()
+    again = SqliteStore(folder)
+    assert sorted(kinds(again)) == ["after", "before", "store_repaired", "store_repaired", "store_repaired"]
+    assert len(again.telemetry(START, START + 1e6)) == 101
+    assert again.health == ""
 
 
 def test_a_full_disk_keeps_events_safe_and_telemetry_waiting(tmp_path: Path) -> None:
