@@ -14,9 +14,10 @@ import numpy as np
 
 from benchmarks.builder import QUANTITIES, SHARED_DAYS, START, asked_for, site_of
 from igrow.core.greenhouse import GreenhouseParameters, generate_weather, recipe, simulate_many
+from igrow.trainer.calibration import calibrate
 from igrow.trainer.data import Log, prepare_log
 from igrow.trainer.diagnosis import learned_from
-from igrow.trainer.fit import calibrate, evaluate
+from igrow.trainer.fit import evaluate
 from igrow.trainer.fit.population import Population, learn_population
 
 FIRST_DAYS = (8, 14)

@@ -18,10 +18,11 @@ from benchmarks.builder import QUANTITIES, SHARED_DAYS, START, asked_for, site_o
 from benchmarks.diagnosis.nurseries import DRIFT
 from igrow.core.greenhouse import GreenhouseParameters, HiddenEffect, generate_weather, recipe, simulate_many
 from igrow.core.greenhouse.tomato import Crop
+from igrow.trainer.calibration import calibrate
 from igrow.trainer.data import Log, prepare_log
 from igrow.trainer.diagnosis import Diagnosis, change_since, diagnose, drift, learned_from
 from igrow.trainer.diagnosis.drift import Drift, Pair
-from igrow.trainer.fit import FittedModel, calibrate
+from igrow.trainer.fit import FittedModel
 from igrow.trainer.fit.population import Population, learn_population
 
 LATER_DAYS = 28

@@ -21,10 +21,11 @@ from typing import TYPE_CHECKING, Any
 from igrow import __version__
 
 if TYPE_CHECKING:
+    from igrow.trainer.calibration import calibrate
     from igrow.trainer.data import Log, prepare_log, read_log
     from igrow.trainer.diagnosis import diagnose
     from igrow.trainer.exporting import export, read_model
-    from igrow.trainer.fit import FittedModel, calibrate
+    from igrow.trainer.fit import FittedModel
     from igrow.trainer.publishing import publish
     from igrow.trainer.scoring.comparison import Comparison, compare
 
@@ -32,7 +33,7 @@ _PLACES = {
     "Comparison": "igrow.trainer.scoring.comparison",
     "FittedModel": "igrow.trainer.fit",
     "Log": "igrow.trainer.data",
-    "calibrate": "igrow.trainer.fit",
+    "calibrate": "igrow.trainer.calibration",
     "compare": "igrow.trainer.scoring.comparison",
     "diagnose": "igrow.trainer.diagnosis",
     "export": "igrow.trainer.exporting",

@@ -22,10 +22,10 @@ from igrow.core.simulator.crop import CropStages
 from igrow.core.simulator.hybrid.nominal import site_record
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
+from igrow.trainer.calibration import calibrate
 from igrow.trainer.data import prepare_log
 from igrow.trainer.exporting.plan import RANGED
 from igrow.trainer.fit.actuation import fit_actuation, setpoint_columns
-from igrow.trainer.fit.calibrate import calibrate
 from igrow.trainer.fit.model import FittedModel, training_envelope
 from igrow.trainer.training.crop import fit_net_growth, train_networks
 

@@ -24,8 +24,8 @@ from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import prepare_log
 from igrow.trainer.diagnosis import change, drift, history, linear, search, sharing
 from igrow.trainer.diagnosis.design import Design
-from igrow.trainer.diagnosis.diagnose import log_days
 from igrow.trainer.diagnosis.drift import Drift, Pair
+from igrow.trainer.diagnosis.freerun import log_days
 from igrow.trainer.diagnosis.rounds import laid_out
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.fit.gaussian import Gaussian

@@ -18,11 +18,12 @@ from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
 from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
+from igrow.trainer.calibration import calibrate
 from igrow.trainer.data import prepare_log
 from igrow.trainer.data.splits import split_days
-from igrow.trainer.diagnosis import freerun, history_of, sensitivity
+from igrow.trainer.diagnosis import DEFAULT, freerun, history_of, sensitivity
 from igrow.trainer.exporting import read_model
-from igrow.trainer.fit import FittedModel, calibrate
+from igrow.trainer.fit import FittedModel
 
 REFERENCE_DAYS = 56
 MISMATCH = 0.08
@@ -52,10 +53,11 @@ def referenced(greenhouse: VirtualGreenhouse, log: Telemetry, crop: Crop) -> Ref
     """Calibrate on the log of a greenhouse, and measure sizes; `crop` is that at its end."""
     seen = prepare_log(log, greenhouse.site)
     model = calibrate(seen)
+    record = seen.record(model.alignment or 0.0)
     if model.history is None:
         # Learned here whether or not it is asked by default.
-        model = replace(model, history=history_of(seen, model))
-    return Reference(greenhouse, model, enr_units(seen.record(model.alignment or 0.0), model), crop)
+        model = replace(model, history=history_of(record, model, DEFAULT))
+    return Reference(greenhouse, model, enr_units(record, model), crop)
 
 
 def built_in(site: Site) -> FittedModel:

@@ -30,7 +30,7 @@ from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import prepare_log
 from igrow.trainer.diagnosis import DEFAULT, NuisanceSubspace, nuisance
 from igrow.trainer.diagnosis.design import Design, prepare
-from igrow.trainer.diagnosis.diagnose import log_days
+from igrow.trainer.diagnosis.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import knowledge_of
 from igrow.trainer.diagnosis.nuisance import Direction, LogLikelihood
 from igrow.trainer.diagnosis.rules import HOUR

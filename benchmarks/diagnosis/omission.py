@@ -53,7 +53,6 @@ ON_REAL_LOGS = ("lamp_heat_share", "leakage_wind", "transpiration_night_share")
 """Parameters that are taken out on the public logs."""
 MATTERS = 1.05
 """Times by which the 24 h error of held-out weeks must rise for a term to count as one that the greenhouse has."""
-DAY = omission.HORIZONS[-1]
 CONFOUNDED = ({"co2_valve_leak", "soil_respiration"},)
 LEAST, MOST = 3.0, 8.0
 """Scores between which the bound is set."""
@@ -104,8 +103,8 @@ def calibrations(
             print(f"{name} without {parameter or 'nothing'}: {error}", file=sys.stderr)
             continue
         errors = {
-            quantity: by_horizon[DAY].mae
-            for quantity, by_horizon in evaluate(record, posterior.values, {}, (DAY,), held_out).items()
+            quantity: by_horizon[omission.DAY].mae
+            for quantity, by_horizon in evaluate(record, posterior.values, {}, (omission.DAY,), held_out).items()
         }
         whole = whole or errors
         found = None if usual is None else omission.examine(record, site, posterior, DEFAULT, usual)

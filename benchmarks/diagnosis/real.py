@@ -21,9 +21,9 @@ import numpy as np
 from benchmarks.diagnosis.logs import built_in
 from igrow.core.errors import IgrowError
 from igrow.core.site import Site
+from igrow.trainer.calibration import calibrate
 from igrow.trainer.data import Log, read_log
 from igrow.trainer.diagnosis import Diagnosis, diagnose
-from igrow.trainer.fit import calibrate
 
 COMPARTMENTS = (
     ("agc2019", "Reference"),

@@ -25,7 +25,7 @@ from igrow.core.sun import solar_hour
 from igrow.trainer.data import prepare_log
 from igrow.trainer.diagnosis import DEFAULT, linear, search
 from igrow.trainer.diagnosis.change import net_gain
-from igrow.trainer.diagnosis.diagnose import log_days
+from igrow.trainer.diagnosis.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import knowledge_of
 from igrow.trainer.diagnosis.rounds import search_of
 
@@ -117,9 +117,7 @@ def gain(one: Trial, season: Season) -> Gain:
     """Return what a log tells of its cause."""
     site, model = one.known.greenhouse.site, one.known.model
     days = log_days(prepare_log(season.measured, site), model)
-    design = search_of(
-        days, site, model, knowledge_of(model, site, DEFAULT), frozenset(), DEFAULT, None, None
-    ).resolved()
+    design = search_of(days, site, knowledge_of(model, site, DEFAULT), frozenset(), DEFAULT, None, None).resolved()
     truth = {effect.name: effect for effect in hidden(one.case, one.known.unit, one.known.greenhouse.start)}
     expected, _ = expected_gains(design, one.case, truth)
     null = linear.fit(design.grams, design.null_model())

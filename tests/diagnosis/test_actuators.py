@@ -10,7 +10,7 @@ import pytest
 from igrow.core.simulator.hybrid.nominal import site_record
 from igrow.trainer.data import Log
 from igrow.trainer.diagnosis import DEFAULT, Diagnosis, actuators, diagnose
-from igrow.trainer.diagnosis.diagnose import log_days
+from igrow.trainer.diagnosis.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import knowledge_of
 from tests.diagnosis.conftest import DAYS, STEP, greenhouse_log, model_in_force
 from tests.virtual_log import SITE

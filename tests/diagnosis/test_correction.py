@@ -12,13 +12,13 @@ from igrow.core.bundle import EffectRecord, Estimate
 from igrow.trainer.diagnosis.candidates import Candidate, Pattern
 from igrow.trainer.diagnosis.correction import (
     Corrected,
-    Stage,
     corrected_model,
     is_proven_change,
     same_in_all_regimes,
     stands,
 )
 from igrow.trainer.diagnosis.estimate import Estimated
+from igrow.trainer.diagnosis.freerun import Stage
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
 from igrow.trainer.diagnosis.linear import Term
 from igrow.trainer.diagnosis.result import Interval, OnsetInterval

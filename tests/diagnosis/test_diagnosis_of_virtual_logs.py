@@ -16,7 +16,7 @@ from igrow.trainer.data import Log, prepare_log
 from igrow.trainer.diagnosis import Diagnosis, diagnose
 from igrow.trainer.diagnosis.diagnose import newest_weeks
 from igrow.trainer.diagnosis.evidence import errors_with
-from igrow.trainer.diagnosis.knowledge import ActiveTerm
+from igrow.trainer.diagnosis.knowledge import ActiveTerm, knowledge_of
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
@@ -235,11 +235,11 @@ def test_of_a_long_log_the_newest_six_weeks_are_asked_what_has_changed(quiet_log
     middle = quiet_log.telemetry.time[0] - np.timedelta64(80, "D")
     known = Discrepancy({}, Gaussian((), np.zeros(0), np.zeros((0, 0))), {}, STEP, {}, middle)
     model = model_in_force()
-    remembering = replace(model, history=known)
+    unknown, remembering = (knowledge_of(one, SITE, DEFAULT) for one in (model, replace(model, history=known)))
     long = replace(
         quiet_log, telemetry=Telemetry(quiet_log.telemetry.time[0] + np.arange(60) * np.timedelta64(1, "D"), {})
     )
-    assert newest_weeks(long, model, DEFAULT) is long
+    assert newest_weeks(long, unknown, DEFAULT) is long
     assert newest_weeks(quiet_log, remembering, DEFAULT) is quiet_log
     newest = newest_weeks(long, remembering, DEFAULT)
     assert newest.telemetry.time[-1] == long.telemetry.time[-1]

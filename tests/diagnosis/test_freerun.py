@@ -9,7 +9,7 @@ from igrow.core.simulator.hybrid.nominal import nominal
 from igrow.trainer.data import prepare_log
 from igrow.trainer.data.splits import split_days
 from igrow.trainer.diagnosis import freerun, sensitivity
-from igrow.trainer.diagnosis.freerun import FreeRuns
+from igrow.trainer.diagnosis.freerun import FreeRuns, LogDays
 from igrow.trainer.fit import Gaussian
 from tests.virtual_log import SITE, virtual_log
 
@@ -48,8 +48,8 @@ def moved() -> tuple[dict[str, float], Gaussian]:
     record = prepare_log(virtual_log(16, seed=8, step=900.0, parameters=truth), SITE).record(0.0)
     split = split_days(record, SITE.longitude)
     prior = Gaussian.independent(known, {name: 0.6 * abs(value) + 1e-9 for name, value in known.items()})
-    days = sensitivity.day_runs(record, split.day)
-    return truth, freerun.fit_parameters(record, days, split, prior, {})
+    days = LogDays(record, split, sensitivity.day_runs(record, split.day))
+    return truth, days.fit(prior, ())
 
 
 def test_parameters_that_moved_are_found_within_their_intervals(moved: tuple[dict[str, float], Gaussian]) -> None:

@@ -13,13 +13,13 @@ from igrow.core.simulator.hybrid.nominal import nominal
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.core.simulator.hybrid.record import observe
 from igrow.core.telemetry import Telemetry, concatenate
+from igrow.trainer.calibration import calibrate
 from igrow.trainer.data import Log, prepare_log
-from igrow.trainer.diagnosis import Diagnosis, Finding, amplitudes, diagnose, history
+from igrow.trainer.diagnosis import DEFAULT, Diagnosis, Finding, amplitudes, diagnose, history
 from igrow.trainer.diagnosis.design import Design, History
-from igrow.trainer.diagnosis.diagnose import history_of
 from igrow.trainer.diagnosis.drift import Drift
 from igrow.trainer.diagnosis.parameter_change import VISIBLE, find
-from igrow.trainer.fit import FittedModel, calibrate
+from igrow.trainer.fit import FittedModel
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.report import sentences
 from igrow.trainer.report.worth import worth
@@ -113,7 +113,7 @@ def model(log: tuple[Telemetry, Telemetry]) -> FittedModel:
     plain, _ = log
     before = prepare_log(plain.select(end=plain.time[0] + np.timedelta64(KNOWN, "D")), SITE)
     fitted = calibrate(before)
-    return replace(fitted, history=history_of(before, fitted))
+    return replace(fitted, history=history.history_of(before.record(fitted.alignment or 0.0), fitted, DEFAULT))
 
 
 def later(log: tuple[Telemetry, Telemetry], begins: int) -> Log:

@@ -14,7 +14,7 @@ from igrow.core.errors import IgrowError
 from igrow.core.quantities import ACTUATORS
 from igrow.core.simulator.hybrid.nominal import nominal
 from igrow.core.telemetry import Telemetry, write_csv
-from igrow.trainer import calibrate, diagnosis, export, prepare_log, read_model
+from igrow.trainer import calibrate, calibration, export, prepare_log, read_model
 from igrow.trainer.cli import main
 from igrow.trainer.fit import FittedModel
 from igrow.trainer.fit.model import training_envelope, united
@@ -60,7 +60,9 @@ def clean(short: Telemetry) -> FittedModel:
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """The discrepancy takes half of the time, and is the same function for all."""
-    monkeypatch.setattr(diagnosis, "discrepancy_of", lambda _log, model: {"mean": float(model.posterior.mean.sum())})
+    monkeypatch.setattr(
+        calibration, "discrepancy_of", lambda _, model, *__: {"mean": float(model.posterior.mean.sum())}
+    )
 
 
 def site_file(folder: Path) -> Path:
@@ -209,7 +211,7 @@ def test_a_model_whose_discrepancy_cannot_be_learned_is_written_with_a_sentence(
     def refuse(*_: object) -> None:
         raise IgrowError("too few days")
 
-    monkeypatch.setattr(diagnosis, "discrepancy_of", refuse)
+    monkeypatch.setattr(calibration, "discrepancy_of", refuse)
     model = calibrate(prepare_log(short, SITE))
     assert model.discrepancy == {}
     assert any("could not be learned" in note and "too few days" in note for note in model.notes)

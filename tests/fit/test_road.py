@@ -12,9 +12,9 @@ from igrow.trainer import calibrate, diagnose, export, publish, read_log
 
 
 def test_every_name_of_the_road_is_a_function_whatever_was_imported_before() -> None:
+    import igrow.trainer.calibration
     import igrow.trainer.diagnosis.diagnose
     import igrow.trainer.exporting.bundle
-    import igrow.trainer.fit.calibrate
 
     for name in ("read_log", "calibrate", "diagnose", "export", "publish"):
         assert callable(getattr(igrow.trainer, name)), name

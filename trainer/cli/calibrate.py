@@ -9,10 +9,10 @@ import numpy as np
 
 from igrow.core.errors import IgrowError
 from igrow.core.language import LANGUAGES, speak
+from igrow.trainer.calibration import calibrate
 from igrow.trainer.cli.log_arguments import add_log_arguments, log_of
 from igrow.trainer.cli.progress import progress
 from igrow.trainer.exporting import export, read_model
-from igrow.trainer.fit import calibrate
 from igrow.trainer.fit.population import read_population
 from igrow.trainer.report.sentences import omission
 

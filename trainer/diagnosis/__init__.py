@@ -13,8 +13,9 @@ since; `omission` asks what it lacked from the first day), `estimate`, `refit` (
 greenhouses show though nothing is missing, `sharing` what one tells others. docs/method.md tells why.
 """
 
-from igrow.trainer.diagnosis.diagnose import diagnose, discrepancy_of, history_of
-from igrow.trainer.diagnosis.nuisance import NuisanceSubspace, read_nuisance
+from igrow.trainer.diagnosis.diagnose import diagnose
+from igrow.trainer.diagnosis.history import history_of
+from igrow.trainer.diagnosis.nuisance import NuisanceSubspace, discrepancy_of, read_nuisance
 from igrow.trainer.diagnosis.omission import examine
 from igrow.trainer.diagnosis.result import EXIT_CODES, Diagnosis, Finding
 from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules, read_rules

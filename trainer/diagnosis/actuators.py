@@ -21,8 +21,8 @@ from igrow.core.simulator.hybrid import climate, measurement, record
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.data.log import Log
 from igrow.trainer.diagnosis import freerun, linear, sensitivity
-from igrow.trainer.diagnosis.correction import LogDays, Stage
 from igrow.trainer.diagnosis.estimate import normal_quantile
+from igrow.trainer.diagnosis.freerun import LogDays, Stage
 from igrow.trainer.diagnosis.knowledge import Knowledge, activate
 from igrow.trainer.diagnosis.result import Interval
 from igrow.trainer.diagnosis.rules import DecisionRules

@@ -3,44 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from igrow.core.arrays import Floats
 from igrow.core.bundle import EffectRecord, Estimate, HeldOutError, Onset, Span
 from igrow.core.effects import EFFECTS
 from igrow.core.local_time import utc_datetime
 from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator.crop import CropStages
-from igrow.core.simulator.hybrid.record import Record
-from igrow.trainer.data.splits import DaySplit
 from igrow.trainer.diagnosis import freerun
 from igrow.trainer.diagnosis.candidates import Pattern, pattern_fluxes
 from igrow.trainer.diagnosis.estimate import Estimated
-from igrow.trainer.diagnosis.freerun import FreeRuns
-from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, activate, drift, home_drift
+from igrow.trainer.diagnosis.freerun import LogDays, Stage
+from igrow.trainer.diagnosis.knowledge import Knowledge, drift, home_drift
 from igrow.trainer.diagnosis.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.refit import REGIMES
 from igrow.trainer.diagnosis.result import Finding, Interval
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.diagnosis.search import Hypothesis
-from igrow.trainer.diagnosis.sensitivity import DayRuns
-from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.model import FittedModel
 from igrow.trainer.fit.solver import DivergenceError
-
-
-@dataclass(frozen=True)
-class Stage:
-    """One model of the tables: deployed, recalibrated, corrected."""
-
-    posterior: Gaussian
-    terms: tuple[ActiveTerm, ...]
-    patterns: Mapping[Pattern, float] = field(default_factory=dict)
-    """Amplitude of what no cause explains, in units of a pattern."""
-    added: Mapping[str, Floats] = field(default_factory=dict)
-    """Its fluxes by channel, (n,)."""
 
 
 @dataclass(frozen=True)
@@ -53,31 +36,6 @@ class Corrected:
     """All causes with their size and skill on unseen days, kept or not."""
     parameter: ParameterChange | None = None
     """One that has changed, where no effect is missing."""
-
-
-@dataclass(frozen=True)
-class LogDays:
-    """A record with its split and runs: what stages are fitted to and judged on."""
-
-    record: Record
-    split: DaySplit
-    runs: DayRuns
-
-    def fit(
-        self,
-        prior: Gaussian,
-        terms: Sequence[ActiveTerm],
-        start: Mapping[str, float] | None = None,
-        added: Mapping[str, Floats] | None = None,
-    ) -> Gaussian:
-        """Return parameters fitted to the fit days beside terms."""
-        effects = activate(self.record, terms)
-        return freerun.fit_parameters(self.record, self.runs, self.split, prior, effects, start, added)
-
-    def run(self, stage: Stage, horizon: str = "24_h") -> FreeRuns | None:
-        """Run a stage freely on held-out days."""
-        effects = activate(self.record, stage.terms)
-        return freerun.run(self.record, self.split, stage.posterior.values, effects, horizon, added=stage.added)
 
 
 def correct(
@@ -112,7 +70,7 @@ def correct(
             continue
         judged = _judged(log, one, current, trial)
         estimates.append(judged)
-        proven = is_proven_change if knowledge.history else stands
+        proven = stands if knowledge.history is None else is_proven_change
         if proven(judged, kept, rules):
             kept.append(judged)
             current = trial

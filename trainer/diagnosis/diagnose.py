@@ -9,45 +9,33 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from igrow.core.effects import EFFECTS
 from igrow.core.errors import IgrowError
-from igrow.core.language import N_
 from igrow.trainer.data.log import Log
-from igrow.trainer.data.splits import split_days
-from igrow.trainer.diagnosis import freerun, history, sensitivity, wording
+from igrow.trainer.diagnosis import freerun, history, wording
 from igrow.trainer.diagnosis.actuators import REPLACEABLE, Completed, complete
 from igrow.trainer.diagnosis.candidates import hidden_by_missing_weather
-from igrow.trainer.diagnosis.correction import Corrected, LogDays, Stage, correct, corrected_model, with_parameter
-from igrow.trainer.diagnosis.design import prepare
+from igrow.trainer.diagnosis.correction import Corrected, correct, corrected_model, with_parameter
 from igrow.trainer.diagnosis.drift import Drift
 from igrow.trainer.diagnosis.estimate import normal_quantile
 from igrow.trainer.diagnosis.evidence import Evidence
-from igrow.trainer.diagnosis.knowledge import activate, knowledge_of
-from igrow.trainer.diagnosis.nuisance import NuisanceSubspace, learn_discrepancy
+from igrow.trainer.diagnosis.freerun import LogDays, Stage, log_days
+from igrow.trainer.diagnosis.knowledge import Knowledge, knowledge_of
+from igrow.trainer.diagnosis.nuisance import NuisanceSubspace
 from igrow.trainer.diagnosis.open_vents import under_open_vents
 from igrow.trainer.diagnosis.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.result import Diagnosis, Finding, Verdict
 from igrow.trainer.diagnosis.rounds import search_of
 from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules
 from igrow.trainer.diagnosis.search import Hypothesis
-from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.growth import built_in_crop, growth_since
 from igrow.trainer.fit.model import FittedModel
-from igrow.trainer.fit.population import Population
 
 Report = Callable[[str], None]
-NOT_CALIBRATED = N_(
-    "What the model misses of this greenhouse when all is well is not known, so only large causes can be told from a "
-    "greenhouse that is another: calibrate it on weeks that are known to be good (igrow-trainer calibrate)."
-)
-NEWEST = N_(
-    "Within more than six weeks a crop changes: what has changed since the calibration was looked for in the newest "
-    "six."
-)
-SINCE = N_("The errors are of the days since then: before, the greenhouse was another.")
 
 
 def diagnose(
@@ -83,16 +71,16 @@ def diagnose(
     if log.faults:
         return _data_fault(log, model)
     log.require("a diagnosis", rules.least_days)
-    given, log = log, newest_weeks(log, model, rules)
+    knowledge = knowledge_of(model, site, rules)
+    given, log = log, newest_weeks(log, knowledge, rules)
     say = progress or (lambda _line: None)
     say("completing the log")
-    knowledge = knowledge_of(model, site, rules)
     logged, rng = log_days(log, model), np.random.default_rng(seed)
     completed = complete(log, logged, model, knowledge, rules)
     days, opened = completed.days, under_open_vents(logged.record, rules)
     off = opened is not None and opened.is_offset(rules)
     hidden = frozenset(without) | (frozenset({"co2_drift"}) if off else frozenset())
-    search = search_of(days, site, model, knowledge, hidden, rules, nuisance, drift)
+    search = search_of(days, site, knowledge, hidden, rules, nuisance, drift)
     say("searching for causes")
     first, last, found = search.run(rng)
     rivals = hidden_by_missing_weather(first.design.line)
@@ -103,15 +91,13 @@ def diagnose(
     patterns = last.patterns
     if parameter is not None and parameter.onset is not None:
         if parameter.leads or not (found or patterns):
-            # One set of parameters is none for a log of two greenhouses: the one that is there now counts.
-            later = log.select(parameter.onset.time)
-            if later.days >= rules.least_days:
-                told = diagnose(
-                    later, model, without=without, seed=seed, rules=rules, nuisance=nuisance, drift=drift,
-                    progress=progress,
-                )  # fmt: skip
-                if any(one.effect == parameter.parameter for one in told.findings):
-                    return begun(told, parameter)
+            again = partial(
+                diagnose, model=model, without=without, seed=seed, rules=rules, nuisance=nuisance, drift=drift,
+                progress=progress,
+            )  # fmt: skip
+            told = _since(parameter, log.select(parameter.onset.time), again, rules)
+            if told is not None:
+                return told
         # What the days since then alone do not bear out, or are too few to, is left to a later log.
         parameter = None
     if parameter is not None and parameter.leads:
@@ -130,28 +116,49 @@ def diagnose(
     runs = {name: day for name, (stage, seen) in stages.items() if (day := seen.run(stage)) is not None}
     corrected = corrected_model(model, result, findings, errors, knowledge.discrepancy, (start, end), crop)
     notes = (
-        *((NOT_CALIBRATED,) if knowledge.transferred else ()),
-        *((NEWEST,) if log is not given else ()),
+        *((wording.NOT_CALIBRATED,) if knowledge.transferred else ()),
+        *((wording.NEWEST,) if log is not given else ()),
         *((opened.sentence,) if opened is not None and off else ()),
     )
     return Diagnosis(
-        site.name,
-        verdict,
-        start,
-        end,
-        int(days.split.fit.sum()),
-        int((~days.split.fit).sum()),
-        findings,
-        errors,
-        log.screened,
-        model,
-        remembering(corrected, result.parameter, rules),
-        first.design.untestable,
-        logged.record.missing,
-        notes,
-        Evidence(days, knowledge, first, result.estimates, {name: stage for name, (stage, _) in stages.items()}, runs),
-        log,
+        site=site.name,
+        verdict=verdict,
+        start=start,
+        end=end,
+        fit_days=int(days.split.fit.sum()),
+        held_out_days=int((~days.split.fit).sum()),
+        findings=findings,
+        errors=errors,
+        screened=log.screened,
+        model=model,
+        corrected=remembering(corrected, result.parameter, rules),
+        untestable=first.design.untestable,
+        missing=logged.record.missing,
+        notes=notes,
+        evidence=Evidence(
+            days, knowledge, first, result.estimates, {name: stage for name, (stage, _) in stages.items()}, runs
+        ),
+        log=log,
     )
+
+
+def _since(
+    change: ParameterChange, later: Log, again: Callable[[Log], Diagnosis], rules: DecisionRules
+) -> Diagnosis | None:
+    """Return the diagnosis of the days since a parameter has changed; None where these alone do not bear it out.
+
+    One set of parameters is none for a log of two greenhouses: the one that is there now counts.
+
+    Args:
+        change: with its beginning, by the whole log.
+        later: the days since.
+        again: the diagnosis of them.
+        rules: how many they must be.
+    """
+    if later.days < rules.least_days:
+        return None
+    told = again(later)
+    return begun(told, change) if any(one.effect == change.parameter for one in told.findings) else None
 
 
 def begun(later: Diagnosis, change: ParameterChange) -> Diagnosis:
@@ -162,7 +169,7 @@ def begun(later: Diagnosis, change: ParameterChange) -> Diagnosis:
         else one
         for one in later.findings
     )
-    return replace(later, findings=findings, notes=(*later.notes, SINCE))
+    return replace(later, findings=findings, notes=(*later.notes, wording.SINCE))
 
 
 def remembering(model: FittedModel, change: ParameterChange | None, rules: DecisionRules) -> FittedModel:
@@ -174,43 +181,12 @@ def remembering(model: FittedModel, change: ParameterChange | None, rules: Decis
     return replace(model, history=history.followed(model.history, change.parameter, share.value * value, deviation))
 
 
-def newest_weeks(log: Log, model: FittedModel, rules: DecisionRules) -> Log:
+def newest_weeks(log: Log, knowledge: Knowledge, rules: DecisionRules) -> Log:
     """Return the newest weeks of a long log where its greenhouse's history can be asked what has changed, else all."""
-    known = rules.history and model.history is not None and model.calibrated_on == log.known_site.name
-    if not known or log.days <= rules.long_days:
+    if knowledge.history is None or log.days <= rules.long_days:
         return log
     # So many local days at most, the first and the last of them cut.
     return log.select(log.telemetry.time[-1] - np.timedelta64(round((rules.long_days - 1.0) * 86_400.0), "s"))
-
-
-def discrepancy_of(log: Log, model: FittedModel, rules: DecisionRules = DEFAULT) -> dict[str, float]:
-    """Return what a calibrated model misses on its own calibration log, for `FittedModel.discrepancy`.
-
-    Raises:
-        DivergenceError: the model runs out of all bounds on it.
-    """
-    site, days = log.known_site, log_days(log, model)
-    knowledge = knowledge_of(model, site, rules)
-    effects = activate(days.record, knowledge.terms)
-    design = prepare(days.record, days.split, knowledge.prior, effects, site.longitude, rules, discrepancy={})
-    return learn_discrepancy(design)
-
-
-def history_of(
-    log: Log, model: FittedModel, rules: DecisionRules = DEFAULT, *, population: Population | None = None
-) -> Discrepancy:
-    """Return the same with covariance and the noise's colour, for `FittedModel.history`; raises as above does."""
-    record, site = log_days(log, model).record, log.known_site
-    effects = activate(record, knowledge_of(model, site, rules).terms)
-    return history.learn(record, site, model.posterior, rules, population, effects)
-
-
-def log_days(log: Log, model: FittedModel) -> LogDays:
-    """Return the record of a log as a model reads it, split into days, with its runs."""
-    shift = log.best_shift(model.posterior.values) if model.alignment is None else model.alignment
-    record = log.record(shift)
-    split = split_days(record, log.known_site.longitude)
-    return LogDays(record, split, sensitivity.day_runs(record, split.day))
 
 
 def _verdict(

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 from igrow.core.arrays import Floats
 from igrow.trainer.diagnosis.compare import Round
-from igrow.trainer.diagnosis.correction import LogDays, Stage
 from igrow.trainer.diagnosis.estimate import Estimated
-from igrow.trainer.diagnosis.freerun import FreeRuns, mean_absolute_errors
+from igrow.trainer.diagnosis.freerun import FreeRuns, LogDays, Stage, mean_absolute_errors
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge
 
 

@@ -1,4 +1,4 @@
-"""Free runs: parameters fitted to those of the fit days, errors and skill on days that nothing was fitted to.
+"""The days of a log: parameters fitted to free runs on some, errors and skill on those that nothing was fitted to.
 
 A forecast is judged by its free run, so the parameters that are shipped are those that serve it. That is what
 `recalibrated` and `corrected` mean in the tables.
@@ -6,28 +6,29 @@ A forecast is judged by its free run, so the parameters that are shipped are tho
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from igrow.core.arrays import Floats, Integers
 from igrow.core.simulator.hybrid import measurement
-from igrow.core.simulator.hybrid.climate import ActiveEffects
 from igrow.core.simulator.hybrid.record import Record, complete_starts, free_run, observe
-from igrow.trainer.data.splits import DaySplit
+from igrow.trainer.data.log import Log
+from igrow.trainer.data.splits import DaySplit, split_days
 from igrow.trainer.diagnosis import sensitivity
-from igrow.trainer.diagnosis.knowledge import clipped
+from igrow.trainer.diagnosis.candidates import Pattern
+from igrow.trainer.diagnosis.knowledge import ActiveTerm, activate, clipped
 from igrow.trainer.diagnosis.sensitivity import DayRuns, Linearisation
 from igrow.trainer.fit import solver
 from igrow.trainer.fit.climate import bounds
+from igrow.trainer.fit.evaluation import horizon_steps, starts_within
 from igrow.trainer.fit.gaussian import Gaussian
+from igrow.trainer.fit.model import FittedModel
 from igrow.trainer.fit.scales import CORRELATION_TIME, ERROR_SCALES, ROBUST
 
-HORIZONS: Mapping[str, float] = {"1_step": 0.0, "24_h": 86_400.0, "7_d": 604_800.0}
-"""Seconds of each free run; 0 is one time step."""
-EVERY: Mapping[str, float] = {"1_step": 1500.0, "24_h": 10_800.0, "7_d": 86_400.0}
-"""Seconds between the starts of runs."""
+HORIZONS: Mapping[str, float] = {"1_step": 1500.0, "24_h": 10_800.0, "7_d": 86_400.0}
+"""Of `igrow.trainer.fit.evaluation.HORIZONS`; seconds between the starts of their runs."""
 EVALUATIONS = 20
 """Points that a fit may try."""
 
@@ -44,85 +45,102 @@ class FreeRuns:
     """Day of each start, (s,)."""
 
 
-def fit_parameters(
-    record: Record,
-    runs: DayRuns,
-    split: DaySplit,
-    prior: Gaussian,
-    effects: ActiveEffects,
-    start: Mapping[str, float] | None = None,
-    added: Mapping[str, Floats] | None = None,
-) -> Gaussian:
-    """Return the posterior of the parameters.
+@dataclass(frozen=True)
+class Stage:
+    """One model of the tables: deployed, recalibrated, corrected."""
 
-    Args:
-        record: of the log.
-        runs: its day-long runs.
-        split: only fit days count.
-        prior: of the parameters.
-        effects: active, held.
-        start: where to begin, by name (None: the prior's mean).
-        added: further fluxes by channel, (n,).
-
-    Raises:
-        DivergenceError: the model runs out of all bounds where the fit begins.
-    """
-    scale = np.array([ERROR_SCALES[name] for name in measurement.PREDICTED])[:, None, None]
-    counted = (runs.weight & split.fit[runs.day][None, :, None]).ravel()
-    low, high = bounds(prior.names)
-    begin = np.array([(start or prior.values)[name] for name in prior.names])
-
-    def line(point: Floats) -> Linearisation:
-        return sensitivity.linearise(record, runs, clipped(prior.names, point), effects, added)
-
-    def residuals(point: Floats) -> Floats:
-        flat: Floats = (line(point).errors / scale).ravel()[counted]
-        return flat
-
-    def jacobian(point: Floats) -> Floats:
-        slopes = sensitivity.parameter_sensitivities(line(point), prior.names, prior.standard_deviation)
-        flat: Floats = (slopes / scale).reshape(len(slopes), -1)[:, counted].T
-        return flat
-
-    weight = record.step / CORRELATION_TIME
-    return solver.solve(
-        residuals, jacobian, prior, low, high, weights=weight, robust=ROBUST, start=begin, evaluations=EVALUATIONS
-    ).posterior
+    posterior: Gaussian
+    terms: tuple[ActiveTerm, ...]
+    patterns: Mapping[Pattern, float] = field(default_factory=dict)
+    """Amplitude of what no cause explains, in units of a pattern."""
+    added: Mapping[str, Floats] = field(default_factory=dict)
+    """Its fluxes by channel, (n,)."""
 
 
-def run(
-    record: Record,
-    split: DaySplit,
-    parameters: Mapping[str, float],
-    effects: ActiveEffects,
-    horizon: str,
-    *,
-    added: Mapping[str, Floats] | None = None,
-) -> FreeRuns | None:
-    """Run freely over a horizon and compare on held-out days; None where no run fits.
+@dataclass(frozen=True)
+class LogDays:
+    """A record with its split and runs: what stages are fitted to and judged on."""
 
-    Runs of 24 h lie on such days altogether; runs of seven days start anywhere, and count on such days alone.
-    """
-    steps = max(1, round(HORIZONS[horizon] / record.step))
-    if steps + 1 >= len(record):
-        return None
-    wanted = ~split.fit_rows
-    starts = complete_starts(record, steps, max(1, round(EVERY[horizon] / record.step)))
-    outside = np.concatenate([[0], np.cumsum(~wanted)])
-    if horizon == "7_d":
-        starts = starts[outside[starts + steps] - outside[starts] < steps]
-    else:
-        starts = starts[outside[starts + steps + 1] - outside[starts] == 0]
-    if len(starts) == 0:
-        return None
-    states = observe(record, parameters, effects)
-    shown = free_run(record, states, starts, steps, parameters, effects, added)
-    samples = starts + 1 + np.arange(steps)[:, None]
-    errors = {}
-    for name in measurement.PREDICTED:
-        error = shown[name] - record.measured[name][samples]
-        errors[name] = np.where(wanted[samples], error, np.nan)
-    return FreeRuns(shown, errors, split.day[starts])
+    record: Record
+    split: DaySplit
+    runs: DayRuns
+    """A day long, one from every local midnight."""
+
+    def fit(
+        self,
+        prior: Gaussian,
+        terms: Sequence[ActiveTerm],
+        start: Mapping[str, float] | None = None,
+        added: Mapping[str, Floats] | None = None,
+    ) -> Gaussian:
+        """Return the posterior of the parameters, fitted to the fit days beside terms.
+
+        Args:
+            prior: of the parameters.
+            terms: active, held.
+            start: where to begin, by name (None: the prior's mean).
+            added: further fluxes by channel, (n,).
+
+        Raises:
+            DivergenceError: the model runs out of all bounds where the fit begins.
+        """
+        record, runs, effects = self.record, self.runs, activate(self.record, terms)
+        scale = np.array([ERROR_SCALES[name] for name in measurement.PREDICTED])[:, None, None]
+        counted = (runs.weight & self.split.fit[runs.day][None, :, None]).ravel()
+        low, high = bounds(prior.names)
+        begin = np.array([(start or prior.values)[name] for name in prior.names])
+
+        def line(point: Floats) -> Linearisation:
+            return sensitivity.linearise(record, runs, clipped(prior.names, point), effects, added)
+
+        def residuals(point: Floats) -> Floats:
+            flat: Floats = (line(point).errors / scale).ravel()[counted]
+            return flat
+
+        def jacobian(point: Floats) -> Floats:
+            slopes = sensitivity.parameter_sensitivities(line(point), prior.names, prior.standard_deviation)
+            flat: Floats = (slopes / scale).reshape(len(slopes), -1)[:, counted].T
+            return flat
+
+        weight = record.step / CORRELATION_TIME
+        return solver.solve(
+            residuals, jacobian, prior, low, high, weights=weight, robust=ROBUST, start=begin, evaluations=EVALUATIONS
+        ).posterior
+
+    def run(self, stage: Stage, horizon: str = "24_h") -> FreeRuns | None:
+        """Run a stage freely over a horizon and compare on held-out days; None where no run fits.
+
+        Runs of 24 h lie on such days altogether; runs of seven days start anywhere, and count on such days alone.
+        """
+        record, parameters, effects = self.record, stage.posterior.values, activate(self.record, stage.terms)
+        steps, every = horizon_steps(record, horizon), max(1, round(HORIZONS[horizon] / record.step))
+        if steps + 1 >= len(record):
+            return None
+        wanted = ~self.split.fit_rows
+        if horizon == "7_d":
+            starts = complete_starts(record, steps, every)
+            before = np.concatenate([[0], np.cumsum(wanted)])
+            starts = starts[before[starts + steps] > before[starts]]
+        else:
+            starts = starts_within(record, wanted, steps, every)
+        if len(starts) == 0:
+            return None
+        states = observe(record, parameters, effects)
+        shown = free_run(record, states, starts, steps, parameters, effects, stage.added)
+        samples = starts + 1 + np.arange(steps)[:, None]
+        errors = {}
+        for name in measurement.PREDICTED:
+            error = shown[name] - record.measured[name][samples]
+            errors[name] = np.where(wanted[samples], error, np.nan)
+        return FreeRuns(shown, errors, self.split.day[starts])
+
+
+def log_days(log: Log, model: FittedModel) -> LogDays:
+    """Return the record of a log as a model reads it, split into days, with its runs."""
+    shift = log.best_shift(model.posterior.values) if model.alignment is None else model.alignment
+    record = log.record(shift)
+    split = split_days(record, log.known_site.longitude)
+    return LogDays(record, split, sensitivity.day_runs(record, split.day))
 
 
 def root_mean_square(values: Floats) -> float:

@@ -1,9 +1,9 @@
 """The history of a greenhouse: learned from the log of its calibration, carried on to each later log.
 
 Two questions are told apart. What the model lacks is asked of the calibration log, under physical priors: every
-parameter, every effect and every pattern together, linear about the calibrated parameters (`learn`). What has changed
-since is asked of a later log: a greenhouse drifts, its crop faster than its walls, and that drift alone stands between
-what was learned and what may be expected now (`expected`).
+parameter, every effect and every pattern together, linear about the calibrated parameters (`history_of`). What has
+changed since is asked of a later log: a greenhouse drifts, its crop faster than its walls, and that drift alone stands
+between what was learned and what may be expected now (`expected`).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from igrow.trainer.diagnosis.amplitudes import drift_within, keys, omission, rat
 from igrow.trainer.diagnosis.candidates import WEEKDAYS
 from igrow.trainer.diagnosis.design import JOINT, Design, History, blocks_of
 from igrow.trainer.diagnosis.drift import Drift, read_drift
-from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX
+from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, activate, knowledge_of
 from igrow.trainer.diagnosis.linear import DailyGrams, LinearModel
 from igrow.trainer.diagnosis.noise import Whitening
 from igrow.trainer.diagnosis.recalibration import averaging
@@ -31,6 +31,7 @@ from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.fit.climate import site_prior
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
+from igrow.trainer.fit.model import FittedModel
 from igrow.trainer.fit.population import Population
 
 SURE = 1e-3
@@ -39,32 +40,26 @@ PARTS = (2, 4)
 """Into so many windows a calibration log is cut, to see what gains in each though nothing has changed."""
 
 
-def learn(
-    record: Record,
-    site: Site,
-    posterior: Gaussian,
-    rules: DecisionRules,
-    population: Population | None = None,
-    effects: ActiveEffects | None = None,
+def history_of(
+    record: Record, model: FittedModel, rules: DecisionRules, population: Population | None = None
 ) -> Discrepancy:
     """Return what a calibrated model misses of its greenhouse, learned from all days of the calibration log.
 
     Args:
         record: of that log, on its working grid.
-        site: the greenhouse.
-        posterior: of the parameters; a change of them is held to the site's description, not to their calibration,
-            which has used this log already.
+        model: calibrated on it; a change of its parameters is held to the site's description, not to their
+            calibration, which has used this log already.
         rules: how much of everything may be missing.
         population: what other greenhouses of its owner have shown (None: the description and the rules alone).
-        effects: that the model has.
 
     Raises:
         DivergenceError: the model runs out of all bounds on the log.
     """
-    found, design = jointly(record, site, posterior, rules, population, effects)
+    effects = activate(record, knowledge_of(model, model.site, rules).terms)
+    found, design = jointly(record, model.site, model.posterior, rules, population, effects)
     balances = averaging(design.line, design.interval, rules).balances
     return Discrepancy(
-        parameters=posterior.values,
+        parameters=model.posterior.values,
         amplitudes=found,
         filters={balance: one.raw for balance, one in zip(balances, design.whitening.filters, strict=True)},
         step=record.step,
@@ -81,7 +76,7 @@ def jointly(
     population: Population | None = None,
     effects: ActiveEffects | None = None,
 ) -> tuple[Gaussian, Design]:
-    """Return all amplitudes of a calibration log, and its design under the noise beside them; see `learn`."""
+    """Return all amplitudes of a calibration log, and its design under the noise beside them; see `history_of`."""
     days = split_days(record, site.longitude)
     whole = DaySplit(days.day, np.ones(days.days, dtype=bool))
     plain = lay_out(record, whole, posterior, effects or {}, site.longitude, rules)

@@ -20,6 +20,7 @@ from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.fit.climate import bounds
+from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.model import FittedModel
 
@@ -60,8 +61,8 @@ class Knowledge:
     """Empty for a transferred model."""
     transferred: bool
     """What the model misses of this greenhouse when all is well is not known."""
-    history: bool = False
-    """It is known with its covariance: causes are changes since the calibration."""
+    history: Discrepancy | None = None
+    """The same with its covariance: causes are then changes since the calibration; None where none is to be asked."""
 
 
 def knowledge_of(model: FittedModel, site: Site, rules: DecisionRules) -> Knowledge:
@@ -71,14 +72,14 @@ def knowledge_of(model: FittedModel, site: Site, rules: DecisionRules) -> Knowle
     discrepancy = model.discrepancy if at_home else {}
     if not at_home:
         posterior = posterior.widened(drift(posterior.values, rules.transferred_drift, rules))
-    known = at_home and rules.history and model.history is not None
     # Fits to free runs may move further than a greenhouse changes: a parameter also stands in for what has no name.
     prior = posterior.widened(general_drift(posterior.values, rules))
+    history = model.history if at_home and rules.history else None
     low, high = bounds(prior.names)
     shift = np.array([discrepancy.get(PARAMETER_PREFIX + name, 0.0) for name in prior.names])
     centred = prior.moved(np.clip(prior.mean + shift, low, high))
     terms = tuple(active_term(one) for one in model.effects if one.name in EFFECTS)
-    return Knowledge(model.posterior, prior, centred, terms, discrepancy, not discrepancy, known)
+    return Knowledge(model.posterior, prior, centred, terms, discrepancy, not discrepancy, history)
 
 
 def active_term(record: EffectRecord) -> ActiveTerm:

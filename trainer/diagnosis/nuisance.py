@@ -27,10 +27,13 @@ from scipy.optimize import minimize
 
 from igrow.core.arrays import Floats
 from igrow.core.effects import EFFECTS
+from igrow.core.simulator.hybrid.record import Record
+from igrow.trainer.data.splits import split_days
 from igrow.trainer.diagnosis import compare, linear, search
-from igrow.trainer.diagnosis.design import Design
-from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX
+from igrow.trainer.diagnosis.design import Design, prepare
+from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, activate, knowledge_of
 from igrow.trainer.diagnosis.rules import DecisionRules
+from igrow.trainer.fit.model import FittedModel
 
 FILE = "learned/nuisance.json"
 _SEEN = 1e-6
@@ -78,6 +81,18 @@ def read_nuisance(path: Path | None = None) -> NuisanceSubspace:
 def write_nuisance(path: Path, subspace: NuisanceSubspace) -> None:
     """Write a subspace with its provenance."""
     path.write_text(json.dumps(asdict(subspace)) + "\n", encoding="utf-8")
+
+
+def discrepancy_of(record: Record, model: FittedModel, rules: DecisionRules) -> dict[str, float]:
+    """Return what a calibrated model misses on the record of its own calibration log, for `FittedModel.discrepancy`.
+
+    Raises:
+        DivergenceError: the model runs out of all bounds on it.
+    """
+    longitude, knowledge = model.site.longitude, knowledge_of(model, model.site, rules)
+    effects = activate(record, knowledge.terms)
+    split = split_days(record, longitude)
+    return learn_discrepancy(prepare(record, split, knowledge.prior, effects, longitude, rules, discrepancy={}))
 
 
 def learn_discrepancy(design: Design) -> dict[str, float]:

@@ -20,10 +20,8 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from igrow.core.arrays import Mask
-from igrow.core.bundle import EffectRecord, Estimate, HeldOutError
+from igrow.core.bundle import EffectRecord, Estimate
 from igrow.core.effects import EFFECTS, Effect
-from igrow.core.quantities import QUANTITIES
-from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
 from igrow.trainer.data.splits import alternate_weeks
@@ -34,7 +32,7 @@ from igrow.trainer.diagnosis.estimate import normal_quantile
 from igrow.trainer.diagnosis.linear import LinearModel
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.fit.climate import fit_climate
-from igrow.trainer.fit.evaluation import evaluate
+from igrow.trainer.fit.evaluation import held_out_errors
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.omission import Omission
 from igrow.trainer.fit.solver import DivergenceError
@@ -42,8 +40,8 @@ from igrow.trainer.fit.solver import DivergenceError
 FILE = "learned/omission.json"
 TERMS = tuple(effect.name for effect in EFFECTS.values() if effect.resembles)
 """Effects that can stand in for a term of the physics."""
-HORIZONS = ("1_h", "24_h")
-"""Of the errors that a finding carries; the last one decides."""
+DAY = "24_h"
+"""The horizon whose errors decide."""
 USUAL_DEVIATION, HELD = 2.0, 3.0
 """Deviation of a root gain before any greenhouse, and greenhouses that it counts as."""
 WIDE = 3.0
@@ -94,9 +92,9 @@ def learn(gains: Mapping[str, Sequence[Mapping[str, float]]]) -> dict[str, tuple
     return found
 
 
-def read_usual_gains(path: Path | None = None) -> UsualGains:
-    """Return stored gains (None: those that came with the trainer)."""
-    file = files("igrow.trainer.diagnosis").joinpath(FILE) if path is None else path
+def read_usual_gains() -> UsualGains:
+    """Return the gains that came with the trainer."""
+    file = files("igrow.trainer.diagnosis").joinpath(FILE)
     return UsualGains(**json.loads(file.read_text(encoding="utf-8")))
 
 
@@ -169,8 +167,10 @@ def examine(
     try:
         without = fit_climate([(record, ~held_out)], prior)
         beside = _fit(record, ~held_out, prior, effect)
-        errors = _errors(record, held_out, without, beside, effect)
-        day = [one.after / one.before for one in errors if one.horizon == HORIZONS[-1]]
+        parameters = beside.marginal(prior.names).values
+        active = {effect.name: {effect.amplitude.name: beside.values[_name(effect)], **_shape(effect)}}
+        errors = held_out_errors(record, held_out, (without.values, {}), (parameters, active))
+        day = [one.after / one.before for one in errors if one.horizon == DAY]
         if not day or np.mean(day) > 1.0 - rules.least_omission_fall:
             return None
         fitted = _fit(record, None, prior, effect)
@@ -199,6 +199,10 @@ def _distance(one: Candidate) -> float:
     return sum(abs(value - shapes[name].typical) / (shapes[name].high - shapes[name].low) for name, value in one.shape)
 
 
+def _shape(effect: Effect) -> dict[str, float]:
+    return {one.name: one.typical for one in effect.shapes}
+
+
 def _name(effect: Effect) -> str:
     return f"{effect.name}:{effect.amplitude.name}"
 
@@ -211,21 +215,4 @@ def _fit(record: Record, rows: Mask | None, prior: Gaussian, effect: Effect) -> 
         np.append(prior.mean, size.typical),
         block_diag(prior.covariance, (WIDE * size.typical) ** 2),
     )
-    return fit_climate([(record, rows)], joint, {effect.name: {one.name: one.typical for one in effect.shapes}})
-
-
-def _errors(
-    record: Record, rows: Mask, without: Gaussian, beside: Gaussian, effect: Effect
-) -> tuple[HeldOutError, ...]:
-    """Return the errors of both fits on rows that neither saw."""
-    shape = {one.name: one.typical for one in effect.shapes}
-    active = {effect.name: {effect.amplitude.name: beside.values[_name(effect)], **shape}}
-    parameters = {name: value for name, value in beside.values.items() if name in PARAMETERS}
-    old = evaluate(record, without.values, {}, HORIZONS, rows)
-    new = evaluate(record, parameters, active, HORIZONS, rows)
-    return tuple(
-        HeldOutError(name, horizon, old[name][horizon].mae, summary.mae, QUANTITIES[name].unit)
-        for name, by_horizon in new.items()
-        for horizon, summary in by_horizon.items()
-        if horizon in old.get(name, {})
-    )
+    return fit_climate([(record, rows)], joint, {effect.name: _shape(effect)})

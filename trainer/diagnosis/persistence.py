@@ -41,9 +41,9 @@ def persistence_errors(result: Diagnosis) -> Mapping[str, float]:
     return errors
 
 
-def misfits(result: Diagnosis, stage: str = "corrected") -> list[Misfit]:
-    """Return the quantities that a stage predicts no better than yesterday's readings do."""
-    found = []
+def misfits(result: Diagnosis) -> list[Misfit]:
+    """Return the quantities that the model which stands predicts no better than yesterday's readings do."""
+    stage, found = "deployed" if result.verdict == "nothing" else "corrected", []
     for quantity, yesterday in persistence_errors(result).items():
         error = result.errors[quantity].get("24_h", {}).get(stage)
         if error is not None and error >= yesterday:

@@ -144,7 +144,7 @@ class Diagnosis:
             if day:
                 stages = ", ".join(f"{stage} {value:.3g}" for stage, value in day.items())
                 lines.append(f"  {quantity}, 24 h ahead on unseen days: {stages}")
-        for one in misfits(self, "deployed" if self.verdict == "nothing" else "corrected"):
+        for one in misfits(self):
             lines.append(
                 f"  the model does not fit {one.quantity}: yesterday's readings are off by {one.persistence:.3g}"
             )

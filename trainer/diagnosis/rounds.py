@@ -12,10 +12,10 @@ from igrow.core.site import Site
 from igrow.trainer.diagnosis import history, parameter_change
 from igrow.trainer.diagnosis.change import changed
 from igrow.trainer.diagnosis.compare import Round, compare
-from igrow.trainer.diagnosis.correction import LogDays
 from igrow.trainer.diagnosis.design import Design, prepare
 from igrow.trainer.diagnosis.drift import Drift, read_drift
 from igrow.trainer.diagnosis.estimate import Estimated, estimate, with_refitted, within_bounds
+from igrow.trainer.diagnosis.freerun import LogDays
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, activate
 from igrow.trainer.diagnosis.nuisance import NuisanceSubspace, read_nuisance
 from igrow.trainer.diagnosis.parameter_change import ParameterChange
@@ -25,7 +25,6 @@ from igrow.trainer.diagnosis.structure import disagreement
 from igrow.trainer.fit.climate import site_prior
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
-from igrow.trainer.fit.model import FittedModel
 from igrow.trainer.fit.solver import DivergenceError
 
 
@@ -149,7 +148,6 @@ class Change(Search):
 def search_of(
     days: LogDays,
     site: Site,
-    model: FittedModel,
     knowledge: Knowledge,
     without: frozenset[str],
     rules: DecisionRules,
@@ -158,8 +156,8 @@ def search_of(
 ) -> Search:
     """Return the search that fits what is known: of changes where the greenhouse's history applies to the log."""
     common = (days, site, knowledge, without, rules, nuisance or read_nuisance())
-    known = model.history
-    if not rules.history or known is None or model.calibrated_on != site.name:
+    known = knowledge.history
+    if known is None:
         return Search(*common)
     plain = laid_out(days, site, known, (), rules)
     if not history.applies(known, plain):

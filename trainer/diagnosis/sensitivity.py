@@ -24,8 +24,6 @@ from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.core.simulator.hybrid.record import SUBSTEP, Record, free_run, observe
 from igrow.trainer.fit.solver import DivergenceError
 
-BALANCES = ("heat", "vapour", "co2")
-"""In the order of `measurement.PREDICTED`, which shows each of them first."""
 PARAMETER_DIFFERENCE = 0.05
 """Finite difference of a parameter, in prior standard deviations."""
 EFFECT_DIFFERENCE = 0.1

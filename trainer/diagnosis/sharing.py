@@ -11,11 +11,11 @@ import numpy as np
 from igrow.trainer.data.log import Log
 from igrow.trainer.diagnosis import amplitudes, history
 from igrow.trainer.diagnosis.design import JOINT, Design
-from igrow.trainer.diagnosis.diagnose import log_days
 from igrow.trainer.diagnosis.drift import Drift, Pair
+from igrow.trainer.diagnosis.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX
 from igrow.trainer.diagnosis.rounds import laid_out
-from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules
+from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.fit.climate import site_prior
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
@@ -23,19 +23,19 @@ from igrow.trainer.fit.model import FittedModel
 from igrow.trainer.fit.population import Learned, learned_of
 
 
-def learned_from(model: FittedModel, rules: DecisionRules = DEFAULT) -> Learned:
+def learned_from(model: FittedModel) -> Learned:
     """Return what a calibration by the description alone says of a greenhouse and its discrepancy."""
     found = learned_of(site_prior(model.site), model.posterior)
     if model.history is None:
         return found
     found_missing = model.history.amplitudes
     names = tuple(name for name in found_missing.names if not name.startswith(PARAMETER_PREFIX))
-    before = Gaussian(names, np.zeros(len(names)), np.diag(amplitudes.omission(names, rules) ** 2))
+    before = Gaussian(names, np.zeros(len(names)), np.diag(amplitudes.omission(names, DEFAULT) ** 2))
     missing = learned_of(before, found_missing.marginal(names))
     return Learned({**found.shift, **missing.shift}, {**found.variance, **missing.variance})
 
 
-def change_since(log: Log, model: FittedModel, days: float, rules: DecisionRules = DEFAULT) -> Pair | None:
+def change_since(log: Log, model: FittedModel, days: float) -> Pair | None:
     """Return what a later log says of how a greenhouse changes; None where its history does not apply.
 
     Args:
@@ -49,7 +49,7 @@ def change_since(log: Log, model: FittedModel, days: float, rules: DecisionRules
     known, site = model.history, log.known_site
     if known is None or model.calibrated_on != site.name:
         return None
-    plain = laid_out(log_days(log, model), site, known, (), rules)
+    plain = laid_out(log_days(log, model), site, known, (), DEFAULT)
     if not history.applies(known, plain):
         return None
     return pair(known, plain, history.expected(known, plain, history.expected_misfit(known, plain)), days)

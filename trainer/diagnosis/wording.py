@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from igrow.core.effects import EFFECTS
+from igrow.core.language import N_
 from igrow.core.language.units import written
 from igrow.trainer.diagnosis.actuators import Replaced
 from igrow.trainer.diagnosis.candidates import UNIT_FLUX, Pattern
@@ -16,6 +17,15 @@ from igrow.trainer.diagnosis.result import DISCREPANCY, Finding, Interval, Onset
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.diagnosis.search import Hypothesis
 
+NOT_CALIBRATED = N_(
+    "What the model misses of this greenhouse when all is well is not known, so only large causes can be told from a "
+    "greenhouse that is another: calibrate it on weeks that are known to be good (igrow-trainer calibrate)."
+)
+NEWEST = N_(
+    "Within more than six weeks a crop changes: what has changed since the calibration was looked for in the newest "
+    "six."
+)
+SINCE = N_("The errors are of the days since then: before, the greenhouse was another.")
 UNITS = {"heat": "W m-2", "vapour": "kg m-2 s-1", "co2": "kg m-2 s-1", "air_exchange": "m s-1", "light_loss": "1"}
 NAMES = {
     "heat": "heat",

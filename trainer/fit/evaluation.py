@@ -8,19 +8,27 @@ from dataclasses import dataclass
 import numpy as np
 
 from igrow.core.arrays import Floats, Integers, Mask, Times
+from igrow.core.bundle import HeldOutError
 from igrow.core.errors import IgrowError
+from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator.hybrid import record as records
 from igrow.core.simulator.hybrid.climate import ActiveEffects
 from igrow.core.simulator.hybrid.record import Record
 
 HORIZONS = ("1_step", "1_h", "24_h", "7_d")
 """``1_step`` and ``1_h``: the error at that distance. ``24_h`` and ``7_d``: the mean over a free run that long."""
+CARRIED = ("1_h", "24_h")
+"""Of the errors that a model carries."""
 _RUNS = {"24_h": 86_400.0, "7_d": 604_800.0}
 EVERY = 11_100.0
 """Seconds between the starts of runs; they fall on all times of the day."""
 
 Predictor = Callable[[Integers, int], Mapping[str, Floats]]
 """`predict(starts, steps)`: what is predicted for the rows after each start, by quantity, (steps, s)."""
+
+
+Simulator = tuple[Mapping[str, float], ActiveEffects]
+"""Parameters of the climate stage, and active effects."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +63,26 @@ def evaluate(
         IgrowError: a horizon is not known.
     """
     return summarise([errors_of(record, free_runs(record, parameters, effects), horizons, rows)])
+
+
+def held_out_errors(
+    record: Record, rows: Mask, before: Simulator, after: Simulator, horizons: Sequence[str] = CARRIED
+) -> tuple[HeldOutError, ...]:
+    """Return the errors of one simulator beside those of another, on rows that no fit saw, (n,)."""
+    old, new = (evaluate(record, *one, horizons, rows) for one in (before, after))
+    return tuple(
+        HeldOutError(
+            quantity,
+            horizon,
+            old[quantity][horizon].mae,
+            summary.mae,
+            QUANTITIES[quantity].unit,
+            summary.persistence if np.isfinite(summary.persistence) else None,
+        )
+        for quantity, by_horizon in new.items()
+        for horizon, summary in by_horizon.items()
+        if horizon in old.get(quantity, {})
+    )
 
 
 def free_runs(record: Record, parameters: Mapping[str, float], effects: ActiveEffects) -> Predictor:

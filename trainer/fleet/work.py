@@ -100,10 +100,10 @@ def learn_from_site(file: str, state: str, exchange: dict[str, str | None], now:
     Where the log is long enough the newest four weeks are left out of the fit. If nothing is found in them they tell
     how the greenhouse has changed, in `change.npz`.
     """
+    from igrow.trainer.calibration import calibrate  # noqa: PLC0415
     from igrow.trainer.data import prepare_log  # noqa: PLC0415  (collecting needs no fits)
     from igrow.trainer.diagnosis import DEFAULT, change_since, diagnose, learned_from  # noqa: PLC0415
     from igrow.trainer.diagnosis.drift import read_drift  # noqa: PLC0415
-    from igrow.trainer.fit import calibrate  # noqa: PLC0415
 
     del exchange  # what was collected is enough
     site, moment = load_site(file), datetime.fromtimestamp(now, UTC)

@@ -14,6 +14,7 @@ from igrow.core.effects import EFFECTS
 from igrow.core.errors import IgrowError
 from igrow.core.language import Language, speak
 from igrow.core.quantities import QUANTITIES
+from igrow.trainer.diagnosis.freerun import HORIZONS
 from igrow.trainer.diagnosis.result import STAGES, Diagnosis, Finding
 from igrow.trainer.figure_style import COLOURS, DARK
 from igrow.trainer.report import data_faults, figures, sentences
@@ -23,7 +24,6 @@ MOVED = 0.05
 """Relative change from which on a recalibrated parameter is shown."""
 MOST_STRETCHES = 60
 """Stretches set aside that are listed one by one."""
-_HORIZONS = ("1_step", "24_h", "7_d")
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ def _cause(result: Diagnosis, finding: Finding, language: Language) -> Cause:
 def error_rows(result: Diagnosis, language: Language) -> Iterator[ErrorRow]:
     """Yield the table of errors; the best of a row is the smallest, told apart to the digits that are shown."""
     for quantity, table in result.errors.items():
-        for horizon in _HORIZONS:
+        for horizon in HORIZONS:
             if horizon not in table:
                 continue
             unit = QUANTITIES[quantity].difference_unit

@@ -11,6 +11,7 @@ from igrow.core.effects import EFFECTS, Effect
 from igrow.core.language import N_, Language
 from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator.hybrid.measurement import PREDICTED
+from igrow.trainer.diagnosis.candidates import WEEKDAYS
 from igrow.trainer.diagnosis.parameter_change import VISIBLE
 from igrow.trainer.diagnosis.persistence import misfits
 from igrow.trainer.diagnosis.result import DISCREPANCY, WORSE, Diagnosis, Finding
@@ -54,7 +55,6 @@ _WHEN: Mapping[str, str] = {
     "all the time": N_("all the time"),
 }
 _HOURS = re.compile(r"(?:(?P<before>.+), )?(?P<first>\d\d) to (?P<last>\d\d) h(?: (?P<after>on .+))?")
-_WEEKDAYS = ("Monday", "Tuesday", "Wednesday", "Thursday", "Friday", "Saturday", "Sunday")
 _LEAST = {"heat": 0.05, "co2": 0.001, "lamp_light": 0.02}
 """MJ, kg and kWh per m2 and week from which on they are told."""
 
@@ -62,7 +62,7 @@ _LEAST = {"heat": 0.05, "co2": 0.001, "lamp_light": 0.02}
 def verdict(result: Diagnosis, language: Language) -> str:
     """Return the first sentence; it never says that a model fits where its own errors say that it does not."""
     kind = result.verdict
-    wrong = kind in _NO_FIT and misfits(result, "deployed" if kind == "nothing" else "corrected")
+    wrong = kind in _NO_FIT and misfits(result)
     told = _NO_FIT[kind] if wrong else _VERDICTS[kind]
     return language.text(told)
 
@@ -134,8 +134,8 @@ def _course(course: str, language: Language) -> str:
     found = _HOURS.fullmatch(course)
     if found is None:
         day = course.removeprefix("on ").removesuffix("s")
-        if day in _WEEKDAYS:
-            name = language.locale.weekdays[_WEEKDAYS.index(day)]
+        if day in WEEKDAYS:
+            name = language.locale.weekdays[WEEKDAYS.index(day)]
             return language.text("on {weekday}", weekday=name)
         return language.text(_WHEN[course]) if course in _WHEN else course
     hours = language.text("{first} to {last} h", first=found["first"], last=found["last"])
@@ -246,7 +246,7 @@ def gains(result: Diagnosis, language: Language) -> Iterator[str]:
 
 def warnings(result: Diagnosis, language: Language) -> Iterator[str]:
     """Say which quantities the model predicts no better than yesterday's readings, and what could not be judged."""
-    for one in misfits(result, "deployed" if result.verdict == "nothing" else "corrected"):
+    for one in misfits(result):
         unit = QUANTITIES[one.quantity].difference_unit
         yield language.text(
             "The model does not fit {quantity}: a day ahead it is off by {error}, yesterday's readings by {yesterday}.",

@@ -18,7 +18,7 @@ from igrow.core.economics import co2_cost, electricity_price
 from igrow.core.simulator.hybrid import climate
 from igrow.core.simulator.hybrid.record import Record, observe
 from igrow.core.site import Site
-from igrow.trainer.diagnosis.correction import Stage
+from igrow.trainer.diagnosis.freerun import Stage
 from igrow.trainer.diagnosis.knowledge import activate
 from igrow.trainer.diagnosis.parameter_change import VISIBLE
 from igrow.trainer.diagnosis.result import DISCREPANCY, Diagnosis, Finding

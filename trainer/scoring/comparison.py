@@ -11,11 +11,10 @@ from igrow.core.bundle import Bundle, read_bundle
 from igrow.core.quantities import QUANTITIES
 from igrow.trainer.data import Log
 from igrow.trainer.exporting import read_model
-from igrow.trainer.fit.evaluation import Evaluation, errors_of, summarise
+from igrow.trainer.fit.evaluation import CARRIED, Evaluation, errors_of, summarise
 from igrow.trainer.fit.model import FittedModel
 from igrow.trainer.scoring.bundles import BY_SETPOINTS, runs_by_actuators, score_bundle, unseen
 
-HORIZONS = ("1_h", "24_h")
 PERSISTENCE = "persistence"
 Simulator = FittedModel | Bundle | str | Path
 
@@ -67,7 +66,7 @@ class Comparison:
 
 
 def compare(
-    simulators: Mapping[str, Simulator] | Sequence[Simulator], log: Log, horizons: Sequence[str] = HORIZONS
+    simulators: Mapping[str, Simulator] | Sequence[Simulator], log: Log, horizons: Sequence[str] = CARRIED
 ) -> Comparison:
     """Return the errors of several simulators on a log.
 

@@ -78,9 +78,9 @@ def _calibrate(
     now: datetime,
     population: Path | None,
 ) -> Turn:
+    from igrow.trainer.calibration import calibrate  # noqa: PLC0415
     from igrow.trainer.data import prepare_log  # noqa: PLC0415  (scipy is slow to import)
     from igrow.trainer.exporting import export, read_model  # noqa: PLC0415
-    from igrow.trainer.fit import calibrate  # noqa: PLC0415
     from igrow.trainer.fit.population import read_population  # noqa: PLC0415
 
     prepared = prepare_log(log.telemetry, site, name=site.name)

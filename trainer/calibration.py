@@ -18,14 +18,13 @@ import numpy as np
 from igrow.core.bundle import HeldOutError, Span, default_bundle_folder, read_bundle
 from igrow.core.errors import IgrowError
 from igrow.core.local_time import utc_datetime
-from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator.hybrid.record import Record
-from igrow.core.site import Site
 from igrow.trainer.data import Log
 from igrow.trainer.data.splits import alternate_weeks
+from igrow.trainer.diagnosis import DEFAULT, discrepancy_of, examine, history_of
 from igrow.trainer.fit.actuation import by_its_own_rules, fit_actuation, setpoint_columns
 from igrow.trainer.fit.climate import fit_climate
-from igrow.trainer.fit.evaluation import evaluate
+from igrow.trainer.fit.evaluation import held_out_errors
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.growth import built_in_crop, growth_notes, growth_of_log
 from igrow.trainer.fit.holding import fit_holding
@@ -33,15 +32,11 @@ from igrow.trainer.fit.model import FittedModel, training_envelope, united
 from igrow.trainer.fit.omission import Omission
 from igrow.trainer.fit.population import Population
 
-HORIZONS = ("1_h", "24_h")
-"""Of the errors that a model carries."""
-
 Report = Callable[[str], None]
 
 
 def calibrate(
     log: Log,
-    site: Site | None = None,
     *,
     prior_model: FittedModel | None = None,
     population: Population | None = None,
@@ -53,8 +48,7 @@ def calibrate(
         model = calibrate(log)
 
     Args:
-        log: four weeks or more; less than a week says too little.
-        site: the greenhouse; None: the log's own.
+        log: four weeks or more, with its site; less than a week says too little.
         prior_model: what is known of it before; None: its description alone. Causes that were found before are not
             carried over: they are looked for again.
         population: what other greenhouses of its owner have shown; a prior in the place of the description's.
@@ -64,7 +58,6 @@ def calibrate(
     Raises:
         IgrowError: the log cannot be fitted to, and why.
     """
-    log = log if site is None else replace(log, site=site)
     log.require("a calibration")
     site, say = log.known_site, progress or (lambda _line: None)
     before = prior_model or FittedModel.described(site)
@@ -103,14 +96,14 @@ def calibrate(
             before.training_range,
             read_bundle(default_bundle_folder()).manifest.training_range,
         ),
-        errors=held_out_errors(record, before.posterior, say),
+        errors=_held_out_errors(record, before.posterior, say),
         notes=(*_notes(record, inferred), *counted),
     )
     model = replace(model, omission=_omission(record, model, say))
-    return _with_discrepancy(model.completed() if complete else model, log, population, say)
+    return _with_discrepancy(model.completed() if complete else model, record, log.days, population, say)
 
 
-def held_out_errors(record: Record, prior: Gaussian, say: Report) -> tuple[HeldOutError, ...]:
+def _held_out_errors(record: Record, prior: Gaussian, say: Report) -> tuple[HeldOutError, ...]:
     """Return the errors of the prior and of a fit that leaves every fourth week out, on these weeks.
 
     Empty where the log has no fourth week, or nothing complete in it.
@@ -123,25 +116,11 @@ def held_out_errors(record: Record, prior: Gaussian, say: Report) -> tuple[HeldO
         fitted = fit_climate([(record, ~held_out)], prior)
     except IgrowError:
         return ()
-    old, new = (evaluate(record, values.values, {}, HORIZONS, held_out) for values in (prior, fitted))
-    return tuple(
-        HeldOutError(
-            quantity,
-            horizon,
-            old[quantity][horizon].mae,
-            summary.mae,
-            QUANTITIES[quantity].unit,
-            summary.persistence if np.isfinite(summary.persistence) else None,
-        )
-        for quantity, by_horizon in new.items()
-        for horizon, summary in by_horizon.items()
-    )
+    return held_out_errors(record, held_out, (prior.values, {}), (fitted.values, {}))
 
 
 def _omission(record: Record, model: FittedModel, say: Report) -> Omission | None:
     """Return the term that a model lacks by its own log; None, and why, where that cannot be told."""
-    from igrow.trainer.diagnosis import DEFAULT, examine  # noqa: PLC0415  (a diagnosis needs fits in turn)
-
     if not alternate_weeks(record.time).held_out.any():
         say("the log is too short to tell what the model lacks: four weeks are needed")
         return None
@@ -153,14 +132,14 @@ def _omission(record: Record, model: FittedModel, say: Report) -> Omission | Non
         return None
 
 
-def _with_discrepancy(model: FittedModel, log: Log, population: Population | None, say: Report) -> FittedModel:
+def _with_discrepancy(
+    model: FittedModel, record: Record, days: float, population: Population | None, say: Report
+) -> FittedModel:
     """Return the model with what it misses on its own log, and without it where that cannot be told."""
-    from igrow.trainer.diagnosis import DEFAULT, discrepancy_of, history_of  # noqa: PLC0415  (a diagnosis needs fits in turn)
-
     say("learning what the model misses on its own log")
     try:
-        known = history_of(log, model, population=population) if DEFAULT.learns_history(log.days) else None
-        return replace(model, discrepancy=discrepancy_of(log, model), history=known)
+        known = history_of(record, model, DEFAULT, population) if DEFAULT.learns_history(days) else None
+        return replace(model, discrepancy=discrepancy_of(record, model, DEFAULT), history=known)
     except (IgrowError, np.linalg.LinAlgError) as error:
         note = (
             f"what the model misses on its own log could not be learned, so a diagnosis sees large causes only: {error}"
