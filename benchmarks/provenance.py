@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
+PAGES = ":(exclude)docs/results"
 
 
 def provenance(command: str, seeds: Mapping[str, object] | int | None = None) -> dict[str, Any]:
@@ -17,15 +18,17 @@ def provenance(command: str, seeds: Mapping[str, object] | int | None = None) ->
 
 
 def commit() -> str:
-    """Return the short name of the commit, with a plus sign where files have changed since; empty outside of git."""
+    """Return the short name of the commit, with a plus sign where files have changed since; empty outside of git.
+
+    The pages of results are what is being written: one that was printed before changes nothing of the next.
+    """
+    name, changed = _git("rev-parse", "--short", "HEAD"), _git("diff", "--name-only", "HEAD", "--", ".", PAGES)
+    return name + "+" * bool(changed)
+
+
+def _git(*words: str) -> str:
     try:
-        name = subprocess.run(
-            ["git", "describe", "--always", "--dirty=+", "--exclude=*"],
-            cwd=ROOT,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
+        asked = subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=True)
     except (OSError, subprocess.CalledProcessError):
         return ""
-    return name.stdout.strip()
+    return asked.stdout.strip()
