@@ -28,7 +28,7 @@ from igrow.trainer.fleet.registry import Backend
 from igrow.trainer.fleet.runner import run_tasks
 from igrow.trainer.fleet.tasks import Ending, Task
 from igrow.trainer.service.archive import Archive
-from igrow.trainer.service.recalibration import site_folder
+from igrow.trainer.service.site_memory import site_folder
 
 WORKERS = 2
 SPREAD = 0.08

@@ -12,9 +12,10 @@ import pytest
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
-from igrow.trainer.service import history, recalibration
+from igrow.trainer.service import first_calibration, history, recalibration
 from igrow.trainer.service.archive import Archive
-from igrow.trainer.service.recalibration import Diagnosed, bundle_in_force, forget_old, recalibrate, relative_gain
+from igrow.trainer.service.recalibration import Diagnosed, recalibrate, relative_gain
+from igrow.trainer.service.site_memory import bundle_in_force, forget_old
 from tests.tiny_bundle import write_tiny_bundle
 
 SITE = Site(name="house", latitude=52.0, longitude=4.5)
@@ -174,6 +175,20 @@ def test_a_fault_of_ours_is_one_sites_error_with_its_traceback_kept(tmp_path: Pa
     assert turn.verdict == "error"
     assert "ZeroDivisionError: a bug" in turn.note
     assert "Traceback" in (tmp_path / "state" / "fault.txt").read_text()
+
+
+def test_a_fault_of_ours_in_a_first_calibration_is_one_sites_error_too(tmp_path: Path, monkeypatch) -> None:
+    def broken(*_):
+        raise ZeroDivisionError("a bug")
+
+    weeks = Archive(tmp_path / "archive")
+    time = np.datetime64("2020-01-20T00:00:00") + np.arange(0, 40 * 86_400, 3600).astype("timedelta64[s]")
+    weeks.add_telemetry("house", Telemetry(time, {"air_temperature": np.full(len(time), 20.0)}))
+    monkeypatch.setattr(first_calibration, "_calibrate", broken)
+    turn = first_calibration.calibrate_first(SITE, weeks, tmp_path / "state", refuse, now=NOON, days=60)
+    assert (turn.command, turn.verdict) == ("calibrate", "error")
+    assert "ZeroDivisionError: a bug" in turn.note
+    assert [line["command"] for line in history.read(tmp_path / "state")] == ["calibrate"]
 
 
 def test_the_gain_is_negative_where_the_new_model_is_worse_on_unseen_days() -> None:

@@ -7,11 +7,10 @@ from datetime import timedelta
 from pathlib import Path
 
 from igrow.core.errors import IgrowError
-from igrow.trainer.cli.common import add_exchange, exchange_of
+from igrow.trainer.cli.common import add_exchange, exchange_of, utc_now
 from igrow.trainer.service.archive import Archive
 from igrow.trainer.service.collecting import collect
 from igrow.trainer.service.forwarding import forward
-from igrow.trainer.service.recalibration import utc_now
 
 EXAMPLE = (
     "igrow-trainer collect north --exchange /srv/igrow --state state\n"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import shutil
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,9 +13,12 @@ from igrow.core.exchange import Place
 from igrow.core.exchange.remote import open_place
 
 if TYPE_CHECKING:
-    from datetime import datetime
-
     from igrow.trainer.fit import FittedModel
+
+
+def utc_now() -> datetime:
+    """Return the time, UTC."""
+    return datetime.now(UTC)
 
 
 def add_exchange(parser: argparse.ArgumentParser) -> None:

@@ -9,13 +9,15 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from igrow.trainer.cli.common import utc_now
 from igrow.trainer.fleet.overview import SiteRow, overview, utc
 from igrow.trainer.fleet.registry import Entry, Registry, load_registry
 from igrow.trainer.fleet.runner import run_tasks
 from igrow.trainer.fleet.tasks import Ending, Task, TaskOutcome
 from igrow.trainer.fleet.work import CHANGE, LATER_DAYS, LEARNED
 from igrow.trainer.service import history
-from igrow.trainer.service.recalibration import DAYS, site_folder, utc_now
+from igrow.trainer.service.recalibration import DAYS
+from igrow.trainer.service.site_memory import site_folder
 
 EXAMPLE = (
     "igrow-trainer fleet collect /srv/fleet\n"

@@ -8,11 +8,12 @@ from pathlib import Path
 
 from igrow.core.errors import IgrowError
 from igrow.core.site import load_site
-from igrow.trainer.cli.common import add_exchange, exchange_of
+from igrow.trainer.cli.common import add_exchange, exchange_of, utc_now
 from igrow.trainer.publishing import publish
 from igrow.trainer.service.archive import Archive
 from igrow.trainer.service.collecting import collect
-from igrow.trainer.service.recalibration import DAYS, recalibrate, site_folder, utc_now
+from igrow.trainer.service.recalibration import DAYS, recalibrate
+from igrow.trainer.service.site_memory import site_folder
 
 EXAMPLE = "igrow-trainer recalibrate --exchange /srv/igrow --keys keys --state state --site site.yaml"
 

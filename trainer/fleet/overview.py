@@ -15,14 +15,8 @@ from igrow.trainer.fleet.work import COLLECTED
 from igrow.trainer.service import history
 from igrow.trainer.service.archive import Archive
 from igrow.trainer.service.ledger import read_ledger
-from igrow.trainer.service.recalibration import (
-    COMMAND,
-    bundle_in_force,
-    next_run,
-    read_diagnosis,
-    refused_bundles,
-    site_folder,
-)
+from igrow.trainer.service.recalibration import COMMAND, next_run
+from igrow.trainer.service.site_memory import bundle_in_force, read_diagnosis, refused_bundles, site_folder
 
 SILENT = timedelta(days=2)
 """A site without a row for longer than this has a broken link."""

@@ -21,7 +21,8 @@ from igrow.trainer.service import history
 from igrow.trainer.service.archive import Archive
 from igrow.trainer.service.collecting import collect
 from igrow.trainer.service.forwarding import forward
-from igrow.trainer.service.recalibration import recalibrate, site_folder
+from igrow.trainer.service.recalibration import recalibrate
+from igrow.trainer.service.site_memory import bundle_in_force, site_folder
 
 COLLECTED = "collected.json"
 LEARNED, CHANGE = "learned.json", "change.npz"
@@ -160,7 +161,6 @@ def publish_site(
 ) -> dict[str, Any]:
     """Sign a site's bundles again where the signatures expire soon; with `again` publish its bundle once more."""
     from igrow.trainer.publishing import publish_in, refresh  # noqa: PLC0415
-    from igrow.trainer.service.recalibration import bundle_in_force  # noqa: PLC0415
 
     repository, moment = _repository(exchange, site), datetime.fromtimestamp(now, UTC)
     folder = site_folder(Path(state), site)

@@ -7,17 +7,19 @@ that was calibrated on the site itself, `recalibration.py` goes on.
 from __future__ import annotations
 
 from datetime import datetime, timedelta
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from igrow.core.bundle import Bundle
-from igrow.core.errors import IgrowError
 from igrow.core.site import Site
 from igrow.trainer.service import history, seasons
 from igrow.trainer.service.archive import Archive, SiteLog
-from igrow.trainer.service.recalibration import LEAST_GAIN, Publish, Turn, bundle_in_force
+from igrow.trainer.service.history import Turn
+from igrow.trainer.service.recalibration import LEAST_GAIN
+from igrow.trainer.service.site_memory import Publish, bundle_in_force, publish_new
 
 if TYPE_CHECKING:
     from igrow.trainer.data import Log
@@ -40,7 +42,7 @@ def calibrate_first(
 ) -> Turn:
     """Calibrate a site that has no bundle of its own, and publish it where it is better than the built-in one.
 
-    Never raises for what the site sent: an error is a line of its history.
+    Never raises for what the site sent: an error is a line of its history. Raises as `history.keep` does.
 
     Args:
         site: whose log it is.
@@ -55,18 +57,14 @@ def calibrate_first(
     bundle, notes = bundle_in_force(folder, log.reports)
     if bundle.manifest.calibrated_on == site.name:
         note = f"{bundle.label} was calibrated on it already; recalibrate corrects it"
-        return Turn(site.name, now, "waiting", False, note, notes=notes)
+        return Turn(COMMAND, site.name, now, "waiting", False, note, notes=notes)
     time = log.telemetry.time
     length = 0.0 if len(time) == 0 else float((time[-1] - time[0]) / np.timedelta64(1, "D"))
     if length < LEAST_DAYS:
         note = f"{length:.0f} days of log are there, {LEAST_DAYS} are needed"
-        return Turn(site.name, now, "waiting", False, note, notes=notes)
-    try:
-        turn = _calibrate(site, log, bundle, folder, publish_bundle, now, population)
-    except (IgrowError, OSError) as error:
-        turn = Turn(site.name, now, "error", False, str(error))
-    history.append(folder, turn.to_json() | {"command": COMMAND})
-    return turn
+        return Turn(COMMAND, site.name, now, "waiting", False, note, notes=notes)
+    work = partial(_calibrate, site, log, bundle, folder, publish_bundle, now, population)
+    return history.keep(folder, COMMAND, site.name, now, work)
 
 
 def _calibrate(
@@ -80,7 +78,7 @@ def _calibrate(
 ) -> Turn:
     from igrow.trainer.calibration import calibrate  # noqa: PLC0415
     from igrow.trainer.data import prepare_log  # noqa: PLC0415  (scipy is slow to import)
-    from igrow.trainer.exporting import export, read_model  # noqa: PLC0415
+    from igrow.trainer.exporting import read_model  # noqa: PLC0415
     from igrow.trainer.fit.population import read_population  # noqa: PLC0415
 
     prepared = prepare_log(log.telemetry, site, name=site.name)
@@ -88,17 +86,14 @@ def _calibrate(
     gain, notes = _gain(prepared, model, read_model(bundle, site)), (*log.notes, *model.notes)
 
     def turn(note: str, *, published: bool = False) -> Turn:
-        return Turn(site.name, now, "calibrated", published, note, gain=gain, notes=notes)
+        return Turn(COMMAND, site.name, now, "calibrated", published, note, gain=gain, notes=notes)
 
     if gain < LEAST_GAIN:
         return turn(f"the bundle in force stays: on unseen weeks the calibration is only {100 * gain:.1f} % better")
-    fresh = folder / "bundles" / now.strftime("%Y%m%dT%H%M%SZ")
-    fresh.parent.mkdir(parents=True, exist_ok=True)
-    model, unplanned = seasons.with_season(model, now)
-    export(model, fresh)
-    publish_bundle(fresh)
+    write = partial(seasons.export_planned, model, now)
+    name, unplanned = publish_new(folder, write, publish_bundle, now, bundle.folder)
     notes += unplanned
-    return turn(f"published {fresh.name}: {100 * gain:.1f} % less error a day ahead on unseen weeks", published=True)
+    return turn(f"published {name}: {100 * gain:.1f} % less error a day ahead on unseen weeks", published=True)
 
 
 def _gain(log: Log, model: FittedModel, deployed: FittedModel) -> float:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+import traceback
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -15,6 +17,58 @@ from igrow.core.exchange.documents import parse_object
 NAME = "history.jsonl"
 LONGEST_TAIL = 2**20
 """Bytes from the end that are read: some thousands of runs."""
+
+
+@dataclass(frozen=True)
+class Turn:
+    """What one run did for one site: a line of its history."""
+
+    command: str
+    site: str
+    time: datetime
+    verdict: str
+    published: bool
+    note: str
+    causes: tuple[str, ...] = ()
+    gain: float = 0.0
+    """Relative fall of the 24 h error on unseen days against the bundle in force."""
+    notes: tuple[str, ...] = ()
+    """What was set aside or is missing, one sentence each."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the line of the history."""
+        return {
+            "time": self.time.strftime("%Y-%m-%dT%H:%M:%SZ"),
+            "command": self.command,
+            "site": self.site,
+            "verdict": self.verdict,
+            "causes": list(self.causes),
+            "gain": round(self.gain, 4),
+            "published": self.published,
+            "note": self.note,
+            "notes": list(self.notes),
+        }
+
+
+def keep(folder: Path, command: str, site: str, now: datetime, work: Callable[[], Turn]) -> Turn:
+    """Return what a run came to, and keep it; what fails in it, and a fault of this program, are a line of the history.
+
+    Raises MemoryError, and OSError where the history cannot be written.
+    """
+    try:
+        turn = work()
+    except (IgrowError, OSError) as error:
+        turn = Turn(command, site, now, "error", False, str(error))
+    except MemoryError:
+        raise  # whoever gave the limit says so
+    except Exception as error:  # a fault of ours in one site's data must not cost the others
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "fault.txt").write_text(traceback.format_exc(), encoding="utf-8")
+        what = f"{type(error).__name__}: {(str(error).splitlines() or [''])[0]}"
+        note = f"a fault of this program: {what}; see {folder / 'fault.txt'}"
+        turn = Turn(command, site, now, "error", False, note)
+    append(folder, turn.to_json())
+    return turn
 
 
 def append(folder: Path, line: Mapping[str, Any]) -> None:

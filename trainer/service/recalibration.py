@@ -6,69 +6,29 @@
 
 `<state>/sites/<site>` holds `bundles/` with what was published, the newest last, `history.jsonl` with one line a run,
 and the last diagnosis. A bundle that the gateway refused, or took back, is not built upon.
-
-All calls into the rooms of calibration, diagnosis and export stand in this file.
 """
 
 from __future__ import annotations
 
-import json
-import shutil
-import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
 from functools import partial
 from pathlib import Path
-from typing import Any
 
-from igrow.core.bundle import Bundle, BundleError, default_bundle_folder, read_bundle
+from igrow.core.bundle import Bundle
 from igrow.core.errors import IgrowError
 from igrow.core.site import Site
 from igrow.trainer.service import history, seasons
 from igrow.trainer.service.archive import Archive, SiteLog
+from igrow.trainer.service.history import Turn
+from igrow.trainer.service.site_memory import Publish, bundle_in_force, publish_new
 
 COMMAND = "recalibrate"
-KEPT = 5
-"""Published bundles that are kept for each site, besides the one in force."""
 LEAST_GAIN = 0.01
 """Relative fall of the 24 h error on unseen days, mean over quantities, that is worth a new bundle."""
 DAYS = 56
 """Newest days of the log that are looked at."""
-REFUSED = frozenset({"rejected", "refused", "went_back", "withdrawn"})
-"""Verdicts of a gateway after which a bundle is not in force there."""
-
-Publish = Callable[[Path], object]
-
-
-@dataclass(frozen=True)
-class Turn:
-    """What one run did for one site: a line of its history."""
-
-    site: str
-    time: datetime
-    verdict: str
-    published: bool
-    note: str
-    causes: tuple[str, ...] = ()
-    gain: float = 0.0
-    """Relative fall of the 24 h error on unseen days against the bundle in force."""
-    notes: tuple[str, ...] = ()
-    """What was set aside or is missing, one sentence each."""
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the line of the history."""
-        return {
-            "time": self.time.strftime("%Y-%m-%dT%H:%M:%SZ"),
-            "command": COMMAND,
-            "site": self.site,
-            "verdict": self.verdict,
-            "causes": list(self.causes),
-            "gain": round(self.gain, 4),
-            "published": self.published,
-            "note": self.note,
-            "notes": list(self.notes),
-        }
 
 
 def next_run(site: Site, folder: Path) -> datetime | None:
@@ -91,7 +51,7 @@ def recalibrate(
     """Diagnose one site and publish a better bundle; what happened goes into its history.
 
     Never raises for what the site sent: whatever fails is a line of its history and is tried again at the next run.
-    Raises MemoryError, and OSError where the history cannot be written.
+    Raises as `history.keep` does.
 
     Args:
         site: whose log it is.
@@ -105,20 +65,9 @@ def recalibrate(
     """
     due = next_run(site, folder)
     if due is not None and now < due and not force:
-        return Turn(site.name, now, "waiting", False, f"next at {due:%Y-%m-%d %H:%M} UTC")
-    try:
-        turn = _run(site, archive, folder, publish_bundle, now, days, drift)
-    except (IgrowError, OSError) as error:
-        turn = Turn(site.name, now, "error", False, str(error))
-    except MemoryError:
-        raise  # whoever gave the limit says so
-    except Exception as error:  # a fault of ours in one site's data must not cost the others
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "fault.txt").write_text(traceback.format_exc(), encoding="utf-8")
-        what = f"{type(error).__name__}: {(str(error).splitlines() or [''])[0]}"
-        turn = Turn(site.name, now, "error", False, f"a fault of this program: {what}; see {folder / 'fault.txt'}")
-    history.append(folder, turn.to_json())
-    return turn
+        return Turn(COMMAND, site.name, now, "waiting", False, f"next at {due:%Y-%m-%d %H:%M} UTC")
+    run = partial(_run, site, archive, folder, publish_bundle, now, days, drift)
+    return history.keep(folder, COMMAND, site.name, now, run)
 
 
 def _run(
@@ -139,7 +88,7 @@ def _run(
     notes += unreadable + outcome.notes
 
     def turn(note: str, *, published: bool = False) -> Turn:
-        return Turn(site.name, now, outcome.verdict, published, note, outcome.causes, outcome.gain, notes)
+        return Turn(COMMAND, site.name, now, outcome.verdict, published, note, outcome.causes, outcome.gain, notes)
 
     if outcome.write_bundle is None:
         return turn("; ".join(outcome.notes) or "nothing to publish")
@@ -149,14 +98,11 @@ def _run(
         return turn(f"a model with {gain} less error a day ahead on unseen days was found")
     if publish_bundle is None or not (better or seasons.lacking(bundle, site, now)):
         return turn(f"the bundle in force stays: the new model is only {gain} better on unseen days")
-    fresh = folder / "bundles" / now.strftime("%Y%m%dT%H%M%SZ")
-    fresh.parent.mkdir(parents=True, exist_ok=True)
     write = outcome.write_bundle if better else partial(_write_again, bundle, site, now)
-    notes += write(fresh)
-    publish_bundle(fresh)
-    forget_old(fresh.parent, bundle.folder)
+    name, unplanned = publish_new(folder, write, publish_bundle, now, bundle.folder)
+    notes += unplanned
     why = f"{gain} less error a day ahead on unseen days" if better else "the model in force, with the season planned"
-    return turn(f"published {fresh.name}: {why}", published=True)
+    return turn(f"published {name}: {why}", published=True)
 
 
 @dataclass(frozen=True)
@@ -176,20 +122,14 @@ def _diagnose(site: Site, log: SiteLog, bundle: Bundle, target: Path, now: datet
     from igrow.trainer.data import prepare_log  # noqa: PLC0415  (scipy is slow to import)
     from igrow.trainer.diagnosis import diagnose  # noqa: PLC0415
     from igrow.trainer.diagnosis.drift import read_drift  # noqa: PLC0415
-    from igrow.trainer.exporting import export, read_model  # noqa: PLC0415
+    from igrow.trainer.exporting import read_model  # noqa: PLC0415
     from igrow.trainer.report import write_diagnosis  # noqa: PLC0415
 
     prepared = prepare_log(log.telemetry, site, name=site.name)
     diagnosis = diagnose(prepared, read_model(bundle, site), drift=None if drift is None else read_drift(drift))
     write_diagnosis(target, diagnosis)
-    write_bundle = None
-    if diagnosis.verdict != "data_fault":
-
-        def write_bundle(folder: Path) -> tuple[str, ...]:
-            model, notes = seasons.with_season(diagnosis.corrected, now)
-            export(model, folder)
-            return notes
-
+    sound = diagnosis.verdict != "data_fault"
+    write_bundle = partial(seasons.export_planned, diagnosis.corrected, now) if sound else None
     causes = tuple(one.effect for one in diagnosis.findings)
     return Diagnosed(diagnosis.verdict, causes, relative_gain(diagnosis.errors), tuple(diagnosis.notes), write_bundle)
 
@@ -215,61 +155,9 @@ def relative_gain(errors: Mapping[str, Mapping[str, Mapping[str, float]]]) -> fl
     return sum(falls) / len(falls) if falls else 0.0
 
 
-def refused_bundles(reports: Sequence[Mapping[str, object]]) -> dict[str, str]:
-    """Return the bundles whose newest report says that they are not in force: identity -> verdict."""
-    newest = {str(report.get("identity")): str(report.get("verdict")) for report in reports}
-    return {identity: verdict for identity, verdict in newest.items() if verdict in REFUSED}
-
-
-def bundle_in_force(folder: Path, reports: Sequence[Mapping[str, object]]) -> tuple[Bundle, tuple[str, ...]]:
-    """Return the newest published bundle that the gateway has not refused or taken back, and sentences on damaged ones.
-
-    Where there is none it is the default bundle.
-    """
-    refused, notes = refused_bundles(reports), []
-    published = sorted((folder / "bundles").glob("*"), reverse=True) if (folder / "bundles").is_dir() else []
-    for candidate in published:
-        if candidate.name.endswith(".new"):
-            continue
-        try:
-            bundle = read_bundle(candidate)
-        except BundleError as error:
-            notes.append(f"{error}; its predecessor is built upon")
-            continue
-        if bundle.identity not in refused:
-            return bundle, tuple(notes)
-    return read_bundle(default_bundle_folder()), tuple(notes)
-
-
-def forget_old(bundles: Path, in_force: Path) -> None:
-    """Delete all but the newest published bundles; never the one in force, however many were refused since."""
-    for old in sorted(bundles.iterdir())[:-KEPT]:
-        if old.resolve() != in_force.resolve():
-            shutil.rmtree(old)
-
-
 def _missing(log: SiteLog) -> list[str]:
     if not log.missing_days:
         return []
     days = ", ".join(f"{day}" for day in log.missing_days[:10])
     more = f" and {len(log.missing_days) - 10} more" if len(log.missing_days) > 10 else ""
     return [f"{len(log.missing_days)} days have no row: {days}{more}"]
-
-
-def site_folder(state: Path, site: str) -> Path:
-    """Return the folder of one site's memory."""
-    return state / "sites" / site
-
-
-def read_diagnosis(folder: Path) -> dict[str, Any] | None:
-    """Return the last diagnosis of a site, None where there is none that can be read."""
-    try:
-        document: dict[str, Any] = json.loads((folder / "diagnosis" / "diagnosis.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
-        return None
-    return document if isinstance(document, dict) else None
-
-
-def utc_now() -> datetime:
-    """Return the time, UTC."""
-    return datetime.now(UTC)

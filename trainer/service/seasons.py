@@ -47,3 +47,12 @@ def with_season(model: FittedModel, now: datetime) -> tuple[FittedModel, tuple[s
             return replace(model, season=plan_season(site, bundle, begins=first_day(site, today))), ()
     except IgrowError as error:
         return model, (f"no season is planned: {error}",)
+
+
+def export_planned(model: FittedModel, now: datetime, folder: Path) -> tuple[str, ...]:
+    """Write a model with what is left of the season as a bundle; returns a sentence where that cannot be planned."""
+    from igrow.trainer.exporting import export  # noqa: PLC0415
+
+    model, notes = with_season(model, now)
+    export(model, folder)
+    return notes
