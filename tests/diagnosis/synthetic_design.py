@@ -21,7 +21,7 @@ from igrow.trainer.fit.gaussian import Gaussian
 
 BALANCES, HOURS = 2, 24
 START = np.datetime64("2020-03-01T00:00:00", "s")
-PLAIN = NoiseFilter(np.ones(1), np.ones(1), (), (2.0, 4.5, 0.5, 1.75, 3.0))
+PLAIN = NoiseFilter(np.ones(1), np.ones(1), (2.0, 4.5, 0.5, 1.75, 3.0))
 """Leaves errors as they are."""
 
 

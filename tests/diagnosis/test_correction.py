@@ -21,7 +21,7 @@ from igrow.trainer.diagnosis.estimate import Estimated
 from igrow.trainer.diagnosis.freerun import Stage
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
 from igrow.trainer.diagnosis.linear import Term
-from igrow.trainer.diagnosis.result import Interval, OnsetInterval
+from igrow.trainer.diagnosis.result import OnsetInterval
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.diagnosis.wording import discrepancy, finding
@@ -37,7 +37,7 @@ def cause(**values: float) -> Estimated:
     """A leak that stands: large, certain, and useful."""
     hypothesis = Hypothesis(Candidate("co2_valve_leak", ()), Term(0), 40.0, 1.0, 5.0, 0.001)
     one = Estimated(
-        hypothesis, ActiveTerm("co2_valve_leak", 1.0, {}), Interval(1.0, 0.6, 1.4, "g m-2 h-1"), 40.0, None,
+        hypothesis, ActiveTerm("co2_valve_leak", 1.0, {}), Estimate(1.0, 0.6, 1.4, "g m-2 h-1"), 40.0, None,
         ("co2_valve_leak",), bootstrap_p=0.1, effect_to_noise=1.0, skill=0.1,
     )  # fmt: skip
     return replace(one, **values)  # type: ignore[arg-type]
@@ -99,7 +99,7 @@ def test_a_change_must_not_make_unseen_days_worse(values: dict[str, float], stay
     ],
 )
 def test_a_cause_is_the_same_by_day_and_by_night_in_calm_and_in_wind(values: dict[str, float], same: bool) -> None:
-    regimes = {name: Interval(value, value - 0.1, value + 0.1, "1") for name, value in values.items()}
+    regimes = {name: Estimate(value, value - 0.1, value + 0.1, "1") for name, value in values.items()}
     assert same_in_all_regimes(regimes, DEFAULT) is same
     assert stands(replace(cause(), regimes=regimes), [], DEFAULT) is same
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from igrow.core.bundle import Estimate
 from igrow.core.effects import EFFECTS
 from igrow.trainer.diagnosis import compare
 from igrow.trainer.diagnosis.candidates import Candidate
@@ -15,7 +16,6 @@ from igrow.trainer.diagnosis.estimate import Estimated, estimate, normal_quantil
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
 from igrow.trainer.diagnosis.linear import Term
 from igrow.trainer.diagnosis.refit import Refitted
-from igrow.trainer.diagnosis.result import Interval
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.diagnosis.search import Hypothesis
 from tests.diagnosis.synthetic_design import Truth, in_fitted_noise, make_design, with_column
@@ -92,7 +92,7 @@ BOUNDS = EFFECTS["co2_valve_leak"].amplitude
 def leak(size: float) -> Estimated:
     cause = Hypothesis(Candidate("co2_valve_leak", ()), Term(0), 40.0, size, 5.0, 0.001)
     term = ActiveTerm("co2_valve_leak", size, {}, None)
-    return Estimated(cause, term, Interval(size, size - 0.5, size + 0.5, BOUNDS.unit), 40.0, None, ("co2_valve_leak",))
+    return Estimated(cause, term, Estimate(size, size - 0.5, size + 0.5, BOUNDS.unit), 40.0, None, ("co2_valve_leak",))
 
 
 def test_a_size_beyond_its_bound_is_brought_back_and_its_interval_reaches_it() -> None:

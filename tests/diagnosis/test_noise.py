@@ -53,7 +53,7 @@ def test_balances_that_go_together_become_independent() -> None:
 
 
 def test_the_likelihood_is_that_of_students_t() -> None:
-    plain = NoiseFilter(np.ones(1), np.ones(1), (), (0.0,) * 5)
+    plain = NoiseFilter(np.ones(1), np.ones(1), (0.0,) * 5)
     whitening = Whitening((plain,), np.array([[1.0 / 0.7]]), np.ones((1, 3)))
     errors = np.array([[[0.0, 0.5, -4.0]]])
     exact = student(FREEDOM, scale=0.7).logpdf(errors[0, 0])

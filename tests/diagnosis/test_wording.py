@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from igrow.core.bundle import Estimate
 from igrow.core.effects import EFFECTS
 from igrow.trainer.diagnosis import wording
 from igrow.trainer.diagnosis.candidates import Candidate, Pattern
 from igrow.trainer.diagnosis.estimate import Estimated
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
 from igrow.trainer.diagnosis.linear import Term
-from igrow.trainer.diagnosis.result import Interval, OnsetInterval, plain
+from igrow.trainer.diagnosis.result import OnsetInterval, plain
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.diagnosis.search import Hypothesis
 
@@ -22,8 +23,8 @@ BEGAN = np.datetime64("2020-03-14T06:00:00", "s")
 
 def leak(confounded: tuple[str, ...] = ("wind_infiltration",)) -> Estimated:
     cause = Hypothesis(Candidate("wind_infiltration", ()), Term(0), 40.0, 0.118, 5.0, 0.001)
-    shapes = {"exponent": Interval(1.1, 0.9, 1.3, "1")}
-    size = Interval(0.118, 0.08, 0.15, "h-1 (m s-1)-1")
+    shapes = {"exponent": Estimate(1.1, 0.9, 1.3, "1")}
+    size = Estimate(0.118, 0.08, 0.15, "h-1 (m s-1)-1")
     term = ActiveTerm("wind_infiltration", 0.118, {"exponent": 1.1})
     return Estimated(cause, term, size, 40.0, None, confounded, shapes=shapes)
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from igrow.core.bundle import Estimate
 from igrow.core.effects import EFFECTS
 from igrow.core.errors import IgrowError
 from igrow.core.language import LANGUAGES, speak
@@ -23,7 +24,6 @@ from igrow.trainer.data.plot import plot_log
 from igrow.trainer.diagnosis import Diagnosis, plots
 from igrow.trainer.diagnosis.open_vents import OpenVents
 from igrow.trainer.diagnosis.persistence import misfits, persistence_errors
-from igrow.trainer.diagnosis.result import Interval
 from igrow.trainer.report import data_faults, render_report, sentences, write_diagnosis
 from igrow.trainer.report.page import error_rows
 from igrow.trainer.report.worth import Worth, worth
@@ -103,7 +103,7 @@ def test_a_leak_costs_what_the_outdoor_air_that_comes_in_must_be_heated(leak: Di
     assert 0.4 * all_day < found.heat < all_day
     assert found.co2 > 0.0
     assert found.money == pytest.approx(0.0083 * found.heat + 0.08 * found.co2)
-    half = replace(finding, parameters={"air_changes": Interval(1.0, 0.5, 1.5, "h-1")})
+    half = replace(finding, parameters={"air_changes": Estimate(1.0, 0.5, 1.5, "h-1")})
     assert worth(leak, half).spread == (0.5, 1.5)  # type: ignore[union-attr]
 
 
@@ -144,7 +144,7 @@ def test_a_sensor_that_reads_too_much_saves_heat_since_the_greenhouse_is_colder(
 
 
 def test_an_actuator_that_the_log_lacks_is_told_in_every_language(leak: Diagnosis) -> None:
-    share = {"share": Interval(0.9, 0.8, 1.0, "1")}
+    share = {"share": Estimate(0.9, 0.8, 1.0, "1")}
     lamps = replace(
         leak.findings[0], effect="lamp_power", kind="actuator", parameters=share, confounded=("lamp_power",)
     )
@@ -219,7 +219,7 @@ def test_errors_and_differences_of_an_american_site_are_in_its_degrees(leak: Dia
     ours, theirs = (drawn(plots.residual_against_driver(evidence, "wind_speed", one)) for one in (metric, us))
     assert theirs[:, 0] == pytest.approx(ours[:, 0] * 2.23693629)
     assert theirs[:, 1] == pytest.approx(ours[:, 1] * 1.8, nan_ok=True)
-    regimes = {"calm": (1.0, 0.5, 1.5), "windy": (2.0, 1.5, 2.5)}
+    regimes = {"calm": Estimate(1.0, 0.5, 1.5, "K"), "windy": Estimate(2.0, 1.5, 2.5, "K")}
     ours, theirs = (drawn(plots.coefficient_by_regime(regimes, one, "K")) for one in (metric, us))
     assert theirs[:, 0] == pytest.approx(ours[:, 0] * 1.8)
     assert leak.log is not None
@@ -231,11 +231,11 @@ def test_errors_and_differences_of_an_american_site_are_in_its_degrees(leak: Dia
 
 
 def test_the_size_of_a_cause_goes_with_its_unit(leak: Diagnosis) -> None:
-    offset = Interval(1.0, 0.5, 1.5, "K")
+    offset = Estimate(1.0, 0.5, 1.5, "K")
     finding = replace(leak.findings[0], effect="air_temperature_offset", parameters={"offset": offset}, onset=None)
     assert sentences.cause(finding, speak("en", units="us")) == "The temperature sensor reads 1.8 °F too much."
     assert sentences.cause(finding, speak("de")) == "Der Temperatursensor zeigt 1 K zu viel an."
-    sun = Interval(0.5, 0.3, 0.7, "K (100 W m-2)-1")
+    sun = Estimate(0.5, 0.3, 0.7, "K (100 W m-2)-1")
     name = "air_temperature_radiation_error"
     warmed = replace(finding, effect=name, parameters={EFFECTS[name].amplitude.name: sun})
     assert "it reads 0.9 °F too much for each" in sentences.cause(warmed, speak("en", units="us"))

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from igrow.core.arrays import Floats
+from igrow.core.bundle import Estimate
 from igrow.core.simulator import actuation
 from igrow.core.simulator.hybrid import climate, measurement, record
 from igrow.core.simulator.hybrid.record import Record
@@ -24,7 +25,6 @@ from igrow.trainer.diagnosis import freerun, linear, sensitivity
 from igrow.trainer.diagnosis.estimate import normal_quantile
 from igrow.trainer.diagnosis.freerun import LogDays, Stage
 from igrow.trainer.diagnosis.knowledge import Knowledge, activate
-from igrow.trainer.diagnosis.result import Interval
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.fit.actuation import setpoint_columns
 from igrow.trainer.fit.model import FittedModel
@@ -47,10 +47,10 @@ class Share:
         """Of having followed the rules against having stood still."""
         return (self.value - 0.5) / self.deviation**2
 
-    def interval(self, rules: DecisionRules) -> Interval:
+    def interval(self, rules: DecisionRules) -> Estimate:
         """Return it with its interval."""
         reach = normal_quantile(rules) * self.deviation
-        return Interval(self.value, self.value - reach, self.value + reach, "1")
+        return Estimate(self.value, self.value - reach, self.value + reach, "1")
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Replaced:
     """An actuator that the log lacks and that explains what is missing."""
 
     actuator: str
-    share: Interval
+    share: Estimate
     """Of the course that the rules give it: one is what the computer would have done."""
     skill: float
     """Share of the squared error on unseen days that it removes beyond recalibration."""

@@ -19,7 +19,7 @@ from igrow.trainer.diagnosis.freerun import LogDays, Stage
 from igrow.trainer.diagnosis.knowledge import Knowledge, drift, home_drift
 from igrow.trainer.diagnosis.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.refit import REGIMES
-from igrow.trainer.diagnosis.result import Finding, Interval
+from igrow.trainer.diagnosis.result import Finding
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.fit.model import FittedModel
@@ -118,7 +118,7 @@ def is_proven_change(one: Estimated, kept: Sequence[Estimated], rules: DecisionR
     )
 
 
-def same_in_all_regimes(regimes: Mapping[str, Interval], rules: DecisionRules) -> bool:
+def same_in_all_regimes(regimes: Mapping[str, Estimate], rules: DecisionRules) -> bool:
     """Tell whether a cause's size is about the same by day and by night, in calm and in wind, and so on.
 
     A regime in which the effect hardly shows has no size of its own.
@@ -224,12 +224,7 @@ def corrected_model(
 
 def effect_record(finding: Finding) -> EffectRecord:
     """Return a finding of the catalogue as the manifest's record of an effect."""
-    estimates = {
-        name: Estimate(float(one.value), float(one.low), float(one.high), one.unit)
-        for name, one in finding.parameters.items()
-    }
     began = finding.onset
     onset = None if began is None else Onset(*map(utc_datetime, (began.time, began.low, began.high)))
-    return EffectRecord(
-        finding.effect, EFFECTS[finding.effect].kind, estimates, finding.balances, onset, finding.confounded[1:]
-    )
+    kind, parameters = EFFECTS[finding.effect].kind, dict(finding.parameters)
+    return EffectRecord(finding.effect, kind, parameters, finding.balances, onset, finding.confounded[1:])

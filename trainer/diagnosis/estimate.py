@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.stats import chi2, norm
 
+from igrow.core.bundle import Estimate
 from igrow.core.effects import EFFECTS
 from igrow.trainer.diagnosis import linear, search
 from igrow.trainer.diagnosis.candidates import Candidate
@@ -15,7 +16,7 @@ from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
 from igrow.trainer.diagnosis.linear import Fit, Term
 from igrow.trainer.diagnosis.refit import Refitted
-from igrow.trainer.diagnosis.result import Interval, OnsetInterval
+from igrow.trainer.diagnosis.result import OnsetInterval
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.diagnosis.search import Hypothesis
 
@@ -26,7 +27,7 @@ class Estimated:
 
     hypothesis: Hypothesis
     term: ActiveTerm
-    amplitude: Interval
+    amplitude: Estimate
     gain: float
     """Log-likelihood that it adds to the model it was found in."""
     onset: OnsetInterval | None
@@ -36,8 +37,8 @@ class Estimated:
     """Probability that it does not make unseen days likelier."""
     shift: dict[str, float] = field(default_factory=dict)
     """How the parameters move when it comes in."""
-    shapes: dict[str, Interval] = field(default_factory=dict)
-    regimes: dict[str, Interval] = field(default_factory=dict)
+    shapes: dict[str, Estimate] = field(default_factory=dict)
+    regimes: dict[str, Estimate] = field(default_factory=dict)
     effect_to_noise: float = 0.0
     skill: float = 0.0
     """Share of the squared error on unseen days that it removes."""
@@ -61,7 +62,7 @@ def estimate(found: Round, rng: np.random.Generator) -> Estimated | None:
     return Estimated(
         hypothesis,
         ActiveTerm(hypothesis.effect, amplitude, shape, None if onset is None else onset.time),
-        Interval(amplitude, amplitude - wide, amplitude + wide, EFFECTS[hypothesis.effect].amplitude.unit),
+        Estimate(amplitude, amplitude - wide, amplitude + wide, EFFECTS[hypothesis.effect].amplitude.unit),
         hypothesis.gain,
         onset,
         _confounded(design, null, hypothesis, gain, rng),
@@ -78,15 +79,15 @@ def with_refitted(one: Estimated, refitted: Refitted, rules: DecisionRules) -> E
     for shape in definition.shapes:
         value = refitted.term.shape[shape.name]
         wide = errors * refitted.shape_deviation[shape.name]
-        shapes[shape.name] = Interval(value, max(value - wide, shape.low), min(value + wide, shape.high), shape.unit)
+        shapes[shape.name] = Estimate(value, max(value - wide, shape.low), min(value + wide, shape.high), shape.unit)
     form = rules.form_deviation * amplitude
     wide = normal_quantile(rules) * float(np.hypot(rules.deviation_inflation * refitted.deviation, form))
     unit = definition.amplitude.unit
     regimes = {
-        name: Interval(value, value - errors * deviation, value + errors * deviation, unit)
+        name: Estimate(value, value - errors * deviation, value + errors * deviation, unit)
         for name, (value, deviation) in refitted.regimes.items()
     }
-    interval = Interval(amplitude, amplitude - wide, amplitude + wide, unit)
+    interval = Estimate(amplitude, amplitude - wide, amplitude + wide, unit)
     return replace(one, term=refitted.term, amplitude=interval, shapes=shapes, regimes=regimes)
 
 

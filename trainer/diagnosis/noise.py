@@ -22,6 +22,8 @@ from igrow.core.arrays import Floats, Mask
 
 FREEDOM = 5.0
 """Degrees of freedom of Student's t."""
+ORDER = 2
+"""Number of first-order disturbances: a fast and a slow one."""
 _LARGEST_ROOT = 0.92
 """At 15 minutes a correlation time of a day: what is slower is not a disturbance but a wrong model."""
 
@@ -32,8 +34,6 @@ class NoiseFilter:
 
     numerator: Floats
     denominator: Floats
-    poles: tuple[float, ...]
-    """Of the disturbance: its colour, by step."""
     raw: tuple[float, ...]
     """Where the next fit may begin."""
 
@@ -60,26 +60,25 @@ class Whitening:
         return white
 
 
-def fit_filter(errors: Floats, counted: Mask, order: int = 2, start: NoiseFilter | None = None) -> NoiseFilter:
+def fit_filter(errors: Floats, counted: Mask, start: NoiseFilter | None = None) -> NoiseFilter:
     """Fit the filter of one balance by maximum likelihood under Student's t.
 
     Args:
         errors: of runs, (r, steps), 0 where not observed.
         counted: samples that count, (r, steps).
-        order: number of first-order disturbances (a fast and a slow one by default).
         start: where to begin.
     """
     normal = np.clip(errors / _scale(errors[counted]), -12.0, 12.0)
     raw = (
-        np.concatenate([np.linspace(2.0, 4.5, order), np.linspace(0.5, 3.0, order + 1)])
+        np.concatenate([np.linspace(2.0, 4.5, ORDER), np.linspace(0.5, 3.0, ORDER + 1)])
         if start is None
         else np.asarray(start.raw)
     )
     for _ in range(3):
-        scale = _t_scale(_filtered(normal, raw, order)[counted])
+        scale = _t_scale(_filtered(normal, raw)[counted])
 
         def deviance(values: Floats, scale: float = scale) -> Floats:
-            innovation = _filtered(normal, values, order)[counted] / scale
+            innovation = _filtered(normal, values)[counted] / scale
             root: Floats = np.sign(innovation) * np.sqrt((FREEDOM + 1.0) * np.log1p(innovation**2 / FREEDOM))
             return root
 
@@ -87,8 +86,7 @@ def fit_filter(errors: Floats, counted: Mask, order: int = 2, start: NoiseFilter
         raw = np.asarray(least_squares(deviance, raw, bounds=(-3.0, 9.0), max_nfev=12, ftol=1e-5, xtol=1e-3).x)
         if np.max(np.abs(raw - before)) < 0.02:
             break
-    numerator, denominator, poles = _coefficients(raw, order)
-    return NoiseFilter(numerator, denominator, poles, tuple(float(value) for value in raw))
+    return filter_of(tuple(float(value) for value in raw))
 
 
 def fit_whitening(errors: Floats, counted: Mask, filters: tuple[NoiseFilter, ...]) -> Whitening:
@@ -138,8 +136,7 @@ def rescaled(filters: tuple[NoiseFilter, ...], errors: Floats, observed: Mask, f
 
 def filter_of(raw: tuple[float, ...]) -> NoiseFilter:
     """Return the filter of raw coefficients."""
-    numerator, denominator, poles = _coefficients(np.asarray(raw), len(raw) // 2)
-    return NoiseFilter(numerator, denominator, poles, raw)
+    return NoiseFilter(*_coefficients(np.asarray(raw)), raw)
 
 
 def log_likelihood(whitening: Whitening, errors: Floats) -> Floats:
@@ -169,17 +166,16 @@ def _distance(whitening: Whitening, errors: Floats) -> Floats:
     return distance
 
 
-def _coefficients(raw: Floats, order: int) -> tuple[Floats, Floats, tuple[float, ...]]:
+def _coefficients(raw: Floats) -> tuple[Floats, Floats]:
+    """Return numerator and denominator: the disturbance's poles, which whitening turns into zeros, come first."""
     roots = _LARGEST_ROOT * np.tanh(0.5 * raw)
-    poles, zeros = roots[:order], roots[order:]
-    numerator: Floats = np.poly(poles).astype(np.float64)
-    denominator: Floats = np.poly(zeros).astype(np.float64)
-    return numerator, denominator, tuple(float(pole) for pole in poles)
+    numerator: Floats = np.poly(roots[:ORDER]).astype(np.float64)
+    denominator: Floats = np.poly(roots[ORDER:]).astype(np.float64)
+    return numerator, denominator
 
 
-def _filtered(values: Floats, raw: Floats, order: int) -> Floats:
-    numerator, denominator, _ = _coefficients(raw, order)
-    filtered: Floats = lfilter(numerator, denominator, values)
+def _filtered(values: Floats, raw: Floats) -> Floats:
+    filtered: Floats = lfilter(*_coefficients(raw), values)
     return filtered
 
 

@@ -13,11 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from igrow.core.bundle import Estimate
 from igrow.core.language import N_
 from igrow.trainer.diagnosis import change, linear, search
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.estimate import onset_interval, reach
-from igrow.trainer.diagnosis.result import Interval, OnsetInterval
+from igrow.trainer.diagnosis.result import OnsetInterval
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.fit.climate import bounds
 
@@ -71,7 +72,7 @@ class ParameterChange:
     """A parameter that is not what it was at the calibration."""
 
     parameter: str
-    share: Interval
+    share: Estimate
     """Of its value then: -0.3 is 30 % less."""
     onset: OnsetInterval | None
     p_value: float
@@ -113,7 +114,7 @@ def find(design: Design, rng: np.random.Generator) -> ParameterChange | None:
     ]
     return ParameterChange(
         best.parameter,
-        Interval(size / value, least, most, "1"),
+        Estimate(size / value, least, most, "1"),
         onset_interval(design, null, best.term),
         best.p_value,
         (best.parameter, *as_good),

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from igrow.core.arrays import Floats, Mask
+from igrow.core.bundle import Estimate
 from igrow.core.errors import IgrowError
 from igrow.core.language import ENGLISH, Language
 from igrow.core.quantities import QUANTITIES
@@ -122,17 +123,15 @@ def residual_against_driver(evidence: Evidence, driver: str, language: Language 
     return figure
 
 
-def coefficient_by_regime(
-    regimes: Mapping[str, tuple[float, float, float]], language: Language = ENGLISH, unit: str = ""
-) -> Figure:
-    """Plot a coefficient with its interval, (value, low, high), by regime."""
+def coefficient_by_regime(regimes: Mapping[str, Estimate], language: Language = ENGLISH, unit: str = "") -> Figure:
+    """Plot a coefficient with its interval by regime."""
     if not regimes:
         raise IgrowError("this cause has no size by regime: there is nothing to plot")
     figure, (axes,) = panels(1, 0.7 + 0.24 * len(regimes))
     shown = language.shown(unit)
-    for index, (value, low, high) in enumerate(regimes.values()):
-        axes.plot([shown.of(low), shown.of(high)], [index, index], color=COLOURS["recalibrated"], linewidth=3)
-        axes.plot([shown.of(value)], [index], marker="o", color=COLOURS["ink"])
+    for index, one in enumerate(regimes.values()):
+        axes.plot([shown.of(one.low), shown.of(one.high)], [index, index], color=COLOURS["recalibrated"], linewidth=3)
+        axes.plot([shown.of(one.value)], [index], marker="o", color=COLOURS["ink"])
     axes.set_yticks(range(len(regimes)), [language.name(name) for name in regimes])
     axes.invert_yaxis()
     size, written = language.text("size"), language.unit(unit)

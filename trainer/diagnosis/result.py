@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from igrow.core.bundle import Estimate
 from igrow.core.language import Language, speak
 from igrow.core.quantities import QUANTITIES
 from igrow.trainer.data.screening import Screened
@@ -31,16 +32,6 @@ DISCREPANCY = "discrepancy"
 
 
 @dataclass(frozen=True)
-class Interval:
-    """A value with its confidence interval."""
-
-    value: float
-    low: float
-    high: float
-    unit: str
-
-
-@dataclass(frozen=True)
 class OnsetInterval:
     """When something began, UTC, with its confidence interval."""
 
@@ -58,7 +49,7 @@ class Finding:
     ``discrepancy``."""
     kind: Literal["process", "sensor", "actuator", "parameter", "discrepancy"]
     balances: tuple[str, ...]
-    parameters: Mapping[str, Interval]
+    parameters: Mapping[str, Estimate]
     onset: OnsetInterval | None
     p_value: float
     confounded: tuple[str, ...]
@@ -69,7 +60,7 @@ class Finding:
     """For the grower."""
     effect_to_noise: float = 0.0
     """RMS that it moves in a 24 h free run over the RMS that no model removes."""
-    regimes: Mapping[str, Interval] = field(default_factory=dict)
+    regimes: Mapping[str, Estimate] = field(default_factory=dict)
     """The coefficient refitted by regime."""
     resembles: tuple[str, ...] = ()
     """Parameters of the model whose growth would be the same finding: more air leaks in the wind either way."""
@@ -182,9 +173,7 @@ class Diagnosis:
         """Return a figure of a finding's coefficient by regime; raises as `plot_errors` does."""
         from igrow.trainer.diagnosis import plots  # noqa: PLC0415
 
-        return plots.coefficient_by_regime(
-            {name: (one.value, one.low, one.high) for name, one in finding.regimes.items()}, self._english
-        )
+        return plots.coefficient_by_regime(finding.regimes, self._english)
 
     @property
     def _english(self) -> Language:

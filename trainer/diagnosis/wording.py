@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from igrow.core.bundle import Estimate
 from igrow.core.effects import EFFECTS
 from igrow.core.language import N_
 from igrow.core.language.units import written
@@ -13,7 +14,7 @@ from igrow.trainer.diagnosis.actuators import Replaced
 from igrow.trainer.diagnosis.candidates import UNIT_FLUX, Pattern
 from igrow.trainer.diagnosis.estimate import Estimated, normal_quantile
 from igrow.trainer.diagnosis.parameter_change import VISIBLE, ParameterChange
-from igrow.trainer.diagnosis.result import DISCREPANCY, Finding, Interval, OnsetInterval, plain
+from igrow.trainer.diagnosis.result import DISCREPANCY, Finding, OnsetInterval, plain
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.diagnosis.search import Hypothesis
 
@@ -142,7 +143,7 @@ def discrepancy(patterns: Sequence[Hypothesis], rules: DecisionRules) -> Finding
     """Return the finding for what no candidate explains."""
     balances: dict[str, None] = {}
     drivers: dict[str, None] = {}
-    parameters: dict[str, Interval] = {}
+    parameters: dict[str, Estimate] = {}
     words: list[str] = []
     for one in patterns:
         pattern = one.cause
@@ -151,7 +152,7 @@ def discrepancy(patterns: Sequence[Hypothesis], rules: DecisionRules) -> Finding
         drivers |= dict.fromkeys(pattern.drivers)
         size = UNIT_FLUX[pattern.channel]
         reach = normal_quantile(rules) * abs(one.amplitude) / max(one.statistic, 1e-9)
-        parameters[f"{pattern.channel}: {pattern.when}"] = Interval(
+        parameters[f"{pattern.channel}: {pattern.when}"] = Estimate(
             size * one.amplitude, size * (one.amplitude - reach), size * (one.amplitude + reach), UNITS[pattern.channel]
         )
         words.append(f"{NAMES[pattern.channel]} ({'more' if one.amplitude > 0 else 'less'}, {pattern.when})")

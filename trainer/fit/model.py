@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,6 @@ import numpy as np
 from igrow.core.arrays import Floats
 from igrow.core.bundle import EffectRecord, HeldOutError, Span
 from igrow.core.planner.season import SeasonPlan
-from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator import actuation, holding
 from igrow.core.simulator.crop import CropStages
 from igrow.core.simulator.growth import prior_of
@@ -198,27 +196,6 @@ class FittedModel:
             },
             "notes": list(self.notes),
         }
-
-    def plot_errors(self, path: Path | None = None) -> Any:
-        """Return a matplotlib figure of the errors before and after, a panel for each quantity; `path` saves it."""
-        from matplotlib.figure import Figure  # noqa: PLC0415  (matplotlib is slow to import)
-
-        quantities = list(dict.fromkeys(one.quantity for one in self.errors))
-        figure = Figure(figsize=(3.2 * max(1, len(quantities)), 2.8), layout="constrained")
-        for position, quantity in enumerate(quantities):
-            axes = figure.add_subplot(1, len(quantities), position + 1)
-            rows = [one for one in self.errors if one.quantity == quantity]
-            place = np.arange(len(rows))
-            axes.bar(place - 0.2, [one.before for one in rows], 0.4, label="before", color="0.7")
-            axes.bar(place + 0.2, [one.after for one in rows], 0.4, label="after", color="tab:green")
-            axes.set_xticks(place, [one.horizon.replace("_", " ") for one in rows])
-            axes.set_title(f"{quantity.replace('_', ' ')} ({QUANTITIES[quantity].unit})", fontsize=9)
-        if quantities:
-            figure.axes[0].set_ylabel("mean absolute error")
-            figure.axes[0].legend(fontsize=8)
-        if path is not None:
-            figure.savefig(path)
-        return figure
 
 
 def united(*ranges: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:

@@ -1,4 +1,4 @@
-"""Every nonlinear fit of the trainer: weighted, robust least squares under a normal prior, within bounds.
+"""Every fit of a simulated model: weighted, robust least squares under a normal prior, within bounds.
 
     minimise  1/2 sum_i w_i rho(r_i(x)) + 1/2 (x - m)^T S^-1 (x - m),   low <= x <= high
 
@@ -58,8 +58,6 @@ class Solution:
     """At the minimum, (n, p)."""
     cost: float
     """What was minimised, at the minimum."""
-    evaluations: int
-    """Points that were tried."""
 
 
 def solve(
@@ -119,7 +117,7 @@ def solve(
 
     if not np.isfinite(rows(np.zeros(len(begin)))).all():
         raise DivergenceError("the model runs out of all bounds where the fit begins")
-    place, tried = np.zeros(len(begin)), 0
+    place = np.zeros(len(begin))
     edges = (low - begin) / scale, (high - begin) / scale
     # "dogbox" is quick, exact, and lies on bounds, but it can stop on its way where several parameters lie near theirs;
     # "trf" goes on from there, if it does not begin on a bound.
@@ -135,7 +133,6 @@ def solve(
             xtol=_STEP_TOLERANCE,
             max_nfev=evaluations,
         )
-        tried += int(found.nfev)
         if _has_arrived(found):
             break
         inside = np.minimum(_INSIDE, 0.5 * (edges[1] - edges[0]))
@@ -144,7 +141,7 @@ def solve(
     near = _AT_BOUND * scale
     point = np.where(point < low + near, low, np.where(point > high - near, high, point))
     posterior = Gaussian(prior.names, point, covariance(errors, slope, prior, weights=weight, robust=robust))
-    return Solution(posterior, errors, slope, float(found.cost), tried)
+    return Solution(posterior, errors, slope, float(found.cost))
 
 
 def covariance(

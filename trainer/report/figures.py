@@ -58,11 +58,12 @@ def evidence(result: Diagnosis, language: Language) -> list[Picture]:
         wanted.append((language.text("When the evidence came"), partial(plots.evidence_by_day, seen, language)))
     for finding in result.findings:
         if finding.effect in EFFECTS and finding.regimes:
-            regimes = {name: (one.value, one.low, one.high) for name, one in finding.regimes.items()}
             unit = EFFECTS[finding.effect].amplitude.unit
             title = language.text("The size in parts of the log: {cause}")
             cause = language.text(EFFECTS[finding.effect].title)
-            wanted.append((title.format(cause=cause), partial(plots.coefficient_by_regime, regimes, language, unit)))
+            wanted.append(
+                (title.format(cause=cause), partial(plots.coefficient_by_regime, finding.regimes, language, unit))
+            )
     return list(_drawn(wanted))
 
 
