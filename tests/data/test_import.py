@@ -183,6 +183,14 @@ def test_a_file_that_is_not_what_its_name_says_is_refused_in_one_line(tmp_path: 
     assert capsys.readouterr().err.count("\n") == 1
 
 
+def test_a_parquet_file_may_have_its_times_in_the_index_and_in_a_column(tmp_path: Path, capsys) -> None:
+    time = pd.date_range("2020-02-01", periods=500, freq="5min", tz="UTC")
+    warmth = {"Air temperature (C)": 20.0 + np.sin(np.arange(500.0)), "Outside temperature (C)": np.arange(500.0) % 9}
+    pd.DataFrame({"time": time, **warmth}, index=time.tz_localize(None)).to_parquet(tmp_path / "export.parquet")
+    assert main(["import", str(tmp_path / "export.parquet")]) == 0
+    assert "air_temperature         Air temperature (C)" in capsys.readouterr().out
+
+
 def test_every_error_about_a_log_names_the_command(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("Datum;Tkas\n01-02-2020 00:00;20,1\n")
     with pytest.raises(IgrowError, match=r"`igrow-trainer import .*log.csv` finds out how it is to be read"):

@@ -198,15 +198,23 @@ def _rows_of(book: Any, sheet: str) -> list[tuple[list[str], int]]:
     return [([_text(cell) for cell in row], line) for line, row in enumerate(rows, 1)]
 
 
-def _parquet(path: Path) -> list[tuple[list[str], int]]:
+def read_frame(path: Path) -> Any:
+    """Return a Parquet file as a `pandas.DataFrame`; raises IgrowError."""
     import pandas as pd  # noqa: PLC0415  (slow to import)
 
     try:
-        frame = pd.read_parquet(path)
+        return pd.read_parquet(path)
     except (OSError, ValueError) as error:
         raise IgrowError(f"{path}: cannot be read as Parquet: {str(error).splitlines()[0]}") from None
-    if isinstance(frame.index, pd.DatetimeIndex):
-        frame = frame.reset_index(names=frame.index.name or "time")
+
+
+def _parquet(path: Path) -> list[tuple[list[str], int]]:
+    import pandas as pd  # noqa: PLC0415  (slow to import)
+
+    frame = read_frame(path)
+    name = frame.index.name or "time"
+    if isinstance(frame.index, pd.DatetimeIndex) and name not in frame.columns:
+        frame = frame.reset_index(names=name)
     columns = [[_text(cell) for cell in frame[name].tolist()] for name in frame.columns]
     head = [str(name) for name in frame.columns]
     return [(head, 1), *((list(row), line) for line, row in enumerate(zip(*columns, strict=True), 2))]

@@ -12,7 +12,14 @@ from igrow.core.arrays import Floats, Times
 from igrow.core.telemetry import Telemetry, concatenate, from_rows
 from igrow.trainer.data.fault import DataFault
 
-COMPARED = ("air_temperature", "outdoor_temperature", "air_humidity", "air_co2", "global_radiation")
+COMPARED = {
+    "air_temperature": 0.1,
+    "outdoor_temperature": 0.1,
+    "air_humidity": 0.5,
+    "air_co2": 5.0,
+    "global_radiation": 10.0,
+}
+"""Quantities that are compared; differences below are nothing, whatever the pace of the log."""
 LARGEST_RATIO = 3.0
 """How much further than the next row a repeated row may lie, in medians of each, before it contradicts the first."""
 FAR_DAYS, FEW = 60, 0.01
@@ -113,7 +120,7 @@ def without_strays(telemetry: Telemetry) -> tuple[Telemetry, tuple[str, ...]]:
 
 def _contradiction(time: Times, columns: Mapping[str, Floats], table: Telemetry) -> str | None:
     """Return how rows of one time differ, where they do so by far more than a row does from the next."""
-    for name in COMPARED:
+    for name, nothing in COMPARED.items():
         if name not in columns:
             continue
         read = np.flatnonzero(np.isfinite(columns[name]))
@@ -124,19 +131,9 @@ def _contradiction(time: Times, columns: Mapping[str, Floats], table: Telemetry)
         usual = _median_step(table[name])
         if len(apart) >= LEAST_REPEATED and usual is not None:
             middle = float(np.median(apart))
-            if middle > LARGEST_RATIO * max(usual, _RESOLUTION[name]):
+            if middle > LARGEST_RATIO * max(usual, nothing):
                 return f"their {name} differs by {middle:.3g}, where a row differs from the next by {usual:.3g}"
     return None
-
-
-_RESOLUTION = {
-    "air_temperature": 0.1,
-    "outdoor_temperature": 0.1,
-    "air_humidity": 0.5,
-    "air_co2": 5.0,
-    "global_radiation": 10.0,
-}
-"""Differences below are nothing, whatever the pace of the log."""
 
 
 def _median_step(values: Floats) -> float | None:

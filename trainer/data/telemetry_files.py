@@ -13,7 +13,7 @@ from igrow.core import telemetry as core
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import QUANTITIES
 from igrow.trainer.data import export, mapping
-from igrow.trainer.data.cells import ARCHIVE, ENDINGS, EXCEL, may_be_table
+from igrow.trainer.data.cells import ARCHIVE, ENDINGS, EXCEL, may_be_table, read_frame
 from igrow.trainer.data.rows import Merged, joined, merge
 from igrow.trainer.data.source import Source
 
@@ -82,10 +82,7 @@ def read_parquet(path: Path) -> Merged:
     """
     import pandas as pd  # noqa: PLC0415  (slow to import)
 
-    try:
-        frame = pd.read_parquet(path)
-    except (OSError, ValueError) as error:
-        raise IgrowError(f"{path}: cannot be read as Parquet: {str(error).splitlines()[0]}") from None
+    frame = read_frame(path)
     if "time" not in frame.columns and isinstance(frame.index, pd.DatetimeIndex):
         frame = frame.reset_index(names="time")
     if "time" not in frame.columns:

@@ -7,8 +7,8 @@ import numpy as np
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data.fault import DataFault
 from igrow.trainer.data.grid import HOUR, own_step
+from igrow.trainer.data.screening import NEEDED
 
-NEEDED = ("outdoor_temperature", "air_temperature")
 LEAST_DAYS = 5
 """Days with readings in half of their hours that a log needs, if it has more days than these."""
 LEAST_CORRELATION = 0.3
