@@ -56,11 +56,11 @@ def vapour_pressure_deficit(xp: Any, temperature: Array, concentration: Array) -
     return xp.maximum(saturation_pressure(xp, temperature) - pressure, 0.0 * pressure)
 
 
-def co2_concentration(temperature: Array, ppm: Array, pressure: float = STANDARD_PRESSURE) -> Array:
-    """Return the CO2 content in kg m-3 of air with a volume fraction in ppm."""
-    return ppm * (1e-6 * pressure * MOLAR_MASS_CO2 / GAS_CONSTANT) / (temperature + 273.15)
+def co2_concentration(temperature: Array, ppm: Array) -> Array:
+    """Return the CO2 content in kg m-3 of air of standard pressure with a volume fraction in ppm."""
+    return ppm * (1e-6 * STANDARD_PRESSURE * MOLAR_MASS_CO2 / GAS_CONSTANT) / (temperature + 273.15)
 
 
-def co2_fraction(temperature: Array, concentration: Array, pressure: float = STANDARD_PRESSURE) -> Array:
-    """Return the CO2 volume fraction in ppm of air with a content in kg m-3."""
-    return concentration * (temperature + 273.15) / (1e-6 * pressure * MOLAR_MASS_CO2 / GAS_CONSTANT)
+def co2_fraction(temperature: Array, concentration: Array) -> Array:
+    """Return the CO2 volume fraction in ppm of air of standard pressure with a content in kg m-3."""
+    return concentration * (temperature + 273.15) / (1e-6 * STANDARD_PRESSURE * MOLAR_MASS_CO2 / GAS_CONSTANT)

@@ -10,8 +10,8 @@ import numpy as np
 from igrow.core.arrays import Floats, Times
 from igrow.core.errors import IgrowError
 
-# Offsets change on whole quarters of an hour of UTC in every zone since 1970.
-_QUARTER = np.timedelta64(900, "s")
+_QUARTER = 900
+"""Seconds: offsets change on whole quarters of an hour of UTC in every zone since 1970."""
 
 
 def zone(name: str) -> ZoneInfo:
@@ -30,9 +30,9 @@ def utc_datetime(time: np.datetime64) -> datetime.datetime:
 def to_local(time: Times, time_zone: str) -> Times:
     """Return the wall time of UTC times, datetime64[s] of the same shape."""
     time = np.asarray(time, dtype="datetime64[s]")
-    quarters, index = np.unique(time.astype(np.int64) // 900, return_inverse=True)
+    quarters, index = np.unique(time.astype(np.int64) // _QUARTER, return_inverse=True)
     where = zone(time_zone)
-    offsets = [_offset(datetime.datetime.fromtimestamp(quarter * 900, where)) for quarter in quarters.tolist()]
+    offsets = [_offset(datetime.datetime.fromtimestamp(quarter * _QUARTER, where)) for quarter in quarters.tolist()]
     local: Times = time + np.array(offsets, dtype="timedelta64[s]")[index].reshape(time.shape)
     return local
 
@@ -44,9 +44,11 @@ def from_local(time: Times, time_zone: str) -> Times:
     back on, else to the first. When clocks go forward the skipped wall times do not exist.
     """
     time = np.asarray(time, dtype="datetime64[s]")
-    quarters, index = np.unique(time.astype(np.int64) // 900, return_inverse=True)
+    quarters, index = np.unique(time.astype(np.int64) // _QUARTER, return_inverse=True)
     where = zone(time_zone)
-    naive = [datetime.datetime(1970, 1, 1) + datetime.timedelta(seconds=quarter * 900) for quarter in quarters.tolist()]
+    naive = [
+        datetime.datetime(1970, 1, 1) + datetime.timedelta(seconds=quarter * _QUARTER) for quarter in quarters.tolist()
+    ]
     first = np.array([_offset(t.replace(tzinfo=where)) for t in naive], dtype="timedelta64[s]")[index]
     second = np.array([_offset(t.replace(tzinfo=where, fold=1)) for t in naive], dtype="timedelta64[s]")[index]
     doubled = second < first

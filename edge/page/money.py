@@ -37,7 +37,6 @@ class Expected:
     """Title, plan, recipe, difference."""
     gain: str
     """One sentence."""
-    better: bool
 
 
 def expected(plan: Mapping[str, Any], area: float, say: Words) -> Expected | None:
@@ -67,7 +66,7 @@ def expected(plan: Mapping[str, Any], area: float, say: Words) -> Expected | Non
         more = N_("The plan is expected to bring {amount} more than your recipe{sure}.")
         less = N_("The plan is expected to bring {amount} less than your recipe{sure}.")
         text = say.text(more if mean > 0 else less, amount=say.euro(abs(mean)), sure=sure)
-    return Expected(tuple(rows), text, mean >= 0.005)
+    return Expected(tuple(rows), text)
 
 
 @dataclass(frozen=True)

@@ -91,8 +91,6 @@ class PlanResult:
     """The recipe within all limits, (H, 4)."""
     template: Template
     """By which candidates were decoded."""
-    evaluations: int
-    """Candidates simulated."""
     binding: tuple[Mapping[str, tuple[str, ...]], ...]
     """By hour and setpoint: the crop's limits that kept it from what the search asked for."""
 
@@ -175,11 +173,9 @@ def optimise(
     parents = offspring[: settings.parents]
     parent_fitness = np.full(settings.parents, WORST, dtype=np.float32)
     history: list[float] = []
-    evaluations = 1 + len(known)
     best_at = 0
     for number in range(budget.generations):
         offspring_fitness = fitness(template.decode(offspring, recipe, applied, state.memory))
-        evaluations += len(offspring)
         random = draw(rng, settings, template.genes)
         parents, parent_fitness, offspring = run(parents, parent_fitness, offspring, offspring_fitness, random)
         if not history or parent_fitness[0] > history[best_at] + 1e-6:
@@ -217,7 +213,6 @@ def optimise(
         objective=objective,
         recipe=followed,
         template=template,
-        evaluations=evaluations + 2,
         binding=course.binding(),
     )
 
