@@ -127,7 +127,7 @@ def false_claims(
         rest = [one for other, one in zip(logs, gains, strict=True) if other.greenhouse != log.greenhouse]
         bound = Drift({}, BETWEEN, largest(rest), least)
         named = next(iter(own), "")
-        if named and own[named] >= bound.needed_gain(named):
+        if named and own[named] >= bound.needed_gain(named, DEFAULT):
             claims.append((log.greenhouse, log.group, named))
     return claims
 

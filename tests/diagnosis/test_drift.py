@@ -12,6 +12,7 @@ from igrow.core.arrays import Floats
 from igrow.core.errors import IgrowError
 from igrow.trainer.diagnosis import drift
 from igrow.trainer.diagnosis.drift import Drift, Pair
+from igrow.trainer.diagnosis.rules import DEFAULT
 
 KEYS = ("parameter:respiration", "parameter:vent_wind", "rain_cooling", "rain_cooling")
 
@@ -87,8 +88,8 @@ def test_a_rate_lies_between_physics_and_what_was_learned_and_grows_with_time() 
 
 def test_a_change_must_gain_more_than_it_did_where_nothing_had_changed() -> None:
     known = Drift({}, 42.0, {"co2_drift": 20.0, "lamp_heat": 1.0}, least_gain=9.0)
-    assert known.needed_gain("co2_drift") > 20.0
-    assert known.needed_gain("lamp_heat") == known.needed_gain("rain_cooling") == 9.0
+    assert known.needed_gain("co2_drift", DEFAULT) > 20.0
+    assert known.needed_gain("lamp_heat", DEFAULT) == known.needed_gain("rain_cooling", DEFAULT) == 9.0
 
 
 def test_a_stored_drift_is_read_back(tmp_path: Path) -> None:

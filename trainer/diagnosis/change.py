@@ -68,7 +68,7 @@ def best(design: Design, scored: list[Hypothesis]) -> Hypothesis | None:
 def needed_gain(design: Design, one: Hypothesis) -> float:
     """Return what a change must gain: by some more than it did in any greenhouse in which nothing had changed."""
     assert design.history is not None and design.history.drift is not None
-    return design.history.drift.needed_gain(one.effect)
+    return design.history.drift.needed_gain(one.effect, design.rules)
 
 
 def net_gain(design: Design, one: Hypothesis) -> float:

@@ -23,6 +23,7 @@ import numpy as np
 from igrow.core.arrays import Floats
 from igrow.core.errors import IgrowError
 from igrow.trainer.diagnosis.knowledge import CROP
+from igrow.trainer.diagnosis.rules import DecisionRules
 
 FILE = "learned/drift.json"
 ROUNDS = 40
@@ -34,8 +35,6 @@ LEAST_PAIRS = 3
 LEARNED_SHARE, CO2_SHARE = 0.5, 0.85
 """Weight of a learned rate against the physically expected one, in logarithms. Where the structure is not the
 greenhouse's a likelihood takes its misfit for change, and what may change too much hides causes; a crop does change."""
-OVER_NULL = 1.3
-"""Times the largest gain of an effect where nothing had changed that it must gain."""
 CO2_OF_CROP = frozenset({
     "parameter:assimilation_maximum", "parameter:assimilation_light", "parameter:assimilation_co2",
     "parameter:respiration",
@@ -62,9 +61,9 @@ class Drift:
     provenance: Mapping[str, Any] = field(default_factory=dict)
     """The command that learned it, its date and seeds."""
 
-    def needed_gain(self, effect: str) -> float:
+    def needed_gain(self, effect: str, rules: DecisionRules) -> float:
         """Return what a change must gain: more, by some, than it did in any greenhouse in which nothing had changed."""
-        return max(self.least_gain, OVER_NULL * self.null_gains.get(effect, 0.0))
+        return max(self.least_gain, rules.change_over_null * self.null_gains.get(effect, 0.0))
 
     def by_physics(self) -> Drift:
         """Return the change that physics alone lets expect: what one parameter's own change is told from."""
