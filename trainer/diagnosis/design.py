@@ -219,8 +219,7 @@ def prepare(
     runs = sensitivity.day_runs(record, split.day)
     first = sensitivity.linearise(record, runs, prior.values, effects)
     average = averaging(first, interval, rules)
-    known = _combined(first, longitude, [discrepancy] if discrepancy else [])
-    nuisance = _combined(first, longitude, directions)
+    known, nuisance = _combined(first, longitude, [discrepancy] if discrepancy else [], directions)
     misfit = average(known).sum(axis=0)
     line, whitening = recalibrate(first, split, prior, misfit, average, rules)
     slopes = sensitivity.parameter_sensitivities(line, prior.names, prior.standard_deviation)
@@ -271,16 +270,16 @@ def blocks_of(parts: Sequence[Part]) -> dict[str, Block]:
     return blocks
 
 
-def _combined(line: Linearisation, longitude: float, lists: Sequence[Mapping[str, float]]) -> Floats:
-    """Return the columns of lists of amplitudes by key, (lists, 3, r, steps)."""
-    if not lists:
-        return np.zeros((0, *line.shown.shape))
+def _combined(line: Linearisation, longitude: float, *groups: Sequence[Mapping[str, float]]) -> list[Floats]:
+    """Return for groups of amplitudes by key the columns that each adds up to, (group, 3, r, steps)."""
+    if not any(groups):
+        return [np.zeros((0, *line.shown.shape)) for _ in groups]
     found = candidates.effect_columns(line)
-    patterns, columns = candidates.pattern_columns(line, longitude)
+    patterns, courses = candidates.pattern_columns(line, longitude)
     keys = [*(one.key for one in found.candidates), *(one.key for one in patterns)]
-    amplitudes = np.array([[one.get(key, 0.0) for key in keys] for one in lists])
-    combined: Floats = np.tensordot(amplitudes, np.concatenate([found.columns, columns]), axes=1)
-    return combined
+    columns = np.concatenate([found.columns, courses])
+    amplitudes = (np.array([[one.get(key, 0.0) for key in keys] for one in group]) for group in groups)
+    return [np.tensordot(one.reshape(-1, len(keys)), columns, axes=1) for one in amplitudes]
 
 
 def _drifting(slopes: Floats, prior: Gaussian, day: Integers, rules: DecisionRules) -> Floats:
