@@ -126,7 +126,7 @@ class _Partial:
 
 
 def season_of(site: Site, bundle: Bundle, begins: datetime.date, weather: Telemetry | None, say: Report) -> Season:
-    """Return the season to be planned; see `plan_season`."""
+    """Return the season to be planned; arguments and errors as `plan_season`'s."""
     if site.crop.end_date is None:
         raise IgrowError(f"{site.name}: crop.end_date is not set: a season that has no end cannot be planned")
     days = (site.crop.end_date - begins).days + 1

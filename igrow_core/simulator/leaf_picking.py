@@ -51,16 +51,11 @@ def pick(
 ) -> tuple[Array, Array]:
     """Return the leaf area (m2 m-2) that is picked in one step, and the number of pickings after it.
 
-    Parameters
-    ----------
-    leaf_area
-        (...,) m2 m-2 where the step begins.
-    thermal_time, crop_age
-        (...,) degC d and days at the step's end, since the first hour.
-    hour
-        (...,) hour of the day at the step's end.
-    count
-        (...,) pickings so far.
+    Args:
+        leaf_area: (...,) m2 m-2 where the step begins.
+        thermal_time, crop_age: (...,) degC d and days at the step's end, since the first hour.
+        hour: (...,) hour of the day at the step's end.
+        count: (...,) pickings so far.
     """
     development = thermal_time - rule.base * crop_age
     number = np.arange(len(rule.ready), dtype=np.float32)

@@ -126,20 +126,13 @@ def advance(
 ) -> tuple[Array, Array]:
     """Run one step of one stage.
 
-    Parameters
-    ----------
-    state
-        (..., s) where the step begins.
-    drivers
-        (..., n) over the step, in the units of the registry and the order of `stage.drivers`.
-    memory
-        (..., n * k) filters before the step, see `initial_memory`.
-    hour
-        (..., 1) hour of the day at the step's end, 0 to 24; needed where `stage.clock`.
+    Args:
+        state: (..., s) where the step begins.
+        drivers: (..., n) over the step, in the units of the registry and the order of `stage.drivers`.
+        memory: (..., n * k) filters before the step, see `initial_memory`.
+        hour: (..., 1) hour of the day at the step's end, 0 to 24; needed where `stage.clock`.
 
-    Returns
-    -------
-    (state, memory)
+    Returns:
         At the end of the step.
     """
     if stage.time_constants:

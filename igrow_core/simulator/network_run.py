@@ -50,16 +50,11 @@ def run_hour(
 ) -> tuple[Carried, dict[str, Array]]:
     """Run climate and growth for one hour.
 
-    Parameters
-    ----------
-    known
-        Name -> (..., 1): `known_inputs`, over the hour that ends.
-    hour
-        (..., 1) hour of the day at its end.
+    Args:
+        known: name -> (..., 1): `known_inputs`, over the hour that ends.
+        hour: (..., 1) hour of the day at its end.
 
-    Returns
-    -------
-    (carried, values)
+    Returns:
         What the next hour needs (the harvest as it was), and name -> (..., 1) of all states, par, thermal_time and
         crop_age at the end of the hour.
     """
@@ -131,18 +126,14 @@ def begin(simulator: NetworkSimulator, known: Mapping[str, Floats]) -> Carried:
 def free_run(simulator: NetworkSimulator, known: Mapping[str, Floats], hour: Floats) -> dict[str, Floats]:
     """Run whole seasons from their first hour on nothing but weather and setpoints.
 
-    Parameters
-    ----------
-    known
-        Name -> (runs, hours): `known_inputs` over all hours, and the first hour of every state (later hours of a
-        state are not read).
-    hour
-        (hours,) hour of the day.
+    Args:
+        known: name -> (runs, hours): `known_inputs` over all hours, and the first hour of every state (later hours of a
+            state are not read).
+        hour: (hours,) hour of the day.
 
-    Returns
-    -------
-    Name -> (runs, hours) of every state, of par, thermal_time (degC d since the first hour) and crop_age (d). The
-    harvest stage runs by days of 24 rows; within a day its value is the one at the end of the day before.
+    Returns:
+        Name -> (runs, hours) of every state, of par, thermal_time (degC d since the first hour) and crop_age (d). The
+        harvest stage runs by days of 24 rows; within a day its value is the one at the end of the day before.
     """
     runs, hours = known["global_radiation"].shape
     carried = begin(simulator, known)
@@ -161,17 +152,13 @@ def free_growth(
 ) -> dict[str, Floats]:
     """Run growth alone from the first hour under a climate that is known.
 
-    Parameters
-    ----------
-    climate
-        Name -> (runs, hours) of the growth stage's drivers but crop_age and thermal_time; and global_radiation and
-        lamp_on.
-    start
-        The states of growth and harvest at the first hour.
+    Args:
+        climate: name -> (runs, hours) of the growth stage's drivers but crop_age and thermal_time; and global_radiation
+            and lamp_on.
+        start: the states of growth and harvest at the first hour.
 
-    Returns
-    -------
-    Name -> (runs, hours) of the states of growth.
+    Returns:
+        Name -> (runs, hours) of the states of growth.
     """
     runs, hours = climate["air_temperature"].shape
     first = {name: np.full((runs, 1), value) for name, value in start.items()}

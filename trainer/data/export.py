@@ -148,7 +148,7 @@ def times(table: ExportTable, mapping: ExportMapping) -> Times:
 
 
 def numbers(table: ExportTable, name: str, mapping: ExportMapping, words: Mapping[str, float], ours: str) -> Floats:
-    """Return one column as numbers, NaN where it says that there is none; raises IgrowError with the line.
+    """Return one column as numbers, (n,), NaN where it says that there is none; raises IgrowError with the line.
 
     Args:
         table: the export.
@@ -176,7 +176,7 @@ def numbers(table: ExportTable, name: str, mapping: ExportMapping, words: Mappin
 
 
 def quantity(ours: str, table: ExportTable, rule: ColumnMapping, mapping: ExportMapping, time: Times) -> Floats:
-    """Return one of our quantities from the columns that a rule names, in the registry's unit."""
+    """Return one of our quantities from the columns that a rule names, (n,), in our unit; raises IgrowError."""
     total = numbers(table, rule.column, mapping, rule.words, ours)
     for further in rule.add:
         total = total + numbers(table, further, mapping, rule.words, ours)

@@ -41,6 +41,9 @@ def as_table(cells: Cells, header: Sequence[int] = (1,), first_row: int | None =
 
     Names over several lines are joined by a blank; an upper line's cell stands for the empty ones after it (the merged
     cells of a workbook). A name that stands twice gets a number.
+
+    Raises:
+        IgrowError: no header stands there, a row is wider than it, or the columns change below it.
     """
     heads = [row for row, line in zip(cells.rows, cells.lines, strict=True) if line in set(header)]
     if not heads:

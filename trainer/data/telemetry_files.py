@@ -50,7 +50,7 @@ def unpacked(path: Path) -> Path:
 
 
 def read_file(path: Path, translation: Path | None = None) -> Merged:
-    """Return one file: an export by its mapping, or telemetry in CSV (gzip or not) or Parquet."""
+    """Return one file: an export by its mapping, or telemetry in CSV (gzip or not) or Parquet; raises IgrowError."""
     if translation is not None:
         return export.read(path, mapping.load(translation))
     if path.name.lower().endswith(EXCEL):

@@ -138,7 +138,7 @@ def _moves(course: Floats) -> bool:
 
 
 def with_inputs(days: LogDays, inputs: Mapping[str, Floats]) -> LogDays:
-    """Return the log with actuators in the place of those that it lacks."""
+    """Return the log with actuators, (n,) each, in the place of those that it lacks."""
     seen = days.record
     missing = tuple(name for name in seen.missing if name not in inputs)
     return replace(days, record=replace(seen, inputs={**seen.inputs, **inputs}, missing=missing))

@@ -199,7 +199,12 @@ def expected_squares(pair: Pair, change: Floats) -> Floats:
 
 
 def evidence(pair: Pair, change: Floats) -> float:
-    """Return the log marginal likelihood of a later log over that of no change and full knowledge."""
+    """Return the log marginal likelihood of a later log over that of no change and full knowledge.
+
+    Args:
+        pair: what the log says.
+        change: standard deviation of every change, (k,).
+    """
     prior = pair.known + np.diag(change**2)
     posterior = _inverse(pair.information + _inverse(prior))
     scaled = np.eye(len(prior)) + pair.information @ prior

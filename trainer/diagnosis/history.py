@@ -172,7 +172,7 @@ def expected(
     Args:
         known: of the greenhouse.
         plain: the log, laid out about the calibrated parameters.
-        misfit: from `expected_misfit`, of the log without the causes that have been found in it.
+        misfit: (b, r, intervals), from `expected_misfit`, of the log without the causes that have been found in it.
         without: effects that are no candidates.
         learned: how greenhouses change with time (None: what came with the trainer).
     """

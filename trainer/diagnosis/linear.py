@@ -120,12 +120,12 @@ class Fit:
 
     @property
     def amplitudes(self) -> Floats:
-        """Fitted amplitudes of the terms."""
+        """Fitted amplitudes of the terms, (terms,)."""
         return self.solution.coefficients[len(self.model.base) :]
 
     @property
     def deviations(self) -> Floats:
-        """Their standard deviations were the innovations white and of unit variance."""
+        """Their standard deviations were the innovations white and of unit variance, (terms,)."""
         return np.sqrt(np.diag(self.solution.inverse)[len(self.model.base) :])
 
     @property

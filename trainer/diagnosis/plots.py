@@ -30,7 +30,7 @@ def needed(evidence: Evidence | None) -> Evidence:
 
 
 def worst_day(evidence: Evidence, quantity: str, language: Language = ENGLISH) -> Figure:
-    """Plot the unseen day with the largest error of the deployed model: measured, and what each stage predicts."""
+    """Plot the worst unseen day of the deployed model: measured, and what each stage predicts; raises IgrowError."""
     if "deployed" not in evidence.runs or quantity not in PREDICTED:
         raise IgrowError(f"there is no unseen day with {quantity} to plot")
     before = evidence.runs["deployed"]
@@ -93,7 +93,7 @@ def residual_by_date(evidence: Evidence, language: Language = ENGLISH) -> Figure
 
 
 def residual_against_driver(evidence: Evidence, driver: str, language: Language = ENGLISH) -> Figure:
-    """Plot what is missing against a driver, in bins of as many samples each."""
+    """Plot what is missing against a driver, in bins of as many samples each; raises IgrowError."""
     line = evidence.first.design.line
     if np.ndim(line.drivers.get(driver, 0.0)) == 0:
         raise IgrowError(f"{driver} does not vary in this log: there is nothing to plot against")
@@ -124,7 +124,7 @@ def residual_against_driver(evidence: Evidence, driver: str, language: Language 
 
 
 def coefficient_by_regime(regimes: Mapping[str, Estimate], language: Language = ENGLISH, unit: str = "") -> Figure:
-    """Plot a coefficient with its interval by regime."""
+    """Plot a coefficient with its interval by regime; raises IgrowError."""
     if not regimes:
         raise IgrowError("this cause has no size by regime: there is nothing to plot")
     figure, (axes,) = panels(1, 0.7 + 0.24 * len(regimes))

@@ -93,7 +93,7 @@ class _Unknowns:
     high: Floats
 
     def terms(self, point: Floats) -> list[ActiveTerm]:
-        """Return the terms at a point."""
+        """Return the terms at a point, (p + other + k,)."""
         terms = list(self.found)
         for knob, value in zip(self.knobs, point[len(point) - len(self.knobs) :], strict=True):
             terms = knob.set(terms, float(value))

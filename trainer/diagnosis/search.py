@@ -208,7 +208,7 @@ def score_candidates(
 
 
 def middle_of_best(gains: Floats) -> int:
-    """Return the position of the largest gain, the middle one of several.
+    """Return the position of the largest gain, (o,), the middle one of several.
 
     Held-out days tell nothing: within a block of them all beginnings are as likely, and the middle is the least wrong.
     """

@@ -176,7 +176,7 @@ def horizon_steps(record: Record, horizon: str) -> int:
 
 
 def starts_within(record: Record, allowed: Mask, steps: int, every: int) -> Integers:
-    """Return start rows, `every` apart, from which a complete run of `steps` stays among the `allowed` rows."""
+    """Return start rows, (s,), `every` apart, from which a complete run of `steps` stays among `allowed` rows, (n,)."""
     starts = records.complete_starts(record, steps, every)
     outside = np.concatenate([[0], np.cumsum(~allowed)])
     chosen: Integers = starts[outside[starts + steps + 1] - outside[starts] == 0]

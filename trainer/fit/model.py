@@ -209,7 +209,7 @@ def united(*ranges: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float,
 
 
 def training_envelope(columns: Mapping[str, Floats]) -> dict[str, tuple[float, float]]:
-    """Return the smallest and the largest value of each column that has any, with a margin on either side."""
+    """Return the smallest and the largest value of each column, (n,), that has any, with a margin on either side."""
     found = {}
     for name, values in columns.items():
         finite = values[np.isfinite(values)]

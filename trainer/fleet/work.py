@@ -100,6 +100,9 @@ def learn_from_site(file: str, state: str, exchange: dict[str, str | None], now:
 
     Where the log is long enough the newest four weeks are left out of the fit. If nothing is found in them they tell
     how the greenhouse has changed, in `change.npz`.
+
+    Raises:
+        IgrowError: nothing was collected of it, or its log cannot be fitted to.
     """
     from igrow.trainer.calibration import calibrate  # noqa: PLC0415
     from igrow.trainer.data import prepare_log  # noqa: PLC0415  (collecting needs no fits)

@@ -116,6 +116,12 @@ def planned_runs(bundle: Bundle, site: Site, record: Record, setpoints: Mapping[
     """Return runs of a bundle's planning graph, from the measured state by weather and setpoints, hour by hour.
 
     Within an hour nothing is predicted: NaN.
+
+    Args:
+        bundle: of either variant that plans.
+        site: whose greenhouse it is.
+        record: of the log.
+        setpoints: on its grid, (n,) each.
     """
     simulator = BundleSimulator(bundle, site.greenhouse, members=1)
     hour = max(1, round(3600.0 / record.step))

@@ -137,12 +137,12 @@ class StageModule(torch.nn.Module):
         self.cumulative = torch.tensor(stage.cumulative)
 
     def scaled_features(self, features: Floats) -> torch.Tensor:
-        """Return raw features as the network's first inputs."""
+        """Return raw features, (..., f), as the network's first inputs."""
         stage = self.stage
         return torch.tensor(((features - stage.feature_offset) / stage.feature_scale).astype(np.float32))
 
     def scaled_states(self, states: Floats) -> torch.Tensor:
-        """Return states in units of their spread."""
+        """Return states, (..., s), in units of their spread."""
         return torch.tensor(((states - self.stage.state_offset) / self.stage.state_scale).astype(np.float32))
 
     def forward(self, features: torch.Tensor, state: torch.Tensor, jumps: torch.Tensor | None = None) -> torch.Tensor:
@@ -180,6 +180,9 @@ def train_stage(stage: Stage, data: StageData, plan: TrainingPlan, report: Repor
 
     Windows are drawn at random from all runs. Targets that are NaN or not valid do not count; a window starts
     only where the state is known.
+
+    Raises:
+        ValueError: no run is as long as a window of the plan.
     """
     generator = np.random.default_rng(plan.seed)
     torch.manual_seed(plan.seed)

@@ -50,7 +50,11 @@ def _tells_apart(labels: Sequence[str], stamps: Sequence[tuple[str, ...]], repea
 
 
 def chosen_compartment(matches: Sequence[names.Match], answers: Answers, questions: list[Question]) -> str:
-    """Return the compartment to read of those that stand side by side; empty where there is one alone."""
+    """Return the compartment to read of those that stand side by side; empty where there is one alone.
+
+    Raises:
+        IgrowError: none is called as the user says.
+    """
     known = names.compartments(matches)
     if answers.compartment is not None and known:
         wanted = vocabulary.folded(answers.compartment)

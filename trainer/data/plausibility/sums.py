@@ -17,6 +17,10 @@ def running_sum(time: Times, values: Floats) -> Literal["day", "total"] | None:
     """Return ``day`` for a sum that starts anew about once a day, ``total`` for one that never does, else None.
 
     A sum hardly ever falls, and where it does it falls to about nothing.
+
+    Args:
+        time: (n,).
+        values: (n,), NaN where nothing was read.
     """
     known = np.isfinite(values)
     when, seen = time[known], values[known]

@@ -61,12 +61,12 @@ class _Daylight:
     """Of the mean vector of what would come without air, (d,)."""
 
     def offset(self, chosen: Mask | None = None) -> float:
-        """Return the hours by which noon comes late by the log's clock, -12 to 12."""
+        """Return the hours by which noon comes late by the log's clock, -12 to 12; of the days `chosen`, (d,)."""
         vector = self.vector if chosen is None else self.vector[chosen]
         return float(np.angle(-vector.sum()) * 12.0 / np.pi)
 
     def error(self, chosen: Mask | None = None) -> float:
-        """Return the standard error of the offset over days, weighted as the offset is."""
+        """Return the standard error of the offset over days `chosen`, (d,), weighted as the offset is."""
         vector = self.vector if chosen is None else self.vector[chosen]
         whole = vector.sum()
         across = np.angle(vector / (whole / abs(whole))) * 12.0 / np.pi

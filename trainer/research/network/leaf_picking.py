@@ -53,12 +53,9 @@ def fit_picking(leaf_area: Floats, thermal_time: Floats, hour: Floats) -> LeafPi
     pickings before, `ready` mistakes the fewest of the days on which the leaf area sufficed; the base temperature is
     the one with the fewest mistakes in all.
 
-    Parameters
-    ----------
-    leaf_area, thermal_time
-        (runs, hours): m2 m-2, and degC d since the first hour.
-    hour
-        (hours,) hour of the day.
+    Args:
+        leaf_area, thermal_time: (runs, hours): m2 m-2, and degC d since the first hour.
+        hour: (hours,) hour of the day.
     """
     gone = picked_area(leaf_area)
     done = gone > 0

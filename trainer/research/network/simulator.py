@@ -148,16 +148,14 @@ def train_simulator(
 ) -> NetworkSimulator:
     """Train the three stages on seasons of equal length.
 
-    Parameters
-    ----------
-    columns
-        Name -> (runs, hours): weather, setpoints, climate, growth and `fruit_fresh_weight` without gaps.
-    hour
-        (hours,) hour of the day.
-    valid
-        (hours,) or (runs, hours); the others are not learned from.
-    workers
-        Processes that train members side by side; the result does not depend on it.
+    Args:
+        columns: name -> (runs, hours): weather, setpoints, climate, growth and `fruit_fresh_weight` without gaps.
+        hour: (hours,) hour of the day.
+        valid: (hours,) or (runs, hours); the others are not learned from.
+        layouts: of the stages; None: `Layouts`.
+        seed: of weights and windows.
+        report: is told of the progress in lines.
+        workers: processes that train members side by side; the result does not depend on it.
     """
     chosen = layouts or Layouts()
     light = fit_light(columns)
