@@ -26,7 +26,6 @@ from igrow.trainer.diagnosis import change, drift, history, linear, search, shar
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.drift import Drift, Pair
 from igrow.trainer.diagnosis.freerun import log_days
-from igrow.trainer.diagnosis.rounds import laid_out
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.fit.gaussian import Gaussian
 
@@ -73,7 +72,7 @@ def null_log(job: tuple[Reference, Case, Telemetry]) -> NullLog:
     known, site = reference.model.history, reference.greenhouse.site
     assert known is not None
     days = log_days(prepare_log(telemetry, site), reference.model)
-    plain = laid_out(days, site, known, (), DEFAULT)
+    plain = history.laid_out(days, site, known, (), DEFAULT)
     design = history.expected(known, plain, history.expected_misfit(known, plain))
     # What the search needs is in the products; the columns themselves would fill the memory.
     light = replace(design, values=design.values[:, :0], grams=_single(design))

@@ -8,9 +8,14 @@ import numpy as np
 
 from igrow.core.arrays import Floats
 from igrow.core.effects import EFFECTS
-from igrow.trainer.diagnosis.design import Design
+from igrow.trainer.diagnosis.design import JOINT, Design
 from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, drift, home_drift
 from igrow.trainer.diagnosis.rules import DecisionRules
+
+
+def columns(design: Design) -> list[int]:
+    """Return the columns of everything that may be missing, (k,)."""
+    return [column for name in JOINT for column in design.block(name).columns]
 
 
 def keys(design: Design) -> tuple[str, ...]:

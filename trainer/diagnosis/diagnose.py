@@ -1,8 +1,11 @@
 """From a log to the verdict, each stage entered once a round.
 
-log, model --> knowledge --> design --> compare --> estimate --> refit --+--> correct --> findings --> Diagnosis
-                               ^                                         |
-                               +------------ the cause put in -----------+
+log, model --> knowledge --> actuators --> design --> compare --> estimate --> refit --+--> correct --> Diagnosis
+                                             ^                                         |
+                                             +------------ the cause put in -----------+
+
+Beside the causes it is asked which parameter has changed; of one that began within the log the days since then are
+diagnosed by themselves.
 """
 
 from __future__ import annotations
@@ -16,14 +19,14 @@ import numpy as np
 from igrow.core.effects import EFFECTS
 from igrow.core.errors import IgrowError
 from igrow.trainer.data.log import Log
-from igrow.trainer.diagnosis import freerun, history, wording
+from igrow.trainer.diagnosis import history, wording
 from igrow.trainer.diagnosis.actuators import REPLACEABLE, Completed, complete
 from igrow.trainer.diagnosis.candidates import hidden_by_missing_weather
 from igrow.trainer.diagnosis.correction import Corrected, correct, corrected_model, with_parameter
 from igrow.trainer.diagnosis.drift import Drift
 from igrow.trainer.diagnosis.estimate import normal_quantile
 from igrow.trainer.diagnosis.evidence import Evidence
-from igrow.trainer.diagnosis.freerun import LogDays, Stage, log_days
+from igrow.trainer.diagnosis.freerun import HORIZONS, FreeRuns, LogDays, Stage, log_days, mean_absolute_errors
 from igrow.trainer.diagnosis.knowledge import Knowledge, knowledge_of
 from igrow.trainer.diagnosis.nuisance import NuisanceSubspace
 from igrow.trainer.diagnosis.open_vents import under_open_vents
@@ -109,11 +112,11 @@ def diagnose(
     verdict, findings = _verdict(completed, result, patterns, rules)
     stages = _stages(result, completed, logged)
     say("predicting unseen days")
-    errors = _errors(stages)
+    runs = _runs(stages)
+    errors = _errors(runs)
     start, end = log.telemetry.time[0], log.telemetry.time[-1]
     moved = model.posterior.values, result.stages["corrected"].posterior.values
     crop = growth_since(log, days.record, moved, model.crop or built_in_crop())
-    runs = {name: day for name, (stage, seen) in stages.items() if (day := seen.run(stage)) is not None}
     corrected = corrected_model(model, result, findings, errors, knowledge.discrepancy, (start, end), crop)
     notes = (
         *((wording.NOT_CALIBRATED,) if knowledge.transferred else ()),
@@ -136,7 +139,7 @@ def diagnose(
         missing=logged.record.missing,
         notes=notes,
         evidence=Evidence(
-            days, knowledge, first, result.estimates, {name: stage for name, (stage, _) in stages.items()}, runs
+            days, knowledge, first, result.estimates, {name: stage for name, (stage, _) in stages.items()}, runs["24_h"]
         ),
         log=log,
     )
@@ -215,12 +218,20 @@ def _stages(result: Corrected, completed: Completed, logged: LogDays) -> dict[st
     return stages
 
 
-def _errors(stages: Mapping[str, tuple[Stage, LogDays]]) -> Mapping[str, Mapping[str, Mapping[str, float]]]:
+def _runs(stages: Mapping[str, tuple[Stage, LogDays]]) -> dict[str, dict[str, FreeRuns]]:
+    """Return the free runs on held-out days: horizon -> stage, where one fits."""
+    return {
+        horizon: {name: run for name, (stage, seen) in stages.items() if (run := seen.run(stage, horizon)) is not None}
+        for horizon in HORIZONS
+    }
+
+
+def _errors(runs: Mapping[str, Mapping[str, FreeRuns]]) -> Mapping[str, Mapping[str, Mapping[str, float]]]:
     """Return the mean absolute errors on held-out days: quantity -> horizon -> stage."""
     table: dict[str, dict[str, dict[str, float]]] = {}
-    for horizon in freerun.HORIZONS:
-        for name, (stage, seen) in stages.items():
-            for quantity, error in freerun.mean_absolute_errors(seen.run(stage, horizon)).items():
+    for horizon, by_stage in runs.items():
+        for name, run in by_stage.items():
+            for quantity, error in mean_absolute_errors(run).items():
                 table.setdefault(quantity, {}).setdefault(horizon, {})[name] = error
     return table
 

@@ -8,7 +8,7 @@ between what was learned and what may be expected now (`expected`).
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,11 +19,12 @@ from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
 from igrow.trainer.data.splits import DaySplit, split_days
 from igrow.trainer.diagnosis import candidates, linear, noise, search, sensitivity
-from igrow.trainer.diagnosis.amplitudes import drift_within, keys, omission, rate_keys, units
+from igrow.trainer.diagnosis.amplitudes import columns, drift_within, keys, omission, rate_keys, units
 from igrow.trainer.diagnosis.candidates import WEEKDAYS
-from igrow.trainer.diagnosis.design import JOINT, Design, History, blocks_of
+from igrow.trainer.diagnosis.design import Design, History, blocks_of
 from igrow.trainer.diagnosis.drift import Drift, read_drift
-from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, activate, knowledge_of
+from igrow.trainer.diagnosis.freerun import LogDays
+from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, ActiveTerm, activate, knowledge_of
 from igrow.trainer.diagnosis.linear import DailyGrams, LinearModel
 from igrow.trainer.diagnosis.noise import Whitening
 from igrow.trainer.diagnosis.recalibration import averaging
@@ -146,11 +147,21 @@ def lay_out(
     )
 
 
+def laid_out(
+    days: LogDays, site: Site, known: Discrepancy, terms: Sequence[ActiveTerm], rules: DecisionRules
+) -> Design:
+    """Return the design of a log about the parameters of the calibration, before any noise."""
+    names = tuple(known.parameters)
+    spread = site_prior(site).marginal(names).covariance
+    about = Gaussian(names, np.array(list(known.parameters.values())), spread)
+    return lay_out(days.record, days.split, about, activate(days.record, terms), site.longitude, rules)
+
+
 def expected_misfit(known: Discrepancy, plain: Design) -> Floats:
     """Return what the model is expected to miss along a log, (b, r, intervals); what is new in the log is 0."""
     amplitudes = known.amplitudes.values
     mean = np.array([amplitudes.get(key, 0.0) for key in keys(plain)])
-    misfit: Floats = np.tensordot(mean, plain.values[_columns(plain)], axes=1)
+    misfit: Floats = np.tensordot(mean, plain.values[columns(plain)], axes=1)
     return misfit
 
 
@@ -266,17 +277,13 @@ def own_gains(design: Design) -> dict[str, float]:
 def solve_jointly(design: Design) -> tuple[Gaussian, Design]:
     """Return all amplitudes under their prior, and the design under the noise beside them, fitted by turns."""
     null = design.null_model()
-    columns = list(null.base)
-    found = Gaussian(keys(design), np.zeros(len(columns)), np.zeros((len(columns),) * 2))
+    base = list(null.base)
+    found = Gaussian(keys(design), np.zeros(len(base)), np.zeros((len(base),) * 2))
     whitening: Whitening | None = None
     for _ in range(design.rules.noise_rounds):
-        errors = design.values[0] + np.tensordot(found.mean, design.values[columns], axes=1)
+        errors = design.values[0] + np.tensordot(found.mean, design.values[base], axes=1)
         whitening = design.fit_noise(errors, whitening)
         design = design.whitened(whitening)
         solution = linear.fit(design.grams, null).solution
         found = Gaussian(found.names, solution.coefficients, solution.inverse)
     return found, design
-
-
-def _columns(design: Design) -> list[int]:
-    return [column for name in JOINT for column in design.block(name).columns]

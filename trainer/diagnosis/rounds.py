@@ -22,9 +22,7 @@ from igrow.trainer.diagnosis.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.refit import are_identifiable, refit
 from igrow.trainer.diagnosis.rules import HOUR, DecisionRules
 from igrow.trainer.diagnosis.structure import disagreement
-from igrow.trainer.fit.climate import site_prior
 from igrow.trainer.fit.discrepancy import Discrepancy
-from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.solver import DivergenceError
 
 
@@ -137,7 +135,7 @@ class Change(Search):
         return parameter_change.find(self._expected(self.knowledge.terms, by_physics), rng)
 
     def _expected(self, terms: Sequence[ActiveTerm], drift: Drift) -> Design:
-        plain = laid_out(self.days, self.site, self.history, terms, self.rules) if terms else self.plain
+        plain = history.laid_out(self.days, self.site, self.history, terms, self.rules) if terms else self.plain
         return history.expected(self.history, plain, self.misfit, self.without, drift)
 
     def resolved(self) -> Design:
@@ -159,20 +157,10 @@ def search_of(
     known = knowledge.history
     if known is None:
         return Search(*common)
-    plain = laid_out(days, site, known, (), rules)
+    plain = history.laid_out(days, site, known, (), rules)
     if not history.applies(known, plain):
         return Search(*common)
     return Change(*common, known, plain, history.expected_misfit(known, plain), drift)
-
-
-def laid_out(
-    days: LogDays, site: Site, known: Discrepancy, terms: Sequence[ActiveTerm], rules: DecisionRules
-) -> Design:
-    """Return the design of a log about the parameters of the calibration, before any noise."""
-    names = tuple(known.parameters)
-    spread = site_prior(site).marginal(names).covariance
-    about = Gaussian(names, np.array(list(known.parameters.values())), spread)
-    return history.lay_out(days.record, days.split, about, activate(days.record, terms), site.longitude, rules)
 
 
 def _is_inside(one: Estimated, design: Design) -> bool:

@@ -10,11 +10,10 @@ import numpy as np
 
 from igrow.trainer.data.log import Log
 from igrow.trainer.diagnosis import amplitudes, history
-from igrow.trainer.diagnosis.design import JOINT, Design
+from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.drift import Drift, Pair
 from igrow.trainer.diagnosis.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX
-from igrow.trainer.diagnosis.rounds import laid_out
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.fit.climate import site_prior
 from igrow.trainer.fit.discrepancy import Discrepancy
@@ -49,7 +48,7 @@ def change_since(log: Log, model: FittedModel, days: float) -> Pair | None:
     known, site = model.history, log.known_site
     if known is None or model.calibrated_on != site.name:
         return None
-    plain = laid_out(log_days(log, model), site, known, (), DEFAULT)
+    plain = history.laid_out(log_days(log, model), site, known, (), DEFAULT)
     if not history.applies(known, plain):
         return None
     return pair(known, plain, history.expected(known, plain, history.expected_misfit(known, plain)), days)
@@ -64,8 +63,7 @@ def pair(known: Discrepancy, plain: Design, design: Design, days: float) -> Pair
         design: from `history.expected`, of that log.
         days: that rates count for; over more than these the change grows as a random walk does.
     """
-    columns = [column for name in JOINT for column in design.block(name).columns]
-    total = design.grams.of(columns, ())[design.grams.fit].sum(axis=0, dtype=np.float64)
+    total = design.grams.of(amplitudes.columns(design), ())[design.grams.fit].sum(axis=0, dtype=np.float64)
     time = plain.line.record.time
     between = history.days_between(known, time[0] + (time[-1] - time[0]) / 2)
     unit, none = amplitudes.units(plain), Drift({}, days)
