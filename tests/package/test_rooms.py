@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -47,3 +48,15 @@ def test_the_road_imports_no_research_but_to_score_bundles_of_the_network_varian
         if name.startswith("igrow.trainer.research") and not place.startswith("trainer/research/")
     }
     assert found == {SCORES_BOTH_VARIANTS}
+
+
+def test_the_rooms_of_the_trainer_stand_above_each_other() -> None:
+    """No room imports one that needs it in turn, within a function or not: whoever reads goes in one direction."""
+    above: dict[str, set[str]] = {}
+    for place, name in imports("trainer"):
+        room, other = place.split("/")[1].removesuffix(".py"), name.removeprefix("igrow.trainer.").split(".")[0]
+        if name.startswith("igrow.trainer.") and room not in (other, "__init__"):
+            above.setdefault(room, set()).add(other)
+    order = list(TopologicalSorter(above).static_order())
+    road = ("data", "fit", "diagnosis", "calibration", "service", "fleet", "cli")
+    assert sorted(road, key=order.index) == list(road)
