@@ -3,14 +3,16 @@
     result = diagnose(log, model)
     print(result.summary())
 
-In the order in which they are read: `knowledge` (what is known before the log), `actuators` and `open_vents` (what the
-log itself lacks, or a sensor must show), `sensitivity` (day runs of the model, and how they depend on everything),
-`candidates`, `noise`, `recalibration`, `design` (errors and candidates in named blocks), `search` (a scan of all
-candidates), `rounds` (one cause after the other), `compare` (the best of them beside their own noise) or, where the
-greenhouse's own calibration log taught what is missing even then, `history`, `drift` and `change` (what has changed
-since; `omission` asks what it lacked from the first day), `estimate`, `refit` (size, beginning, confounded causes),
-`correction` (what stands on unseen days), `wording`, `result`. `rules` holds every threshold, `nuisance` what
-greenhouses show though nothing is missing, `sharing` what one tells others. docs/method.md tells why.
+In the order in which they are read: `knowledge` (what is known before the log), `freerun` (the days of a log, and
+models that are fitted to some and judged on others), `actuators` and `open_vents` (what the log itself lacks, or a
+sensor must show), `sensitivity` (day runs of the model, and how they depend on everything), `candidates`, `noise`,
+`recalibration`, `design` (errors and candidates in named blocks), `linear` and `search` (a scan of all candidates),
+`rounds` (one cause after the other), `compare` (the best of them beside their own noise) or, where the greenhouse's
+own calibration log taught what is missing even then, `amplitudes`, `history`, `drift` and `change` (what has changed
+since; `parameter_change` asks that of the parameters, `omission` what it lacked from the first day), `estimate`,
+`refit` (size, beginning, confounded causes), `correction` (what stands on unseen days), `wording`, `result`. `rules`
+holds every threshold, `nuisance` what greenhouses show though nothing is missing, `sharing` what one tells others.
+docs/method.md tells why.
 """
 
 from igrow.trainer.diagnosis.diagnose import diagnose
