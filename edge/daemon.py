@@ -143,8 +143,11 @@ class Daemon:
         try:
             remember(control, earlier.result())
         except IgrowError as error:
-            text = "what was set by hand before the start cannot be read, so all setpoints are left as they stand"
-            self._leave_all_alone(control, f"{text}: {error}")
+            self._leave_all_alone(
+                control,
+                f"what was set by hand before the start cannot be read ({error}), so all setpoints are left as they "
+                "stand",
+            )
         except Exception:
             text = "what was noted before the start makes no sense, so all setpoints are left as they stand"
             log.exception("%s", text)

@@ -92,9 +92,7 @@ class StopReport:
             notes += f"; {name} was taken, but the PLC still shows {with_unit(name, shown)}"
         if not self.failed:
             return f"the safe setpoints were written{notes}"
-        begin = (
-            f"written: {', '.join(self.written)}" if self.written else "the PLC does not answer: nothing was written"
-        )
+        begin = f"written: {', '.join(self.written)}" if self.written else "nothing was written"
         failed = "; ".join(f"{name}: {why}" for name, why in self.failed.items())
         rule = "not confirmed, so there the PLC's own safe setpoints rule after its timeout"
         return f"{begin}{notes}; {rule}: {failed}"

@@ -9,10 +9,12 @@ from pathlib import Path
 
 import pytest
 
+from igrow.edge.registers.codec import encode
 from igrow.edge.registers.model import Function
+from igrow.edge.virtual_plc.memory import AnswerWithExceptionError
 from tests.service.attacked_daemon import MAP, SAFE, SITE, WISH, AttackedDaemon
 
-BUSY = 6
+READ_ONLY, DEVICE_FAILURE, ACKNOWLEDGED, BUSY = 2, 4, 5, 6
 NO_PATH = 10
 LONG_SILENCE = 6.0
 """Seconds: more than three cycles, after which a PLC may have fallen back."""
@@ -49,6 +51,54 @@ def test_a_plc_that_refuses_only_writes_and_falls_back_is_controlled_again(attac
     attacked.plc.refuses.clear()
     attacked.controls()
     attacked.beats(2)
+    assert "by hand at the PLC" not in attacked.log()
+
+
+def test_a_stop_at_a_plc_whose_registers_have_become_read_only_says_what_the_plc_said(attacked: AttackedDaemon) -> None:
+    attacked.start()
+    attacked.controls()
+    attacked.beats(3)
+    attacked.plc.refuses["write"] = READ_ONLY
+    attacked.signal(signal.SIGTERM)
+    assert attacked.ended() == 0
+    said = attacked.log().rsplit("stopped:", 1)[1]
+    assert "nothing was written" in said and "refused with exception 2" in said
+    assert "does not answer" not in said
+
+
+@pytest.mark.parametrize("code", [DEVICE_FAILURE, ACKNOWLEDGED, BUSY])
+def test_a_plc_that_answers_everything_with_an_exception_for_a_while_is_controlled_again(
+    attacked: AttackedDaemon, code: int
+) -> None:
+    attacked.start()
+    attacked.controls()
+    attacked.beats(3)
+    attacked.plc.refuses.update({"read": code, "write": code})
+    time.sleep(LONG_SILENCE)
+    with attacked.plc.lock:
+        attacked.plc.set_value("co2_setpoint", SAFE["co2_setpoint"])  # its own fallback
+        attacked.plc.refuses.clear()
+    attacked.controls()
+    attacked.beats(2)
+    assert "by hand at the PLC" not in attacked.log()
+
+
+def test_a_number_of_which_only_one_word_was_taken_ends_where_it_is_wanted(attacked: AttackedDaemon) -> None:
+    """The PLC starts anew between the two words of one write, again and again."""
+    torn = []
+
+    def one_word_only(name: str, value: float) -> None:
+        if name == "co2_setpoint" and len(torn) < 3:
+            torn.append(value)
+            point = attacked.plc.points[name]
+            attacked.plc.tables[point.function].put(point.address + 1, [encode(point, value)[1]])
+            raise AnswerWithExceptionError(DEVICE_FAILURE)
+
+    attacked.plc.before_write = one_word_only
+    attacked.start()
+    attacked.controls()
+    attacked.beats(2)
+    assert len(torn) == 3
     assert "by hand at the PLC" not in attacked.log()
 
 
