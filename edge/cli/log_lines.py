@@ -21,7 +21,7 @@ class _OneLine(logging.Formatter):
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - logging's own name
         line = super().formatMessage(record)
-        return "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in line)
+        return "".join(one if one.isprintable() else repr(one)[1:-1] for one in line)
 
 
 class _JournalFormatter(_OneLine):

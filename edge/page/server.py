@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
 from igrow.core.errors import IgrowError
+from igrow.edge.listening import Listener
 from igrow.edge.page.http import (
     HEAD_BYTES,
     Request,
@@ -52,17 +53,17 @@ class PageServer:
         self._at_work = 0
         self._visits: set[asyncio.Task[None]] = set()
         self._of_one: Counter[str] = Counter()
-        self._server: asyncio.Server | None = None
+        self._listener: Listener | None = None
         self.port = 0
         """The port that is listened to."""
 
     async def start(self, address: str, port: int) -> None:
         """Begin to listen. Raises IgrowError where the port cannot be had."""
         try:
-            self._server = await asyncio.start_server(self._serve, address, port, limit=HEAD_BYTES)
+            self._listener = Listener(address, port, self._serve, limit=HEAD_BYTES)
         except OSError as error:
             raise IgrowError(f"page: port {port} of {address}: {error.strerror or error}") from None
-        self.port = self._server.sockets[0].getsockname()[1]
+        self.port = self._listener.port
 
     @property
     def _cookie(self) -> str:
@@ -71,10 +72,8 @@ class PageServer:
 
     async def close(self) -> None:
         """Stop listening and turn visitors away."""
-        if self._server is not None:
-            self._server.close()
-        for task in tuple(self._visits):
-            task.cancel()
+        if self._listener is not None:
+            self._listener.close()
         for threads in (self._threads, self._scrypt):
             threads.shutdown(wait=False, cancel_futures=True)
 

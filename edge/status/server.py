@@ -14,6 +14,7 @@ from enum import Enum
 from pathlib import Path
 
 from igrow.edge.hand_off import HandOff, LateError
+from igrow.edge.listening import Listener
 from igrow.edge.ports import Snapshot
 from igrow.edge.status.metrics import render_metrics
 
@@ -56,7 +57,7 @@ class StatusServer:
         """
         self.port = port
         """The port that is listened to; 0 becomes the one that the system chose."""
-        self._unreachable = ""
+        self._unheard = ""
         self._unwritten = ""
         self._state_file = state_file
         self._written_at = -math.inf
@@ -64,7 +65,7 @@ class StatusServer:
         self._wall = wall
         self._published_at = -math.inf
         self._snapshot: Snapshot | None = None
-        self._server: asyncio.Server | None = None
+        self._listener: Listener | None = None
         self._visits: set[asyncio.Task[None]] = set()
         self._aside = HandOff("status file")
 
@@ -73,15 +74,20 @@ class StatusServer:
         """Empty while it listens and can leave its file, else one line."""
         return "; ".join(filter(None, (self._unreachable, self._aside.problem or self._unwritten)))
 
+    @property
+    def _unreachable(self) -> str:
+        why = self._unheard or (self._listener.problem if self._listener is not None else "")
+        return f"status page: port {self.port} on localhost: {why}" if why else ""
+
     async def start(self) -> None:
         """Begin to listen; a port that is taken is a problem to report, not a reason to stop."""
         try:
-            self._server = await asyncio.start_server(self._serve, "127.0.0.1", self.port, limit=REQUEST_BYTES)
+            self._listener = Listener("127.0.0.1", self.port, self._serve, limit=REQUEST_BYTES)
         except OSError as error:
-            self._unreachable = f"status page: port {self.port} on localhost: {error.strerror or error}"
+            self._unheard = error.strerror or str(error)
             _log.warning("%s", self._unreachable)
             return
-        self.port = self._server.sockets[0].getsockname()[1]
+        self.port = self._listener.port
 
     def publish(self, snapshot: Snapshot) -> None:
         """Take the newest snapshot. Never blocks; rendering happens when somebody asks."""
@@ -93,10 +99,8 @@ class StatusServer:
 
     async def close(self) -> None:
         """Stop listening, turn visitors away, and leave the last state where the disk takes it."""
-        if self._server is not None:
-            self._server.close()
-        for task in tuple(self._visits):
-            task.cancel()
+        if self._listener is not None:
+            self._listener.close()
         self._leave_state()
         self._aside.close(CLOSE_SECONDS)
 
@@ -111,6 +115,7 @@ class StatusServer:
     def _write_state(self, file: Path, text: str) -> None:
         partial = file.with_name(file.name + ".part")
         try:
+            file.parent.mkdir(parents=True, exist_ok=True)
             # Not synchronised: it is made anew all the time, and a power cut may take it.
             partial.write_text(text)
             partial.replace(file)

@@ -163,6 +163,13 @@ class AttackedDaemon:
             return {}
         return state
 
+    def port_of_status(self) -> int:
+        """Return where its status port is, 0 before it has said so."""
+        try:
+            return int(json.loads((self.state / "status.json").read_text())["port"])
+        except (OSError, ValueError, KeyError):
+            return 0
+
     def until(self, condition: Callable[[], object], seconds: float = PATIENCE) -> None:
         """Wait until a condition holds, while the daemon lives."""
         end = time.monotonic() + seconds

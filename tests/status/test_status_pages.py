@@ -150,7 +150,8 @@ async def test_the_last_state_is_left_in_a_file_for_when_nobody_listens(tmp_path
 
 
 async def test_a_state_file_that_cannot_be_written_is_a_problem_and_no_reason_to_stop(tmp_path) -> None:
-    server = StatusServer(0, tmp_path / "absent" / "status.json")
+    (tmp_path / "file").write_text("no folder")
+    server = StatusServer(0, tmp_path / "file" / "status.json")
     server.publish(snapshot())
     assert "status.json" in server.health
 

@@ -1,0 +1,47 @@
+"""The daemon as a process that may open few files, while visitors of its status port take all of them."""
+
+from __future__ import annotations
+
+import resource
+import signal
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.service.attacked_daemon import SAFE, AttackedDaemon
+
+FEW = 40
+
+
+@pytest.fixture
+def attacked(tmp_path: Path) -> Iterator[AttackedDaemon]:
+    daemon = AttackedDaemon(tmp_path)
+    yield daemon
+    daemon.close()
+
+
+def test_visitors_that_take_the_last_handle_cost_one_line_and_no_beat(attacked: AttackedDaemon) -> None:
+    attacked.start()
+    assert attacked.process is not None
+    attacked.controls()
+    attacked.until(attacked.port_of_status)
+    resource.prlimit(attacked.process.pid, resource.RLIMIT_NOFILE, (FEW, FEW))
+    visitors = [socket.create_connection(("127.0.0.1", attacked.port_of_status())) for _ in range(60)]
+    attacked.until(lambda: "nobody can be taken in" in attacked.log())
+    attacked.beats(10)
+    for visitor in visitors:
+        visitor.close()
+    attacked.until(lambda: served(attacked.port_of_status()))
+    assert len(attacked.log().splitlines()) < 50
+    assert "Traceback" not in attacked.log()
+    attacked.signal(signal.SIGTERM)
+    assert attacked.ended() == 0
+    assert {name: attacked.plc.shows(name) for name in SAFE} == SAFE
+
+
+def served(port: int) -> bool:
+    with socket.create_connection(("127.0.0.1", port)) as line:
+        line.sendall(b"GET /health HTTP/1.1\r\nHost: localhost\r\n\r\n")
+        return line.recv(100).startswith(b"HTTP/1.1 200")
