@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from datetime import datetime
+from datetime import datetime, timedelta
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -20,6 +20,9 @@ from igrow.trainer.season import SHORTEST, first_day, plan_season
 if TYPE_CHECKING:
     from igrow.trainer.fit import FittedModel
 
+LONGEST = timedelta(days=364)
+"""From the first day to the last that is planned of a crop that stands for years: the work grows with the square."""
+
 
 def lacking(bundle: Bundle, site: Site, now: datetime) -> bool:
     """Tell whether a site's crop stands in a season of which the bundle in force knows nothing."""
@@ -35,16 +38,18 @@ def lacking(bundle: Bundle, site: Site, now: datetime) -> bool:
 def with_season(model: FittedModel, now: datetime) -> tuple[FittedModel, tuple[str, ...]]:
     """Return a model with what is left of the season planned on its own simulator, and a sentence where it cannot be.
 
-    It then keeps the season that it had. Takes a minute or two.
+    It then keeps the season that it had. Takes some minutes.
     """
     from igrow.trainer.exporting import export  # noqa: PLC0415  (onnx is slow to import)
 
     site = model.site
-    today = now.astimezone(ZoneInfo(site.time_zone)).date()
+    begins = first_day(site, now.astimezone(ZoneInfo(site.time_zone)).date())
+    if site.crop.end_date is not None:
+        site = replace(site, crop=replace(site.crop, end_date=min(site.crop.end_date, begins + LONGEST)))
     try:
         with TemporaryDirectory() as scratch:
             bundle = export(model, Path(scratch) / "simulator")
-            return replace(model, season=plan_season(site, bundle, begins=first_day(site, today))), ()
+            return replace(model, season=plan_season(site, bundle, begins=begins)), ()
     except IgrowError as error:
         return model, (f"no season is planned: {error}",)
 
