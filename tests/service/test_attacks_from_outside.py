@@ -85,7 +85,7 @@ def test_a_plc_that_answers_everything_with_an_exception_for_a_while_is_controll
 
 def test_a_number_of_which_only_one_word_was_taken_ends_where_it_is_wanted(attacked: AttackedDaemon) -> None:
     """The PLC starts anew between the two words of one write, again and again."""
-    torn = []
+    torn: list[float] = []
 
     def one_word_only(name: str, value: float) -> None:
         if name == "co2_setpoint" and len(torn) < 3:
