@@ -16,7 +16,7 @@ from igrow.core.bundle import MANIFEST_FILE, Bundle, BundleError
 from igrow.edge.updates.rules import Graphs
 from igrow.edge.updates.shelf import Shelf
 from igrow.edge.updates.signed_source import Fetched, UpdateError
-from igrow.edge.updates.state import UpdateState, load_state, save_state
+from igrow.edge.updates.state import UpdateState, load_state, save_in_place, save_state
 from igrow.edge.updates.telling import Teller, Verdict
 
 TAKE_SECONDS = 300.0
@@ -127,7 +127,12 @@ class Bundles:
             yield
         finally:
             self.state.attempt = None
-            self.save()
+            try:
+                save_state(self._state_file, self.state)
+            except OSError:
+                # A note that stays would be held against the bundle at the next start, which is for good.
+                with contextlib.suppress(OSError):
+                    save_in_place(self._state_file, self.state)
 
     def shadow(self, bundle: Bundle, time: float) -> None:
         """Let a bundle predict beside the one in force from `time` on."""

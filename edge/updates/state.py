@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import errno
 import json
+import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -78,3 +80,16 @@ def save_state(path: Path, state: UpdateState) -> None:
     """Replace the state file, and return once that will outlive a power cut; raises OSError."""
     write_whole(path, json.dumps(dataclasses.asdict(state)).encode())
     sync_folder(path.parent)
+
+
+def save_in_place(path: Path, state: UpdateState) -> None:
+    """Write a state that has not grown over the file as it is, for a disk without room for another; raises OSError."""
+    content = json.dumps(dataclasses.asdict(state)).encode()
+    with path.open("r+b") as file:
+        size = file.seek(0, os.SEEK_END)
+        if len(content) > size:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        file.seek(0)
+        file.write(content.ljust(size))
+        file.flush()
+        os.fsync(file.fileno())

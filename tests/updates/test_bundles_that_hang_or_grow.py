@@ -151,6 +151,32 @@ def test_a_candidate_that_took_the_gateway_down_in_its_shadow_run_gives_way(gate
     assert gateway.updates.active() == first
 
 
+def test_a_disk_that_fills_up_during_a_trial_is_not_held_against_the_bundle(
+    gateway: Gateway, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No room, and no inode, for another file: the bundle could not be unpacked, and the note of its trial stays."""
+    saved: list[str | None] = []
+
+    def once(path: Path, state: UpdateState) -> None:
+        if saved:
+            raise OSError(28, "No space left on device")
+        saved.append(state.attempt)
+        save_state(path, state)
+
+    good = send(gateway)
+    with monkeypatch.context() as full:
+        full.setattr(bundles, "save_state", once)
+        gateway.run(0.2)
+        assert saved == [good.identity]
+        gateway.stop()
+    state = load_state(gateway.folder / "updates" / "state.json")
+    assert state.attempt is None
+    gateway.start()
+    gateway.run(2.0)
+    assert gateway.described()["rejected"] == {}
+    assert gateway.active.name == good.label
+
+
 def test_a_trial_that_cannot_be_noted_is_not_made(gateway: Gateway, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
