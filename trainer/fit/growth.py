@@ -157,7 +157,7 @@ def counts_of(
             # A value belongs to the end of the day before it, or to the beginning of its own, whichever is nearer; of
             # those that belong to one midnight, to which a total of every minute has a thousand, the nearest counts.
             local = (to_local(table.time[known], time_zone) - first) / np.timedelta64(1, "D")
-            at = np.round(local).astype(np.int64)
+            at = np.floor(local + 0.5).astype(np.int64)  # noon, too, always to the midnight after
             nearest = np.lexsort((np.abs(local - at), at))
             midnights, place = np.unique(at[nearest], return_index=True)
             return _between(midnights, table[name][known][nearest[place]], kind, days)
