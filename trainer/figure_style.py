@@ -27,7 +27,7 @@ from matplotlib.dates import (
     num2date,
 )
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator
+from matplotlib.ticker import FuncFormatter, MaxNLocator, ScalarFormatter
 
 from igrow.core.arrays import Floats
 from igrow.core.language import Language
@@ -139,6 +139,26 @@ def date_axis(axes: Axes, language: Language) -> None:
         return clock.short_day(np.datetime64(moment, "s")) if moment.time() == datetime.time() else f"{moment:%H:%M}"
 
     axes.xaxis.set_major_formatter(FuncFormatter(label))
+
+
+class _Signs(ScalarFormatter):
+    """Numbers on an axis with the signs of a language."""
+
+    def __init__(self, language: Language) -> None:
+        super().__init__()
+        self._language = language
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        return self._language.locale.number(str(super().__call__(x, pos)))
+
+
+def with_signs_of(figure: Figure, language: Language) -> Figure:
+    """Return a figure whose axes have their numbers as a language writes them, as the text beside them does."""
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            if type(axis.get_major_formatter()) is ScalarFormatter:
+                axis.set_major_formatter(_Signs(language))
+    return figure
 
 
 def few_ticks(axes: Axes, count: int = 4) -> None:

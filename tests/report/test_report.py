@@ -289,6 +289,12 @@ def test_figures_share_one_style_and_turn_dark_with_the_page(page: str) -> None:
     assert not [name for name in ids if re.fullmatch(r"[a-z0-9]+_\d+", name)]
 
 
+@pytest.mark.parametrize(("code", "sign"), [("en", "."), ("nl", ","), ("de", ","), ("es", ","), ("zh", ".")])
+def test_figures_have_the_decimal_sign_of_the_text_beside_them(leak: Diagnosis, code: str, sign: str) -> None:
+    numbers = re.findall(r"<text[^>]*>[−-]?\d+([.,])\d+</text>", render_report(leak, code))
+    assert set(numbers) == {sign}
+
+
 @pytest.mark.parametrize("code", LANGUAGES[1:])
 def test_a_page_in_another_language_has_no_english_text_of_its_own(leak: Diagnosis, code: str) -> None:
     page = render_report(leak, code)

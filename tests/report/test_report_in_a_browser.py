@@ -37,6 +37,9 @@ def test_a_report_reads_well(
         page.goto(f"file://{tmp_path / name}.html")
         assert len(asked) == 1, "a report fetches nothing"
         assert page.evaluate("document.documentElement.scrollWidth") <= width
+        # Rows of a table may be scrolled to; sentences are seen whole.
+        sentences = "[...document.querySelectorAll('p, li, caption, figcaption, h1, h2, h3')]"
+        assert page.evaluate(f"Math.max(...{sentences}.map(one => one.getBoundingClientRect().right))") <= width
         smallest = page.evaluate(
             "Math.min(...[...document.querySelectorAll('svg text')].map(one =>"
             " parseFloat(getComputedStyle(one).fontSize) * one.ownerSVGElement.getBoundingClientRect().width"

@@ -15,7 +15,7 @@ from igrow.core.language import Language
 from igrow.trainer.data.plot import plot_log
 from igrow.trainer.diagnosis import plots
 from igrow.trainer.diagnosis.result import Diagnosis, Finding
-from igrow.trainer.figure_style import WIDTH, svg
+from igrow.trainer.figure_style import WIDTH, svg, with_signs_of
 
 OVERVIEW = ("air_temperature", "air_humidity", "air_co2", "outdoor_temperature", "global_radiation")
 """What the overview of a log shows."""
@@ -34,7 +34,7 @@ def overview(result: Diagnosis, language: Language) -> list[Picture]:
     if result.log is None:
         return []
     draw = partial(plot_log, result.log, only=OVERVIEW, language=language, width=WIDTH)
-    return list(_drawn([(language.text("The log; what was set aside is red"), draw)]))
+    return list(_drawn([(language.text("The log; what was set aside is red"), draw)], language))
 
 
 def evidence(result: Diagnosis, language: Language) -> list[Picture]:
@@ -64,7 +64,7 @@ def evidence(result: Diagnosis, language: Language) -> list[Picture]:
             wanted.append(
                 (title.format(cause=cause), partial(plots.coefficient_by_regime, finding.regimes, language, unit))
             )
-    return list(_drawn(wanted))
+    return list(_drawn(wanted, language))
 
 
 def _drivers(finding: Finding) -> list[str]:
@@ -73,10 +73,10 @@ def _drivers(finding: Finding) -> list[str]:
     return outside or list(finding.drivers)
 
 
-def _drawn(wanted: list[tuple[str, Callable[[], Figure]]]) -> Iterator[Picture]:
+def _drawn(wanted: list[tuple[str, Callable[[], Figure]]], language: Language) -> Iterator[Picture]:
     for title, draw in wanted:
         try:
-            drawn = svg(draw(), on_page=True)
+            drawn = svg(with_signs_of(draw(), language), on_page=True)
         except IgrowError:
             continue  # The log has nothing to show there.
         label = f'<svg role="img" aria-label="{html.escape(title)}"'
