@@ -31,6 +31,7 @@ from igrow.trainer.fit.holding import fit_holding
 from igrow.trainer.fit.model import FittedModel, training_envelope, united
 from igrow.trainer.fit.omission import Omission
 from igrow.trainer.fit.population import Population
+from igrow.trainer.given import READ, must_be
 
 Report = Callable[[str], None]
 
@@ -58,6 +59,7 @@ def calibrate(
     Raises:
         IgrowError: the log cannot be fitted to, and why.
     """
+    must_be(Log, log, READ)
     log.require("a calibration")
     site, say = log.known_site, progress or (lambda _line: None)
     before = prior_model or FittedModel.described(site)

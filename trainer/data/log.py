@@ -11,6 +11,7 @@ import numpy as np
 
 from igrow.core.errors import IgrowError
 from igrow.core.language import speak
+from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
@@ -19,6 +20,7 @@ from igrow.trainer.data.fault import DataFault
 from igrow.trainer.data.record import grid_record
 from igrow.trainer.data.screening import NEEDED, Screened
 from igrow.trainer.data.source import DailyTable
+from igrow.trainer.given import Moment, moment
 
 LEAST_DAYS = 7
 """Days that a log must span for anything to be fitted to it."""
@@ -75,8 +77,15 @@ class Log:
             raise IgrowError(f"{self.name}: this log does not tell its greenhouse: give the site file with --site")
         return self.site
 
-    def select(self, start: np.datetime64 | None = None, end: np.datetime64 | None = None) -> Log:
-        """Return the part with start <= time < end; None leaves that side open."""
+    def select(self, start: Moment | None = None, end: Moment | None = None) -> Log:
+        """Return the part with start <= time < end, in UTC; None leaves that side open.
+
+            log.select("2020-04-01")
+
+        Raises:
+            IgrowError: one of both is no time.
+        """
+        start, end = moment(start), moment(end)
         inside = tuple(
             one
             for one in self.screened
@@ -89,7 +98,10 @@ class Log:
         return replace(self, telemetry=self.telemetry.with_columns(columns))
 
     def without(self, *names: str) -> Log:
-        """Return the log without these columns."""
+        """Return the log without these columns; raises IgrowError where one is no quantity."""
+        for name in names:
+            if name not in QUANTITIES:
+                raise IgrowError(f"{name!r} is no quantity; this log has {', '.join(self.telemetry.columns)}")
         return replace(
             self, telemetry=self.telemetry.only([name for name in self.telemetry.columns if name not in names])
         )

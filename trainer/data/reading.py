@@ -17,6 +17,7 @@ from igrow.trainer.data.plausibility import find_faults
 from igrow.trainer.data.rows import without_strays
 from igrow.trainer.data.screening import screen
 from igrow.trainer.data.source import Source
+from igrow.trainer.given import must_be
 
 
 def read_log(
@@ -42,6 +43,8 @@ def read_log(
     Raises:
         IgrowError: with file and line, where something cannot be read.
     """
+    if not isinstance(path, str | Path | Sequence):
+        raise IgrowError(f"a path is needed, not a {type(path).__name__}: prepare_log takes telemetry in memory")
     place = [path] if isinstance(path, str | Path) else list(path)
     given = load_site(site) if isinstance(site, str | Path) else site
     source = open_source(path, compartment, mapping)
@@ -50,6 +53,7 @@ def read_log(
 
 def prepare_log(telemetry: Telemetry, site: Site | None = None, *, name: str = "log") -> Log:
     """Return the log of a table in memory, screened and put on the grid as `read_log` does it."""
+    must_be(Telemetry, telemetry, "Telemetry(times, columns) makes one, read_log reads files")
     return _prepared(Source(name, telemetry), site, "memory")
 
 

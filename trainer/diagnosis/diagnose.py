@@ -37,6 +37,7 @@ from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.fit.growth import built_in_crop, growth_since
 from igrow.trainer.fit.model import FittedModel
+from igrow.trainer.given import MADE, READ, must_be
 
 Report = Callable[[str], None]
 
@@ -67,6 +68,9 @@ def diagnose(
     Raises:
         IgrowError: the log is shorter than a week, or lacks outdoor or air temperature.
     """
+    must_be(Log, log, READ)
+    must_be(FittedModel, model, MADE)
+    without = (without,) if isinstance(without, str) else without
     for name in without:
         if name not in EFFECTS:
             raise IgrowError(f"no effect is called {name!r}; there are {', '.join(EFFECTS)}")

@@ -38,6 +38,7 @@ from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.growth import CROP_FILE, built_in_crop, crop_of
 from igrow.trainer.fit.model import FittedModel
+from igrow.trainer.given import MADE, must_be
 from igrow.trainer.training.stage_file import stages_to_bytes
 
 DISCREPANCY_FILE = "discrepancy.npz"
@@ -59,6 +60,7 @@ def export(model: FittedModel, folder: Path | str, *, created: datetime | None =
     Raises:
         BundleError: the bundle cannot be written.
     """
+    must_be(FittedModel, model, MADE)
     created = created or datetime.now(UTC)
     crop = model.crop or built_in_crop()
     random = np.random.default_rng(seed)

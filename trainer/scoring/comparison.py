@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from igrow.core.bundle import Bundle, read_bundle
+from igrow.core.errors import IgrowError
 from igrow.core.quantities import QUANTITIES
 from igrow.trainer.data import Log
 from igrow.trainer.exporting import read_model
 from igrow.trainer.fit.evaluation import CARRIED, Evaluation, errors_of, summarise
 from igrow.trainer.fit.model import FittedModel
+from igrow.trainer.given import READ, must_be
 from igrow.trainer.scoring.bundles import BY_SETPOINTS, runs_by_actuators, score_bundle, unseen
 
 PERSISTENCE = "persistence"
@@ -81,6 +83,9 @@ def compare(
     Raises:
         IgrowError: a bundle cannot be read, or the log cannot be used.
     """
+    must_be(Log, log, READ)
+    if not simulators:
+        raise IgrowError("no simulator is given: a model, a bundle or the folder of one is needed")
     given = simulators.items() if isinstance(simulators, Mapping) else _named(simulators)
     return Comparison(log.name, {name: _scores(one, log, horizons) for name, one in given})
 
