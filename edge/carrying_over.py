@@ -49,5 +49,13 @@ def carry_over(control: Control, before: Control) -> None:
     """Let control go on where it stood before a reload, for all points that still mean the same register."""
     old, new = before.configuration.register_map, control.configuration.register_map
     was = registers_of(old, old.points)
-    same = [name for name, register in registers_of(new, new.points).items() if was.get(name) == register]
-    control.cycle.carry_over(before.cycle, same)
+    now = registers_of(new, new.points)
+    control.cycle.carry_over(before.cycle, [name for name, register in now.items() if was.get(name) == register])
+    points, earlier = control.cycle.readback.points, before.cycle.readback.points
+    # A line that is taken out and put in again, by whoever edits the files, must not cost a hand.
+    left_out = {**before.left_out, **{name: (was[name], memory) for name, memory in earlier.items()}}
+    for name, (register, memory) in left_out.items():
+        if name not in points:
+            control.left_out[name] = register, memory
+        elif name not in earlier and register == now[name]:
+            points[name] = memory

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from igrow.core.agronomy import Place
 from igrow.core.sun import position
@@ -16,6 +16,7 @@ from igrow.edge.cycle import ControlCycle
 from igrow.edge.daemon_file import ClockSource
 from igrow.edge.guard import GuardedWriter, Readback
 from igrow.edge.guard.heartbeat import HEARTBEAT
+from igrow.edge.guard.point_memory import PointMemory
 from igrow.edge.journal import Journal
 from igrow.edge.moment import this_boot
 from igrow.edge.notifications.acknowledged import ACKNOWLEDGED_FILE, AcknowledgementWatch
@@ -72,6 +73,8 @@ class Control:
     acknowledged: AcknowledgementWatch
     override: GrowerOverride
     separating_tests: SeparatingTests
+    left_out: dict[str, tuple[str, PointMemory]] = field(default_factory=dict)
+    """What is known of points that a reload has left out, with the register of each: another may bring them back."""
 
     @property
     def lockstep(self) -> bool:

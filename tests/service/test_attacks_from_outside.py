@@ -192,6 +192,34 @@ def test_a_reload_that_swaps_two_addresses_writes_nothing_under_the_old_meaning(
         assert low <= value <= high, f"{value} to the register of the other setpoint"
 
 
+def test_a_hand_at_a_setpoint_that_one_reload_leaves_out_and_the_next_brings_back_is_respected(
+    attacked: AttackedDaemon,
+) -> None:
+    """Somebody takes the setpoint's lines out of the files, and puts them in again."""
+
+    def reload(*, with_co2: bool) -> None:
+        for path, text in whole.items():
+            lines = text.replace(", co2_setpoint]", "]").splitlines(keepends=True)
+            less = "".join(line for line in lines if "co2_setpoint" not in line)
+            path.write_text(text if with_co2 else less)
+        times = attacked.log().count("was read again")
+        attacked.signal(signal.SIGHUP)
+        attacked.until(lambda: attacked.log().count("was read again") > times)
+        attacked.beats(4)
+
+    attacked.start()
+    attacked.controls()
+    attacked.beats(3)
+    whole = {path: path.read_text() for path in attacked.folder.glob("*.yaml")}
+    with attacked.plc.lock:
+        attacked.plc.set_value("co2_setpoint", 555.0)
+    attacked.until(lambda: "by hand at the PLC" in attacked.log())
+    reload(with_co2=False)
+    reload(with_co2=False)
+    reload(with_co2=True)
+    assert attacked.plc.shows("co2_setpoint") == 555.0
+
+
 def test_a_plc_that_hangs_with_its_line_open_is_controlled_again(attacked: AttackedDaemon) -> None:
     attacked.start()
     attacked.controls()
