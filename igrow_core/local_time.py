@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime
-from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
+from zoneinfo import ZoneInfo, ZoneInfoNotFoundError, available_timezones
 
 import numpy as np
 
@@ -19,6 +19,8 @@ def zone(name: str) -> ZoneInfo:
     try:
         return ZoneInfo(name)
     except (ZoneInfoNotFoundError, ValueError, OSError):
+        if not available_timezones():
+            raise IgrowError(f"time zone {name!r}: this machine knows no time zone at all: install tzdata") from None
         raise IgrowError(f"time zone {name!r} is not known: a name such as Europe/Amsterdam is needed") from None
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from zoneinfo import ZoneInfoNotFoundError
+
 import numpy as np
 import pytest
 
@@ -36,3 +38,13 @@ def test_a_wall_time_that_the_clock_skips_never_was() -> None:
 def test_an_unknown_zone_is_named() -> None:
     with pytest.raises(IgrowError, match="Europe/Nowhere"):
         to_local(span("2020-01-01", 5, 2), "Europe/Nowhere")
+
+
+def test_a_machine_without_time_zones_says_what_it_lacks(monkeypatch: pytest.MonkeyPatch) -> None:
+    def unknown(name: str) -> None:
+        raise ZoneInfoNotFoundError(name)
+
+    monkeypatch.setattr("igrow.core.local_time.ZoneInfo", unknown)
+    monkeypatch.setattr("igrow.core.local_time.available_timezones", set)
+    with pytest.raises(IgrowError, match="no time zone at all: install tzdata"):
+        to_local(np.array(["2026-06-01"], dtype="datetime64[s]"), "Europe/Amsterdam")
