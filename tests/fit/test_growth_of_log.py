@@ -79,7 +79,7 @@ def test_a_total_of_every_hour_is_read_from_midnight_to_midnight(telemetry: Tele
 
 def test_what_is_counted_at_noon_is_a_count_for_each_day() -> None:
     time = np.datetime64("2020-02-01T12:00:00") + np.arange(10) * np.timedelta64(1, "D")
-    daily = Telemetry(time, {"net_growth": 0.01 * np.arange(10)})
+    daily = Telemetry(time, {"net_growth": np.arange(10, dtype=np.float64)})
     counts = counts_of(daily, None, np.datetime64("2020-02-01"), 11, "UTC")
     assert [(one.first, one.last) for one in counts] == [(day, day + 1) for day in range(1, 10)]
 
