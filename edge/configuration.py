@@ -19,7 +19,7 @@ from igrow.core.exchange.address import Address, parse_address
 from igrow.core.local_time import zone
 from igrow.core.quantities import SETPOINTS
 from igrow.core.site import Site, load_site
-from igrow.core.yaml_schema import duration, load, place
+from igrow.core.yaml_schema import SchemaError, duration, load, place
 from igrow.edge.daemon_file import BUILT_IN_BUNDLE, ClockSource, CycleSettings, DaemonFile
 from igrow.edge.guard import DEFAULT_INTERLOCKS, GuardRules
 from igrow.edge.guard.heartbeat import HEARTBEAT
@@ -110,7 +110,11 @@ def load_configuration(path: str | os.PathLike[str]) -> Configuration:
     Raises SchemaError for an error inside a file and ConfigurationError when the files do not fit together.
     """
     path = Path(path)
-    file = load(path, DaemonFile)
+    try:
+        file = load(path, DaemonFile)
+    except SchemaError:
+        _refuse_what_it_names(path)
+        raise
     for key, name in (("site", file.site), ("register_map", file.register_map)):
         if not (path.parent / name).is_file():
             raise ConfigurationError(
@@ -119,6 +123,17 @@ def load_configuration(path: str | os.PathLike[str]) -> Configuration:
     site = load_site(path.parent / file.site)
     register_map = load_register_map(path.parent / file.register_map)
     return put_together(path, file, site, register_map)
+
+
+def _refuse_what_it_names(path: Path) -> None:
+    """Raise ConfigurationError where a file is one of those that the daemon's file names."""
+    files = (("site", "a site's file", load_site), ("register_map", "a register map", load_register_map))
+    for key, kind, read in files:
+        try:
+            read(path)
+        except IgrowError:
+            continue
+        raise ConfigurationError(f"{path}: is {kind}: give the daemon's file, which names it as `{key}`")
 
 
 def put_together(path: Path, file: DaemonFile, site: Site, register_map: RegisterMap) -> Configuration:

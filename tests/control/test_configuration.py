@@ -234,3 +234,10 @@ def test_no_rounding_of_a_register_ever_leaves_the_limits(low, width, kind, frac
         assert low <= shown <= high
         assert rule.same(shown, asked)
     assert rule.low - low <= scale + np.spacing(np.float32(low))
+
+
+@pytest.mark.parametrize(("name", "said"), [("site.yaml", "is a site's file"), ("map.yaml", "is a register map")])
+def test_a_file_that_the_daemons_file_names_is_told_from_it(tmp_path: Path, name: str, said: str) -> None:
+    write_files(tmp_path, 5020)
+    with pytest.raises(ConfigurationError, match=f"{name}: {said}: give the daemon's file"):
+        load_configuration(tmp_path / name)
