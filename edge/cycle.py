@@ -158,8 +158,13 @@ class ControlCycle:
         unshown = await look_after(self._plc, self._writer, self._rules.points, outcomes, until)
         held = () if self._manual else tuple(sorted(self.readback.held(image.monotonic)))
         settled = {*held, *(outcome.write.point for outcome in outcomes)}
+        doubtful = () if self._manual else self._hands(image.monotonic)[0]
+        alone = tuple(name for name in self._setpoints if name in doubtful and name not in settled)
+        settled |= {*alone}
         unseen = [name for name in self._setpoints if image.value_of(name).age > 0.0 and name not in settled]
-        return StopReport.after(outcomes, by_hand=held, unseen=unseen, unshown=unshown, manual=self._manual)
+        return StopReport.after(
+            outcomes, by_hand=held, left_alone=alone, unseen=unseen, unshown=unshown, manual=self._manual
+        )
 
     async def _stop_by(self, image: Image, until: float) -> list[WriteOutcome]:
         """Write the guard's verdict on a stop, also to units that were silent lately."""

@@ -50,6 +50,8 @@ class StopReport:
     """Somebody operates it by hand, so nothing was written."""
     by_hand: tuple[str, ...] = ()
     """The points that were left as a hand has set them."""
+    left_alone: tuple[str, ...] = ()
+    """The points that a hand may have set, which nobody could know yet."""
     written: Mapping[str, float] = field(default_factory=dict)
     """What the PLC has confirmed."""
     failed: Mapping[str, str] = field(default_factory=dict)
@@ -64,6 +66,7 @@ class StopReport:
         outcomes: Sequence[WriteOutcome],
         *,
         by_hand: Sequence[str],
+        left_alone: Sequence[str],
         unseen: Sequence[str],
         unshown: Mapping[str, float],
         manual: bool,
@@ -73,6 +76,7 @@ class StopReport:
             seen=True,
             manual=manual,
             by_hand=tuple(by_hand),
+            left_alone=tuple(left_alone),
             unseen=tuple(unseen),
             unshown=unshown,
             written={o.write.point: o.write.value for o in outcomes if o.error is None},
@@ -86,6 +90,8 @@ class StopReport:
         if self.manual:
             return "nothing was written, as somebody operates the PLC by hand"
         notes = f", but for {', '.join(self.by_hand)}, which a hand has set" if self.by_hand else ""
+        if self.left_alone:
+            notes += f", but for {', '.join(self.left_alone)}, which a hand may have set"
         if self.unseen:
             notes += f"; {', '.join(self.unseen)} stood there already when last seen, and cannot be looked at now"
         for name, shown in self.unshown.items():

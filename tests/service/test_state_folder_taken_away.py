@@ -117,4 +117,9 @@ def test_a_start_that_cannot_read_what_was_noted_leaves_a_hand_alone(attacked: A
     attacked.until(lambda: "what was set by hand before the start cannot be read" in attacked.log())
     attacked.beats(5)
     assert attacked.plc.shows("co2_setpoint") == HAND
+    attacked.signal(signal.SIGTERM)
+    assert attacked.ended() == 0
+    assert attacked.plc.shows("co2_setpoint") == HAND
+    last = attacked.log().rsplit("stopped:", 1)[1]
+    assert "but for heating_setpoint, co2_setpoint, which a hand may have set" in last
     assert "Traceback" not in attacked.log()
