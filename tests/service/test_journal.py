@@ -27,7 +27,7 @@ def test_every_line_of_the_journal_has_a_priority_and_no_line_is_a_programmers(t
     assert any(line.startswith("<6>started for site ") for line in lines)
     assert any(line.startswith("<4>") and "the line was lost" in line for line in lines)
     assert any(line.startswith("<6>recipe decides, before it none: ") for line in lines)
-    assert lines[-1].startswith("<6>stopped: the PLC does not answer")
+    assert lines[-1].startswith("<6>stopped: nothing was written")
     assert not any("Traceback" in line or "Errno" in line for line in lines)
 
 
