@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from igrow.core.bundle import default_bundle_folder, read_bundle
+from igrow.core.errors import IgrowError
 from igrow.core.planner.season import SeasonPlan
 from igrow.core.site import Crop, Site
 from igrow.core.telemetry import Telemetry
@@ -103,5 +104,14 @@ def test_a_model_in_force_that_has_no_season_is_published_once_with_one(
     (folder,) = published
     season = SeasonPlan.of(read_bundle(folder))
     assert season is not None and season.covers(np.datetime64("2020-03-01T12:00:00"))
+
+    def fails(*_: object, **__: object) -> None:
+        raise IgrowError("no such weather")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(seasons, "plan_season", fails)
+        unplanned = recalibrate(SITE, archive, tmp_path / "other", published.append, now=NOON)
+    assert (unplanned.verdict, unplanned.published) == ("nothing", False)
+    assert "no season is planned: no such weather" in unplanned.notes
     again = recalibrate(SITE, archive, tmp_path / "state", published.append, now=NOON, force=True)
     assert not again.published and again.note.startswith("the bundle in force stays")

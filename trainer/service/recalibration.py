@@ -79,6 +79,8 @@ def _run(
     days: int,
     drift: Path | None,
 ) -> Turn:
+    from igrow.trainer.exporting import read_model  # noqa: PLC0415  (onnx is slow to import)
+
     log = archive.read(site.name, (now - timedelta(days=days)).date(), now.date() + timedelta(days=2))
     notes = log.notes + tuple(_missing(log))
     if len(log.telemetry) == 0:
@@ -98,7 +100,13 @@ def _run(
         return turn(f"a model with {gain} less error a day ahead on unseen days was found")
     if publish_bundle is None or not (better or seasons.lacking(bundle, site, now)):
         return turn(f"the bundle in force stays: the new model is only {gain} better on unseen days")
-    write = outcome.write_bundle if better else partial(_write_again, bundle, site, now)
+    write = outcome.write_bundle
+    if not better:
+        model, unplanned = seasons.with_season(read_model(bundle, site), now)
+        if unplanned:
+            notes += unplanned
+            return turn("the bundle in force stays, without a season")
+        write = partial(seasons.written, model)
     name, unplanned = publish_new(folder, write, publish_bundle, now, bundle.folder)
     notes += unplanned
     why = f"{gain} less error a day ahead on unseen days" if better else "the model in force, with the season planned"
@@ -132,17 +140,6 @@ def _diagnose(site: Site, log: SiteLog, bundle: Bundle, target: Path, now: datet
     write_bundle = partial(seasons.export_planned, diagnosis.corrected, now) if sound else None
     causes = tuple(one.effect for one in diagnosis.findings)
     return Diagnosed(diagnosis.verdict, causes, relative_gain(diagnosis.errors), tuple(diagnosis.notes), write_bundle)
-
-
-def _write_again(bundle: Bundle, site: Site, now: datetime, folder: Path) -> tuple[str, ...]:
-    """Write the model in force as a bundle with its season; raises IgrowError where none can be planned."""
-    from igrow.trainer.exporting import export, read_model  # noqa: PLC0415
-
-    model, notes = seasons.with_season(read_model(bundle, site), now)
-    if notes:
-        raise IgrowError("; ".join(notes))
-    export(model, folder)
-    return ()
 
 
 def relative_gain(errors: Mapping[str, Mapping[str, Mapping[str, float]]]) -> float:

@@ -56,8 +56,13 @@ def with_season(model: FittedModel, now: datetime) -> tuple[FittedModel, tuple[s
 
 def export_planned(model: FittedModel, now: datetime, folder: Path) -> tuple[str, ...]:
     """Write a model with what is left of the season as a bundle; returns a sentence where that cannot be planned."""
+    model, notes = with_season(model, now)
+    return notes + written(model, folder)
+
+
+def written(model: FittedModel, folder: Path) -> tuple[str, ...]:
+    """Write a model as a bundle; there is nothing to be said of it."""
     from igrow.trainer.exporting import export  # noqa: PLC0415
 
-    model, notes = with_season(model, now)
     export(model, folder)
-    return notes
+    return ()
