@@ -69,8 +69,8 @@ class Told:
     greenhouse: str
     taken_out: str
     """The effect that is missing; empty for none."""
-    named: str
-    score: float
+    named: tuple[str, ...]
+    """Causes, that which stands out most first."""
     gains: dict[str, float]
     rise: float
     """Of the 24 h error on held-out weeks, over that of the whole model: mean ratio of all quantities."""
@@ -111,8 +111,7 @@ def calibrations(
         yield Told(
             name,
             TAKEN_OUT.get(parameter, ""),
-            "" if found is None else found.effect.name,
-            0.0 if found is None else found.score,
+            () if found is None else tuple(effect.name for effect in found.effects),
             {effect: round(gain, 1) for effect, gain in gains.items()},
             float(np.mean([errors[quantity] / whole[quantity] for quantity in errors])),
         )
@@ -129,25 +128,36 @@ def season(job: tuple[str, str, int, tuple[str, ...]]) -> list[Told]:
         record = seen.record(seen.best_shift(site_prior(greenhouse.site).values))
         for one in calibrations(record, greenhouse.site, greenhouse.site.name, taken_out, usual):
             told.append(one)
-            print(f"{one.greenhouse} without {one.taken_out or 'nothing'}: {one.named or '-'}", file=sys.stderr)
+            names = ", ".join(one.named) or "-"
+            print(f"{one.greenhouse} without {one.taken_out or 'nothing'}: {names}", file=sys.stderr)
     return told
 
 
+def stands_for(name: str, taken_out: str) -> bool:
+    """Tell whether a name is that of what was taken out, or of what no log tells apart from it."""
+    return name == taken_out or any({name, taken_out} <= pair for pair in CONFOUNDED)
+
+
 def is_right(one: Told) -> bool:
-    """Tell whether the name is that of what was taken out, or of what no log tells apart from it."""
-    return one.named == one.taken_out or any({one.named, one.taken_out} <= pair for pair in CONFOUNDED)
+    """Tell whether what was taken out is among the names."""
+    return any(stands_for(name, one.taken_out) for name in one.named)
+
+
+def is_wrong(one: Told) -> bool:
+    """Tell whether something else is."""
+    return any(not stands_for(name, one.taken_out) for name in one.named)
 
 
 def show(told: Sequence[Told]) -> None:
     """Print the table."""
     whole = [one for one in told if not one.taken_out]
     false = [one for one in whole if one.named]
-    print(f"named with the whole model: {len(false)} of {len(whole)} {[one.named for one in false]}")
+    print(f"named with the whole model: {len(false)} of {len(whole)} {[', '.join(one.named) for one in false]}")
     print(f"{'taken out':24}{'named':>8}{'wrong':>8}{'of':>5}   where the error rises by a twentieth: named   of")
     for effect in (*dict.fromkeys(one.taken_out for one in told if one.taken_out), "all"):
         own = [one for one in told if one.taken_out and effect in {one.taken_out, "all"}]
         matter = [one for one in own if one.rise >= MATTERS]
-        wrong = sum(bool(one.named) and not is_right(one) for one in own)
+        wrong = sum(map(is_wrong, own))
         right, mattering = sum(map(is_right, own)), sum(map(is_right, matter))
         shares = f"{right / len(own):8.2f}{wrong:8}{len(own):5}"
         print(f"{effect:24}{shares}{mattering / max(len(matter), 1):45.2f}{len(matter):5}")
@@ -180,8 +190,8 @@ def on_real_logs(data: Path, only: str) -> int:
             told.append(found)
             ranked = sorted(found.gains, key=found.gains.__getitem__, reverse=True)[:3]
             gains = ", ".join(f"{name} {found.gains[name]:.0f}" for name in ranked)
-            missing = found.taken_out or "nothing"
-            print(f"{one.name:24} without {missing:22} {found.named or '-':22} error x {found.rise:.2f}; gains {gains}")
+            missing, names = found.taken_out or "nothing", ", ".join(found.named) or "-"
+            print(f"{one.name:24} without {missing:22} {names:40} error x {found.rise:.2f}; gains {gains}")
     print()
     show(told)
     return 0

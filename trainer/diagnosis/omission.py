@@ -1,10 +1,11 @@
-"""What a model lacks, asked of its calibration log: a term of the physics that is not in it.
+"""What a model lacks, asked of its calibration log: terms of the physics that are not in it.
 
 A diagnosis asks what has changed since the calibration; what was missing then is asked here. Each term that an effect
 of the catalogue can stand in for is scored against all parameters under the prior of the site's description, so that
 parameters which a missing term drives to unphysical values speak for it too. Every structure misses something of every
 greenhouse: what calibrations of greenhouses in which nothing was taken out gain is learned (`learned/omission.json`),
-and a term must stand out from that. It must then make weeks better that no fit saw.
+and a term must stand out from that. It must then make weeks better that no fit saw. A large one hides others, so the
+question is asked again beside each that was found.
 """
 
 from __future__ import annotations
@@ -20,8 +21,9 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from igrow.core.arrays import Mask
-from igrow.core.bundle import EffectRecord, Estimate
+from igrow.core.bundle import EffectRecord, Estimate, HeldOutError
 from igrow.core.effects import EFFECTS, Effect
+from igrow.core.simulator.hybrid.climate import ActiveEffects
 from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
 from igrow.trainer.data.splits import alternate_weeks
@@ -29,10 +31,10 @@ from igrow.trainer.diagnosis import history, linear, search
 from igrow.trainer.diagnosis.candidates import Candidate
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.estimate import normal_quantile
-from igrow.trainer.diagnosis.linear import LinearModel
+from igrow.trainer.diagnosis.linear import LinearModel, Term
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.fit.climate import fit_climate
-from igrow.trainer.fit.evaluation import held_out_errors
+from igrow.trainer.fit.evaluation import Simulator, held_out_errors
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.omission import Omission
 from igrow.trainer.fit.solver import DivergenceError
@@ -64,11 +66,11 @@ class UsualGains:
         mean, deviation = self.root_gains.get(effect, (0.0, USUAL_DEVIATION))
         return (root_gain(gain) - mean) / deviation
 
-    def outstanding(self, gains: Mapping[str, float]) -> tuple[str, float] | None:
-        """Return the term that stands out most, with its score; None where none stands out."""
+    def outstanding(self, gains: Mapping[str, float]) -> str | None:
+        """Return the term that stands out most; None where none stands out."""
         scores = {effect: self.score(effect, gain) for effect, gain in gains.items()}
         best = max(scores, key=scores.__getitem__, default=None)
-        return None if best is None or scores[best] < self.least_score else (best, scores[best])
+        return None if best is None or scores[best] < self.least_score else best
 
 
 def root_gain(gain: float) -> float:
@@ -103,7 +105,9 @@ def write_usual_gains(path: Path, usual: UsualGains) -> None:
     path.write_text(json.dumps(asdict(usual), indent=1) + "\n", encoding="utf-8")
 
 
-def gains_of(record: Record, site: Site, posterior: Gaussian, rules: DecisionRules) -> dict[str, float]:
+def gains_of(
+    record: Record, site: Site, posterior: Gaussian, rules: DecisionRules, effects: ActiveEffects | None = None
+) -> dict[str, float]:
     """Return what every term gains in a calibration log against the parameters under the site's description.
 
     Args:
@@ -111,22 +115,30 @@ def gains_of(record: Record, site: Site, posterior: Gaussian, rules: DecisionRul
         site: the greenhouse.
         posterior: of the parameters that the calibration has; those that it holds stay where they are.
         rules: of the noise.
+        effects: terms that were found before, at their sizes, which are free beside the parameters; they gain no more.
 
     Raises:
         DivergenceError: the model runs out of all bounds on the log.
     """
-    _, design = history.jointly(record, site, posterior, rules)
-    block = design.block("parameter")
+    known = effects or {}
+    _, design = history.jointly(record, site, posterior, rules, effects=known)
+    block, columns = design.block("parameter"), design.block("effect").columns
     physical = history.physical_prior(site, posterior)
     null = LinearModel(tuple(block.columns), physical.precision, physical.mean - posterior.mean)
+    typical = _typical(design)
+    for place, effect in typical:
+        if effect.name in known:
+            null = null.with_term(Term(columns[place]))
     current = linear.fit(design.grams, null)
     found = {}
-    for place, effect in _typical(design):
+    for place, effect in typical:
+        if effect.name in known:
+            continue
         bound = effect.amplitude
         scanned = search.scan(
             design.grams,
             current,
-            [design.block("effect").columns[place]],
+            [columns[place]],
             [None],
             [None],
             # What a model has too much of it does not lack.
@@ -145,7 +157,7 @@ def examine(
     rules: DecisionRules,
     usual: UsualGains | None = None,
 ) -> Omission | None:
-    """Return the term that a calibrated model lacks; None where none stands out, or none makes unseen weeks better.
+    """Return the terms that a calibrated model lacks; None where none stands out, or none makes unseen weeks better.
 
     Args:
         record: of the calibration log.
@@ -162,27 +174,44 @@ def examine(
     named = usual.outstanding(gains_of(record, site, posterior, rules))
     if named is None or not held_out.any():
         return None
-    effect, score = EFFECTS[named[0]], named[1]
-    prior = history.physical_prior(site, posterior)
+    prior, found = history.physical_prior(site, posterior), None
+    terms: tuple[Effect, ...] = ()
     try:
-        without = fit_climate([(record, ~held_out)], prior)
-        beside = _fit(record, ~held_out, prior, effect)
-        parameters = beside.marginal(prior.names).values
-        active = {effect.name: {effect.amplitude.name: beside.values[_name(effect)], **_shape(effect)}}
-        errors = held_out_errors(record, held_out, (without.values, {}), (parameters, active))
-        day = [one.after / one.before for one in errors if one.horizon == DAY]
-        if not day or np.mean(day) > 1.0 - rules.least_omission_fall:
-            return None
-        fitted = _fit(record, None, prior, effect)
+        without: Simulator = (fit_climate([(record, ~held_out)], prior).values, {})
+        last = without
+        while named is not None and len(terms) < rules.most_causes:
+            terms = (*terms, EFFECTS[named])
+            fitted = _fit(record, ~held_out, prior, terms)
+            simulator: Simulator = (fitted.marginal(prior.names).values, _active(fitted, terms))
+            if not _better(held_out_errors(record, held_out, last, simulator), rules):
+                break
+            last, fitted = simulator, _fit(record, None, prior, terms)
+            parameters = fitted.marginal(prior.names)
+            errors = held_out_errors(record, held_out, without, simulator)
+            found = Omission(tuple(_estimated(fitted, effect, rules) for effect in terms), parameters, errors)
+            named = usual.outstanding(gains_of(record, site, parameters, rules, _active(fitted, terms)))
     except DivergenceError:
-        return None
-    name = _name(effect)
-    size, deviation = fitted.values[name], rules.deviation_inflation * fitted.deviations[name]
-    reach = normal_quantile(rules) * deviation
+        # What was found before stands without the term that the model cannot run with.
+        return found
+    return found
+
+
+def _better(errors: Sequence[HeldOutError], rules: DecisionRules) -> bool:
+    """Tell whether a term takes its share off the error of unseen weeks."""
+    day = [one.after / one.before for one in errors if one.horizon == DAY]
+    return bool(day) and float(np.mean(day)) <= 1.0 - rules.least_omission_fall
+
+
+def _active(fitted: Gaussian, terms: Sequence[Effect]) -> dict[str, dict[str, float]]:
+    return {one.name: {one.amplitude.name: fitted.values[_name(one)], **_shape(one)} for one in terms}
+
+
+def _estimated(fitted: Gaussian, effect: Effect, rules: DecisionRules) -> EffectRecord:
+    size = fitted.values[_name(effect)]
+    reach = normal_quantile(rules) * rules.deviation_inflation * fitted.deviations[_name(effect)]
     estimates = {effect.amplitude.name: Estimate(size, size - reach, size + reach, effect.amplitude.unit)}
     estimates |= {one.name: Estimate(one.typical, one.low, one.high, one.unit) for one in effect.shapes}
-    found = EffectRecord(effect.name, effect.kind, estimates, effect.balances)
-    return Omission(found, fitted.marginal(prior.names), score, errors)
+    return EffectRecord(effect.name, effect.kind, estimates, effect.balances)
 
 
 def _typical(design: Design) -> list[tuple[int, Effect]]:
@@ -207,12 +236,12 @@ def _name(effect: Effect) -> str:
     return f"{effect.name}:{effect.amplitude.name}"
 
 
-def _fit(record: Record, rows: Mask | None, prior: Gaussian, effect: Effect) -> Gaussian:
-    """Return parameters and the size of a term, fitted together to free runs."""
-    size = effect.amplitude
+def _fit(record: Record, rows: Mask | None, prior: Gaussian, terms: Sequence[Effect]) -> Gaussian:
+    """Return parameters and the sizes of terms, fitted together to free runs."""
+    typical = np.array([one.amplitude.typical for one in terms])
     joint = Gaussian(
-        (*prior.names, _name(effect)),
-        np.append(prior.mean, size.typical),
-        block_diag(prior.covariance, (WIDE * size.typical) ** 2),
+        (*prior.names, *map(_name, terms)),
+        np.concatenate([prior.mean, typical]),
+        block_diag(prior.covariance, np.diag((WIDE * typical) ** 2)),
     )
-    return fit_climate([(record, rows)], joint, {effect.name: _shape(effect)})
+    return fit_climate([(record, rows)], joint, {one.name: _shape(one) for one in terms})

@@ -45,7 +45,7 @@ class FittedModel:
     """The same with covariance and the colour of its noise, at the log's own step; None where it was not learned."""
     effects: tuple[EffectRecord, ...] = ()
     omission: Omission | None = None
-    """A term that its calibration log says it lacks: among the effects only once the model is `completed`."""
+    """Terms that its calibration log says it lacks: among the effects only once the model is `completed`."""
     actuation: Mapping[str, float] = field(default_factory=actuation.default_rules)
     """Rules of the actuation stage by name."""
     holding: Mapping[str, float] = field(
@@ -117,14 +117,14 @@ class FittedModel:
         )
 
     def completed(self) -> FittedModel:
-        """Return the model with the term that it lacks, its parameters refitted beside it; itself where none is."""
+        """Return the model with the terms that it lacks, its parameters refitted beside them; itself where none is."""
         if self.omission is None:
             return self
         after = {(one.quantity, one.horizon): one.after for one in self.omission.errors}
         return replace(
             self,
             posterior=self.omission.posterior,
-            effects=(*self.effects, self.omission.effect),
+            effects=(*self.effects, *self.omission.effects),
             errors=tuple(replace(one, after=after.get((one.quantity, one.horizon), one.after)) for one in self.errors),
         )
 
@@ -185,7 +185,7 @@ class FittedModel:
             "covariance": self.posterior.covariance.tolist(),
             "discrepancy": dict(self.discrepancy),
             "effects": {name: dict(values) for name, values in self.active_effects.items()},
-            "omission": None if self.omission is None else asdict(self.omission.effect),
+            "omission": [asdict(effect) for effect in self.omission.effects] if self.omission else [],
             "actuation": dict(self.actuation),
             "holding": dict(self.holding),
             "training_range": {name: list(ends) for name, ends in self.training_range.items()},

@@ -1,4 +1,4 @@
-"""What a model lacked from its first day: a term of the physics that its own calibration log asks for."""
+"""What a model lacked from its first day: terms of the physics that its own calibration log asks for."""
 
 from __future__ import annotations
 
@@ -10,13 +10,11 @@ from igrow.trainer.fit.gaussian import Gaussian
 
 @dataclass(frozen=True)
 class Omission:
-    """A term that stands out of a calibration, and that weeks which no fit saw bear out."""
+    """Terms that stand out of a calibration, and that weeks which no fit saw bear out."""
 
-    effect: EffectRecord
-    """With its size and interval, fitted beside the parameters."""
+    effects: tuple[EffectRecord, ...]
+    """With their sizes and intervals, fitted together beside the parameters; that which stands out most first."""
     posterior: Gaussian
-    """Of the parameters beside it, under the prior of the site's description."""
-    score: float
-    """How far its gain lies above what calibrations that lack nothing show, in standard deviations."""
+    """Of the parameters beside them, under the prior of the site's description."""
     errors: tuple[HeldOutError, ...]
-    """Without and with it, on weeks that neither fit saw."""
+    """Without and with them, on weeks that neither fit saw."""

@@ -105,10 +105,12 @@ def _told(effect: Effect, size: float, unit: str, language: Language) -> str:
 
 def omission(one: Omission, language: Language, *, completed: bool) -> list[str]:
     """Return what a model lacked from its first day, what weeks that no fit saw say of it, and what became of it."""
-    effect = EFFECTS[one.effect.name]
-    size = one.effect.parameters[effect.amplitude.name]
-    told = _told(effect, size.value, size.unit, language)
-    lines = [language.text("The log of the calibration says what the model lacks: {told}.", told=told)]
+    told = []
+    for found in one.effects:
+        effect = EFFECTS[found.name]
+        size = found.parameters[effect.amplitude.name]
+        told.append(_told(effect, size.value, size.unit, language))
+    lines = [language.text("The log of the calibration says what the model lacks: {told}.", told="; ".join(told))]
     for error in one.errors:
         if error.horizon == "24_h":
             lines.append(
