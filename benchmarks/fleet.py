@@ -98,7 +98,6 @@ class Collected:
     collecting: float
     looking: float
     showing: float
-    row: float
 
 
 def on_the_gateway(step: float) -> None:
@@ -162,9 +161,10 @@ def collect_fleet(sites: int, step: float) -> Collected:
         _, looking, _ = run("fleet", "collect", str(fleet))
         print(f"a round that finds nothing            {'':8} {looking / sites:.3f} s of processor a site")
         wall, showing, _ = run("fleet", "status", str(fleet), "--page", str(root / "www"))
-        megabytes = (root / "www" / "index.html").stat().st_size / 1e6
-        print(f"status and page of all sites          {wall:8.1f} s, {megabytes:.2f} MB")
-        return Collected(cpu / sites, looking / sites, showing / sites, megabytes / sites)
+        pages = [one.stat().st_size / 1e6 for one in (root / "www").glob("*.html")]
+        largest = f"{len(pages)} pages of {max(pages):.2f} MB at most"
+        print(f"status and pages of all sites         {wall:8.1f} s, {largest}")
+        return Collected(cpu / sites, looking / sites, showing / sites)
 
 
 class CountingPlace(FolderPlace):
@@ -250,7 +250,7 @@ def main() -> None:
     found = collect_fleet(options.sites, options.seconds)
     requests = with_history(options.history, 600.0)
     diagnosing, megabytes = weekly_diagnosis(options.diagnose)
-    one = Costs(found.collecting, found.looking, requests, diagnosing, megabytes, found.showing, found.row)
+    one = Costs(found.collecting, found.looking, requests, diagnosing, megabytes, found.showing)
     print("\n".join(report(one, Cluster(options.cores, options.memory, options.price), options.project)))
 
 

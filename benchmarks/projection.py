@@ -15,10 +15,8 @@ CONNECTIONS = 10.0
 """New connections a second that one OpenSSH server takes with its default MaxStartups, if each takes a second."""
 BUCKET = 3500.0
 """Writing requests a second that S3's maker names for one prefix; reading ones have 5500."""
-PAGE = 5.0
-"""MB of a page that a telephone still opens."""
 STATUS = 600.0
-"""Seconds that the page of all sites may take."""
+"""Seconds that the pages of all sites may take."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +35,6 @@ class Costs:
     """Of a process that diagnoses."""
     showing: float
     """Seconds of its row of the page."""
-    row: float
-    """MB of its row."""
 
 
 @dataclass(frozen=True)
@@ -65,8 +61,7 @@ def bounds(one: Costs, cluster: Cluster) -> list[tuple[float, str]]:
             (tasks * HOUR / one.looking, "a round each hour, on these cores"),
             (CONNECTIONS * HOUR, f"one SFTP server: {CONNECTIONS:g} new connections a second, one a site and round"),
             (BUCKET * HOUR / one.requests, f"one S3 prefix: {BUCKET:g} requests a second, {one.requests:.0f} a round"),
-            (PAGE / one.row, f"the page of all sites: {PAGE:g} MB"),
-            (STATUS / one.showing, f"writing that page within {STATUS / 60.0:.0f} minutes, by one process"),
+            (STATUS / one.showing, f"writing the pages of all within {STATUS / 60.0:.0f} minutes, by one process"),
         ]
     )  # fmt: skip
 

@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.projection import Cluster, Costs, bounds, core_seconds, report
 
-ONE = Costs(collecting=1.0, looking=0.1, requests=6.0, diagnosing=7.0, megabytes=500.0, showing=0.001, row=0.0001)
+ONE = Costs(collecting=1.0, looking=0.1, requests=6.0, diagnosing=7.0, megabytes=500.0, showing=0.001)
 
 
 def test_a_site_takes_its_rounds_and_a_seventh_of_its_diagnosis() -> None:

@@ -1,4 +1,7 @@
-"""The fleet's page: one static file that any web server can serve, with each site's report beside it."""
+"""The fleet's page: static files that any web server can serve, with each site's report beside them.
+
+Who needs attention first stands first; a large fleet goes on over further pages, so that a telephone opens each.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +15,12 @@ from jinja2 import Environment, PackageLoader, select_autoescape
 from igrow.core.whole_files import write_whole
 from igrow.trainer.fleet.overview import SiteRow, utc
 
+SITES = 500
+"""On one page: a quarter of a megabyte."""
+
 
 def write_page(folder: Path, rows: Sequence[SiteRow], now: datetime) -> Path:
-    """Write `index.html` and the sites' reports into a folder; returns the page. Raises OSError."""
+    """Write `index.html`, what follows it, and the sites' reports into a folder; returns the first. Raises OSError."""
     reports = folder / "sites"
     reports.mkdir(parents=True, exist_ok=True)
     links = {}
@@ -25,9 +31,17 @@ def write_page(folder: Path, rows: Sequence[SiteRow], now: datetime) -> Path:
                 shutil.copy2(row.report, target)
             links[row.site] = f"sites/{row.site}.html"
     environment = Environment(loader=PackageLoader("igrow.trainer.fleet"), autoescape=select_autoescape())
-    text = environment.get_template("fleet.html").render(
-        rows=rows, links=links, now=now, utc=utc, waiting=sum(1 for row in rows if row.attention)
-    )
-    page = folder / "index.html"
-    write_whole(page, text.encode())
-    return page
+    template = environment.get_template("fleet.html")
+    parts = [rows[first : first + SITES] for first in range(0, len(rows), SITES)] or [rows]
+    names = ["index.html", *(f"page-{number}.html" for number in range(2, len(parts) + 1))]
+    waiting = sum(1 for row in rows if row.attention)
+    for place, (name, part) in enumerate(zip(names, parts, strict=True)):
+        text = template.render(
+            rows=part, total=len(rows), before=SITES * place, links=links, now=now, utc=utc, waiting=waiting,
+            names=names, name=name,
+        )  # fmt: skip
+        write_whole(folder / name, text.encode())
+    for old in folder.glob("page-*.html"):
+        if old.name not in names:
+            old.unlink()
+    return folder / names[0]
