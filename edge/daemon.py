@@ -7,7 +7,7 @@ import contextlib
 import logging
 import math
 import time
-from collections.abc import Coroutine, Iterator
+from collections.abc import Callable, Coroutine, Iterator
 from concurrent.futures import Future
 from datetime import UTC, datetime
 
@@ -17,13 +17,14 @@ from igrow.edge.carrying_over import carry_over, log_to_remember, remember
 from igrow.edge.configuration import Configuration
 from igrow.edge.cycle_result import CycleResult
 from igrow.edge.earlier import Earlier
-from igrow.edge.hand_off import PATIENCE, HandOff, settled
+from igrow.edge.hand_off import PATIENCE, HandOff, LateError, settled
 from igrow.edge.image import Quality
 from igrow.edge.journal import Journal
 from igrow.edge.ports import Plan
 from igrow.edge.reloading import Reloading, refuse_what_needs_a_restart, same_registers
 from igrow.edge.services import SIMULATED_PATIENCE, Services, open_services
 from igrow.edge.snapshot import snapshot_of
+from igrow.edge.state_lock import InUseError
 from igrow.edge.stopping import STOP_SECONDS, StopReport
 from igrow.edge.systemd_notify import SystemdNotifier
 from igrow.edge.wiring import Control, build_control
@@ -44,12 +45,22 @@ class Daemon:
     """Runs control for one site until it is told to stop."""
 
     def __init__(
-        self, configuration: Configuration, services: Services | None = None, notifier: SystemdNotifier | None = None
+        self,
+        configuration: Configuration,
+        services: Services | None = None,
+        notifier: SystemdNotifier | None = None,
+        *,
+        hold: Callable[[], None] = lambda: None,
     ):
-        """`services` and `notifier` replace the real ones in tests."""
+        """`services` and `notifier` replace the real ones in tests.
+
+        `hold` is called before anything is written: it raises InUseError where the state folder is another daemon's by
+        now, and LateError where nobody can tell in time.
+        """
         self.configuration = configuration
         self.services = services or open_services(configuration)
         self._notifier = notifier or SystemdNotifier()
+        self._hold = hold
         self._journal = Journal(self.services.store)
         self._control: Control | None = None
         self._stopping = asyncio.Event()
@@ -73,7 +84,10 @@ class Daemon:
             self._notifier.reloading()
 
     async def run(self) -> None:
-        """Control until `stop`; then write the safe setpoints and close everything."""
+        """Control until `stop`; then write the safe setpoints and close everything.
+
+        Raises InUseError where another daemon has come by the state folder, and then the PLC and the log are its own.
+        """
         self._control = self._begin(None)
         self._earlier = self.services.store.earlier(log_to_remember(self._control))
         await self.services.status.start()
@@ -81,11 +95,24 @@ class Daemon:
         self._journal.event("started", site=self.configuration.site.name)
         try:
             while await self._due():
+                self._look_for_another()
                 await self._unless_stopped(self._remember())
                 await self._take_over_configuration()
                 await self._until_told_to_stop()
         finally:
             await self._end()
+
+    def _look_for_another(self) -> None:
+        """Raise InUseError where the state folder, and so the PLC, is another daemon's by now."""
+        try:
+            self._hold()
+        except LateError:
+            pass  # its disk hangs: control comes first
+        except InUseError:
+            raise InUseError(
+                f"{self.configuration.state_folder}: it was taken away, and another daemon has what is there now: this "
+                "one ends, and leaves the PLC to the other as it stands"
+            ) from None
 
     async def _due(self) -> bool:
         """Wait for the next cycle; tell whether there is one."""
@@ -271,6 +298,14 @@ class Daemon:
         self._notifier.stopping()
         control = self._control
         assert control is not None
+        try:
+            self._look_for_another()
+        except InUseError:
+            # Neither the setpoints nor the files are ours any more.
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(control.plc.close(), LINE_SECONDS)
+            self.services.graphs.close()
+            raise
         report = StopReport(seen=False)
         try:
             control.plc.last_orders()

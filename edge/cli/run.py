@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-import contextlib
 import faulthandler
 import logging
 import os
@@ -16,8 +15,8 @@ from igrow.edge.cli.common import add_configuration
 from igrow.edge.cli.log_lines import set_up_logging
 from igrow.edge.configuration import load_configuration
 from igrow.edge.daemon import Daemon
-from igrow.edge.hand_off import HandOff, LateError
-from igrow.edge.state_lock import sole_use
+from igrow.edge.hand_off import HandOff, settled
+from igrow.edge.state_lock import StateLock
 
 EXAMPLE = "igrow-edge run /etc/igrow/daemon.yaml"
 LOCK_SECONDS = 5.0
@@ -55,15 +54,16 @@ async def run_daemon(path: Path) -> None:
     Raises IgrowError for a bad configuration, and where another daemon has the same state folder.
     """
     configuration = load_configuration(path)
-    with contextlib.ExitStack() as held:
-        try:
-            lock = HandOff("lock", patience=LOCK_SECONDS, share=1.0)
-            lock.do(lambda: held.enter_context(sole_use(configuration.state_folder)))
-        except LateError:
-            log.warning("%s does not answer, so nobody knows of another daemon there", configuration.state_folder)
-        daemon = Daemon(configuration)
-        loop = asyncio.get_running_loop()
-        for number in (signal.SIGTERM, signal.SIGINT):
-            loop.add_signal_handler(number, daemon.stop)
-        loop.add_signal_handler(signal.SIGHUP, daemon.reload)
-        await daemon.run()
+    lock, aside = StateLock(configuration.state_folder), HandOff("lock")
+    taken = aside.post(lock.hold)
+    await settled(taken, LOCK_SECONDS)
+    if taken.done():
+        taken.result()
+    else:
+        log.warning("%s does not answer, so nobody knows of another daemon there", configuration.state_folder)
+    daemon = Daemon(configuration, hold=lambda: aside.ask(lock.hold))
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        loop.add_signal_handler(number, daemon.stop)
+    loop.add_signal_handler(signal.SIGHUP, daemon.reload)
+    await daemon.run()

@@ -24,7 +24,7 @@ from igrow.edge.cli.simulate_plc import make_plant
 from igrow.edge.cli.status import lines
 from igrow.edge.ports import Plan
 from igrow.edge.sources.override import read_leases
-from igrow.edge.state_lock import sole_use
+from igrow.edge.state_lock import StateLock
 from tests.control.daemon_bench import Plant, free_port, running, status_port, until, write_files
 
 
@@ -151,11 +151,13 @@ async def test_backup_export_and_restore_go_round(tmp_path, capsys):
 
 def test_a_store_is_restored_only_while_no_daemon_has_it(tmp_path, capsys):
     path = write_files(tmp_path, 5020)
-    with sole_use(tmp_path / "state"):
-        for arguments in (["restore", path, tmp_path / "backup.tar.gz"], ["run", path], ["commission", path]):
-            code, _, err = call(capsys, *arguments)
-            assert code == 2
-            assert re.fullmatch(r"error: \S*/state: a daemon is running on it; stop it first, .*\n", err)
+    lock = StateLock(tmp_path / "state")
+    lock.hold()
+    for arguments in (["restore", path, tmp_path / "backup.tar.gz"], ["run", path], ["commission", path]):
+        code, _, err = call(capsys, *arguments)
+        assert code == 2
+        assert re.fullmatch(r"error: \S*/state: a daemon is running on it; stop it first, .*\n", err)
+    lock.let_go()
     assert "the backup cannot be restored" in call(capsys, "restore", path, tmp_path / "backup.tar.gz")[2]
 
 

@@ -3,10 +3,24 @@
 from __future__ import annotations
 
 import contextlib
+import shutil
+import signal
 import subprocess
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import pytest
+
+from igrow.edge.state_lock import LOCK_FILE, StateLock
+from tests.service.attacked_daemon import SAFE, AttackedDaemon
 from tests.service.running_daemon import COMMAND, RunningDaemon
+
+
+@pytest.fixture
+def attacked(tmp_path: Path) -> Iterator[AttackedDaemon]:
+    daemon = AttackedDaemon(tmp_path)
+    yield daemon
+    daemon.close()
 
 
 def command(plant: RunningDaemon, name: str, *arguments: object) -> tuple[int, str]:
@@ -49,3 +63,64 @@ def test_a_second_daemon_and_a_restore_are_refused_until_the_first_is_gone(tmp_p
         assert plant.stop() == 0
     finally:
         plant.close()
+
+
+def removed(state: Path) -> None:
+    moved_away(state)
+    shutil.rmtree(state.with_name("away"), ignore_errors=True)
+
+
+def lock_removed(state: Path) -> None:
+    (state / LOCK_FILE).unlink()
+
+
+def moved_away(state: Path) -> None:
+    state.rename(state.with_name("away"))
+
+
+def replaced_by_a_copy(state: Path) -> None:
+    """As by a restore that was made by hand."""
+    shutil.copytree(state, state.with_name("copy"))
+    state.rename(state.with_name("away"))
+    state.with_name("copy").rename(state)
+
+
+@pytest.mark.parametrize("what", [removed, lock_removed, moved_away, replaced_by_a_copy])
+def test_a_daemon_whose_state_folder_was_taken_away_keeps_a_second_one_out(
+    attacked: AttackedDaemon, what: Callable[[Path], None]
+) -> None:
+    attacked.start()
+    attacked.controls()
+    what(attacked.state)
+    attacked.until(lambda: "and its lock with it" in attacked.log())
+    attacked.beats(2)
+    second = subprocess.run(
+        [*COMMAND, "run", str(attacked.configuration)], capture_output=True, text=True, check=False, timeout=60.0
+    )
+    assert second.returncode == 2
+    assert "a daemon is running on it" in second.stderr
+    attacked.beats(2)
+
+
+@pytest.mark.parametrize("by", [None, signal.SIGTERM])
+def test_a_daemon_whose_state_folder_another_one_has_leaves_the_plc_to_it(
+    attacked: AttackedDaemon, by: int | None
+) -> None:
+    """It was quicker than the cycle in which the first one would have taken the lock of the new folder."""
+    attacked.start()
+    attacked.controls()
+    attacked.beats(3)  # so that nothing is left to be written down
+    other = StateLock(attacked.folder / "other")
+    other.hold()
+    attacked.state.rename(attacked.folder / "away")
+    (attacked.folder / "other").rename(attacked.state)
+    written = len(attacked.plc.received)
+    if by is not None:
+        attacked.signal(by)
+    assert attacked.ended() == 2
+    other.let_go()
+    assert not {value for name, value in attacked.plc.written(written) if value == SAFE[name]}
+    (last,) = [line for line in attacked.log().splitlines() if line.startswith("error: ")]
+    assert "another daemon has what is there now: this one ends" in last
+    assert "Traceback" not in attacked.log()
+    assert not (attacked.state / "store").exists()
