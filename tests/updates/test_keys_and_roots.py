@@ -55,7 +55,7 @@ def test_a_stolen_key_is_replaced_with_two_sticks_and_the_gateway_follows(fleet:
         stick.mkdir()
         (fleet.keys / f"root-{number}.pem").rename(stick / f"root-{number}.pem")
     (fleet.keys / "root-3.pem").unlink()
-    with pytest.raises(PublishingError, match=r"1 root keys in .*, 2 are needed"):
+    with pytest.raises(PublishingError, match=r"root keys in .*: 1, needed to sign: 2"):
         replace_key("targets", fleet.keys, [one])
     replace_key("targets", fleet.keys, [one, two])
     with pytest.raises(PublishingError, match="publish the bundle again"):
@@ -63,7 +63,13 @@ def test_a_stolen_key_is_replaced_with_two_sticks_and_the_gateway_follows(fleet:
     assert fleet.publish(6.0) == fleet.fetched()
 
     evil = write_tiny_bundle(tmp_path / "evil", offset=1.0)
+    with pytest.raises(PublishingError, match=r"is newer than .*stolen, whose keys were replaced"):
+        publish_in(evil.folder, fleet.repository, tmp_path / "stolen")
+    # A thief minds no such thing.
+    fresh = fleet.repository / "metadata" / "2.root.json"
+    fresh.rename(tmp_path / fresh.name)
     publish_in(evil.folder, fleet.repository, tmp_path / "stolen")
+    (tmp_path / fresh.name).rename(fresh)
     with pytest.raises(UpdateError, match="not signed by the keys"):
         fleet.source.fetch("demo", ())
     with pytest.raises(PublishingError, match="not signed by our present key"):
@@ -122,5 +128,42 @@ def test_the_commands_make_show_and_move_keys(tmp_path: Path, capsys: pytest.Cap
     assert main(["keys", "show", keys]) == 0
     assert "root       2 of 2 must sign; offline" in capsys.readouterr().out
     assert main(["keys", "replace", keys, "timestamp"]) == 2
-    assert "0 root keys" in capsys.readouterr().err
+    assert "root keys in" in capsys.readouterr().err
     assert main(["keys", "replace", keys, "timestamp", "--root", str(tmp_path / "stick")]) == 0
+    assert "publish or refresh" in capsys.readouterr().out
+    assert main(["keys", "replace", keys, "targets", "--root", str(tmp_path / "stick")]) == 0
+    assert "gateways follow at the next publish of their site" in capsys.readouterr().out
+    assert main(["keys", "replace", keys, "root", "--root", str(tmp_path / "stick")]) == 2
+    assert "While 2 of them are safe they sign; else make new keys" in capsys.readouterr().err
+    (tmp_path / "keys" / "targets.pem").unlink()
+    assert main(["keys", "show", keys]) == 0
+    assert "targets    1 of 1 must sign; not here" in capsys.readouterr().out
+
+
+def test_keys_that_the_gateways_do_not_follow_sign_nothing_and_say_how_they_could(fleet: Fleet, tmp_path: Path) -> None:
+    """A folder of keys that was made anew, or put back from an older copy, would seem to publish and reach nobody."""
+    older = tmp_path / "older"
+    shutil.copytree(fleet.keys, older)
+    replace_key("timestamp", fleet.keys, [fleet.keys])
+    fleet.publish(5.0)
+    fleet.fetched()
+    bundle = write_tiny_bundle(tmp_path / "bundle", offset=6.0)
+    with pytest.raises(PublishingError, match=r"2\.root\.json: is newer than .*older, .* take the newest copy"):
+        publish_in(bundle.folder, fleet.repository, older)
+    new = tmp_path / "new"
+    create_keys(new)
+    for asked in (lambda: publish_in(bundle.folder, fleet.repository, new), lambda: refresh(fleet.repository, new)):
+        with pytest.raises(
+            PublishingError, match=r"1\.root\.json: is of other keys than .*new.* delete .*bundles and install"
+        ):
+            asked()
+    assert fleet.fetched()
+    shutil.rmtree(fleet.repository)
+    shutil.copy(new / "1.root.json", tmp_path / "root.json")
+    assert publish_in(bundle.folder, fleet.repository, new).identity == fleet.fetched()
+
+
+def test_a_key_that_was_lost_is_told_with_the_command_that_makes_another(fleet: Fleet) -> None:
+    (fleet.keys / "targets.pem").unlink()
+    with pytest.raises(PublishingError, match=r"targets\.pem: .*`igrow-trainer keys replace` makes another"):
+        fleet.publish()

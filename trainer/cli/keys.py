@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     renew = actions.add_parser("renew", help="let the root metadata hold for another ten years")
     for one in (create, show, offline, replace, renew):
         one.add_argument("keys", type=Path, help="folder of the signing keys")
-    replace.add_argument("role", choices=ROLES[1:], help="whose key")
+    replace.add_argument("role", choices=ROLES, help="whose key; root keys alone stay")
     for one in (replace, renew):
         one.add_argument("--root", type=Path, action="append", help="folder of root keys; may be repeated")
 
@@ -48,11 +48,14 @@ def run(arguments: argparse.Namespace) -> int:
         written = (
             replace_key(arguments.role, folder, roots) if arguments.action == "replace" else renew_root(folder, roots)
         )
-        print(f"wrote {written}; gateways follow at the next publish or refresh of their site")
+        # What the old key of targets has signed no gateway takes any more.
+        next_time = "publish" if arguments.action == "replace" and arguments.role == "targets" else "publish or refresh"
+        print(f"wrote {written}; gateways follow at the next {next_time} of their site")
     else:
         roles, expires, version = status(folder)
         print(f"root version {version}, holds until {expires:%Y-%m-%d}")
         for one in roles:
-            here = f"{one.present} here" if one.present else "offline"
+            elsewhere = "offline" if one.role == "root" else "not here"
+            here = f"{one.present} here" if one.present else elsewhere
             print(f"  {one.role:<10} {one.threshold} of {one.keys} must sign; {here}")
     return 0

@@ -79,9 +79,13 @@ def replace_key(role: str, folder: Path, root_folders: Sequence[Path]) -> Path:
 
     `root_folders` hold root keys, as many as the threshold asks for. Raises PublishingError.
     """
-    if role not in ROLES[1:]:
-        raise PublishingError(f"{role}: targets, snapshot or timestamp can be replaced")
     before = load_root(folder)
+    if role not in ROLES[1:]:
+        needed = before.signed.roles["root"].threshold
+        raise PublishingError(
+            f"{role}: targets, snapshot or timestamp can be replaced; root keys are what gateways trust. While "
+            f"{needed} of them are safe they sign; else make new keys, and install their 1.root.json on each gateway"
+        )
     root = _next(before)
     path = folder / f"{role}.pem"
     fresh = folder / f".{role}.new.pem"
@@ -159,15 +163,17 @@ def root_versions(folder: Path) -> dict[int, Path]:
 
 def load_signer(folder: Path, role: str) -> CryptoSigner:
     """Return the signer of one role (not root); raises PublishingError where its key cannot be read."""
-    return load_signer_file(folder / f"{role}.pem", role)
+    return load_signer_file(folder / f"{role}.pem")
 
 
-def load_signer_file(path: Path, role: str = "") -> CryptoSigner:
+def load_signer_file(path: Path) -> CryptoSigner:
     """Return the signer of one file; raises PublishingError."""
     try:
         key = load_pem_private_key(path.read_bytes(), password=None)
     except OSError as error:
-        raise PublishingError(f"{path}: {error.strerror}; the {role or path.stem} key is needed to sign") from None
+        raise PublishingError(
+            f"{path}: {error.strerror}; it is needed to sign (lost: `igrow-trainer keys replace` makes another)"
+        ) from None
     except (ValueError, TypeError, UnsupportedAlgorithm):
         raise PublishingError(f"{path}: no unencrypted private key in PEM form") from None
     if not isinstance(key, Ed25519PrivateKey):
@@ -189,16 +195,14 @@ def _sign_root(root: Root, before: Metadata[Root] | None, folders: Sequence[Path
     signed = 0
     for folder in folders:
         for path in _root_files(folder):
-            signer = load_signer_file(path, "root")
+            signer = load_signer_file(path)
             if signer.public_key.keyid in allowed and signer.public_key.keyid not in metadata.signatures:
                 metadata.sign(signer, append=True)
                 signed += 1
     needed = max(root.roles["root"].threshold, before.signed.roles["root"].threshold if before else 0)
     if signed < needed:
         where = ", ".join(str(folder) for folder in folders)
-        raise PublishingError(
-            f"{signed} root keys in {where}, {needed} are needed to sign: give each folder with --root"
-        )
+        raise PublishingError(f"root keys in {where}: {signed}, needed to sign: {needed}; give each folder with --root")
     path = target / f"{root.version}.root.json"
     write_whole(path, metadata.to_bytes(_SERIALIZER))
     return path

@@ -115,11 +115,24 @@ def refresh(
 
 
 def _write_roots(place: Place, keys: Path) -> None:
-    """Write the versions of the root metadata that the repository lacks."""
-    there = {entry.name for entry in place.entries("metadata")}
-    for version, path in sorted(root_versions(keys).items()):
-        if f"{version}.root.json" not in there:
-            place.put(f"metadata/{version}.root.json", path.read_bytes())
+    """Write the versions of the root metadata that the repository lacks.
+
+    Gateways follow those that are there. Raises PublishingError where that leads them to other keys than these.
+    """
+    ours = root_versions(keys)
+    for version, path in sorted(ours.items()):
+        name, content = f"metadata/{version}.root.json", path.read_bytes()
+        there = place.get(name, LARGEST_DOCUMENT)
+        if there is None:
+            place.put(name, content)
+        elif there != content:
+            raise PublishingError(
+                f"{place}/{name}: is of other keys than {keys}, and gateways take nothing that these sign: publish "
+                f"with those; where they are lost, delete {place} and install {keys}/1.root.json on the gateway"
+            )
+    name = f"metadata/{max(ours, default=0) + 1}.root.json"
+    if ours and place.get(name, LARGEST_DOCUMENT) is not None:
+        raise PublishingError(f"{place}/{name}: is newer than {keys}, whose keys were replaced: take the newest copy")
 
 
 def _write_chain(place: Place, keys: Path, targets: int, now: datetime, lifetimes: Lifetimes) -> None:
