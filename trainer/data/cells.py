@@ -38,6 +38,8 @@ class Cells:
     rows: Sequence[list[str]]
     lines: Sequence[int]
     """Line (or row of the sheet) of each, from 1."""
+    sheet: str = ""
+    """Its name, where the file is a workbook and it was asked for by name."""
 
     @property
     def width(self) -> int:
@@ -140,13 +142,13 @@ def read_cells(
             table = [(row, reader.line_num) for row in reader]
         except csv.Error as error:
             raise IgrowError(f"{path}:{reader.line_num}: cannot be read as a table: {error}") from None
-    return _cells(path, table, transposed=transposed)
+    return _cells(path, table, sheet or "", transposed=transposed)
 
 
 def read_sheets(path: Path, *, transposed: bool = False) -> dict[str, Cells]:
     """Return the cells of each sheet of a workbook, in its order; raises IgrowError where it cannot be read."""
     book = _open_workbook(path)
-    return {name: _cells(path, _rows_of(book, name), transposed=transposed) for name in book.sheet_names}
+    return {name: _cells(path, _rows_of(book, name), name, transposed=transposed) for name in book.sheet_names}
 
 
 def is_workbook(path: Path) -> bool:
@@ -154,13 +156,13 @@ def is_workbook(path: Path) -> bool:
     return path.name.lower().endswith(EXCEL) and not is_text(path)
 
 
-def _cells(path: Path, table: Sequence[tuple[list[str], int]], *, transposed: bool) -> Cells:
+def _cells(path: Path, table: Sequence[tuple[list[str], int]], sheet: str, *, transposed: bool) -> Cells:
     """Return a table's cells without the rows that have no text."""
     if transposed:
         columns = zip_longest(*(row for row, _ in table), fillvalue="")
         table = [(list(column), number) for number, column in enumerate(columns, 1)]
     kept = [([cell.strip() for cell in row], line) for row, line in table if any(cell.strip() for cell in row)]
-    return Cells(path, [row for row, _ in kept], [line for _, line in kept])
+    return Cells(path, [row for row, _ in kept], [line for _, line in kept], sheet)
 
 
 def unquoted(text: str) -> str:

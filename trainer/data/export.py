@@ -12,6 +12,7 @@ from igrow.core.arrays import Floats, Times
 from igrow.core.errors import IgrowError
 from igrow.core.local_time import to_local
 from igrow.core.telemetry import Telemetry
+from igrow.trainer.data import named_days
 from igrow.trainer.data.cells import Cells, is_workbook, read_cells, read_sheets
 from igrow.trainer.data.export_table import ExportTable, as_table, chosen_rows, held, with_rows
 from igrow.trainer.data.fault import DataFault
@@ -51,12 +52,16 @@ def _tables(path: Path, mapping: ExportMapping) -> list[ExportTable]:
         sheet=mapping.sheet,
         transposed=mapping.transposed,
     )
-    return [as_table(cells, mapping.header, mapping.first_row)]
+    return [_table(cells, mapping)]
+
+
+def _table(cells: Cells, mapping: ExportMapping) -> ExportTable:
+    return as_table(cells, mapping.header, mapping.first_row, day_in_name=mapping.time.column == named_days.COLUMN)
 
 
 def _columns(cells: Cells, mapping: ExportMapping) -> ExportTable | None:
     try:
-        return as_table(cells, mapping.header, mapping.first_row)
+        return _table(cells, mapping)
     except IgrowError:
         return None
 

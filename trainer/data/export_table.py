@@ -9,6 +9,7 @@ from pathlib import Path
 
 from igrow.core.errors import IgrowError
 from igrow.trainer.data.cells import Cells
+from igrow.trainer.data.named_days import with_day
 from igrow.trainer.data.timestamps import without_weekday
 from igrow.trainer.data.vocabulary import folded, month_names
 
@@ -36,14 +37,17 @@ class ExportTable:
         return self.columns[name]
 
 
-def as_table(cells: Cells, header: Sequence[int] = (1,), first_row: int | None = None) -> ExportTable:
+def as_table(
+    cells: Cells, header: Sequence[int] = (1,), first_row: int | None = None, *, day_in_name: bool = False
+) -> ExportTable:
     """Return the columns of cells by the names that the header lines give them.
 
     Names over several lines are joined by a blank; an upper line's cell stands for the empty ones after it (the merged
-    cells of a workbook). A name that stands twice gets a number.
+    cells of a workbook). A name that stands twice gets a number. Where `day_in_name`, a column tells the day that sheet
+    or file are named after.
 
     Raises:
-        IgrowError: no header stands there, a row is wider than it, or the columns change below it.
+        IgrowError: no header stands there, a row is wider than it, the columns change below it, or no name has a day.
     """
     heads = [row for row, line in zip(cells.rows, cells.lines, strict=True) if line in set(header)]
     if not heads:
@@ -69,7 +73,10 @@ def as_table(cells: Cells, header: Sequence[int] = (1,), first_row: int | None =
         texts = [row[position] if position < len(row) else "" for row, _ in body]
         if name or any(texts):
             columns[name or f"column {position + 1}"] = texts
-    return _without_titles(ExportTable(cells.path, columns, [line for _, line in body]))
+    table = _without_titles(ExportTable(cells.path, columns, [line for _, line in body]))
+    if not day_in_name:
+        return table
+    return ExportTable(cells.path, with_day(cells.path, cells.sheet, table.columns, table.lines), table.lines)
 
 
 def _in_first_order(path: Path, names: Sequence[str], body: _Lines) -> list[tuple[list[str], int]]:

@@ -36,7 +36,10 @@ MISSING = ("", "NaN", "nan", "-", "--", "---", "#N/A", "#N/B", "#NV", "#DIV/0!",
 class TimeColumn:
     """Where the time stands, and how it is written."""
 
-    column: str = setting(default="time", help="its name in the export")
+    column: str = setting(
+        default="time",
+        help="its name in the export; (day in the name): the day that the sheet or the file is named after",
+    )
     time_of_day: str | None = setting(
         default=None, help="column of the time of day, where the first has the date alone"
     )

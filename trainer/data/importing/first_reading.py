@@ -12,6 +12,7 @@ from igrow.trainer.data.cells import Cells
 from igrow.trainer.data.importing.odd_times import parts_of_time, spread
 from igrow.trainer.data.importing.time_format import is_clock, looks_like_time
 from igrow.trainer.data.mapping import MISSING
+from igrow.trainer.data.named_days import how_to_date
 
 _SAMPLE = 400
 """Rows that are looked at."""
@@ -28,14 +29,18 @@ def is_value(cell: str) -> bool:
     return _NUMERIC.fullmatch(cell) is not None or cell in MISSING or cell.lower() in vocabulary.switch_words()
 
 
-def first_reading(cells: Cells) -> int:
+def first_reading(cells: Cells, *, day_in_name: bool = False) -> int:
     """Return the index of the first row of readings: it has a time and a value, and so has the next.
+
+    Where `day_in_name`, a time of day is one.
 
     Raises:
         IgrowError: there is none; it says what would be right.
     """
     usual = Counter(len(row) for row in cells.rows[-_SAMPLE:]).most_common(1)
-    readings = [_is_reading(row, usual[0][0] if usual else 0) for row in cells.rows[: _SAMPLE + 2]]
+    is_time = _is_hour if day_in_name else looks_like_time
+    width = usual[0][0] if usual else 0
+    readings = [_is_reading(row, width, is_time) for row in cells.rows[: _SAMPLE + 2]]
     hours = next((row for row in cells.rows[:_ABOVE] if _stand_across(row, _is_hour)), None)
     if hours is not None:
         first = ", ".join([cell for cell in hours if _is_hour(cell)][:3])
@@ -45,7 +50,7 @@ def first_reading(cells: Cells) -> int:
         following = range(index + 1, min(index + 3, len(cells.rows)))
         if found and (not following or any(readings[row] or _is_of_the_day(cells.rows[row]) for row in following)):
             return index
-    raise IgrowError(f"{cells.path}: {_why_none(cells.rows[:_SAMPLE])}")
+    raise IgrowError(f"{cells.path}: {_why_none(cells.rows[:_SAMPLE], cells.sheet)}")
 
 
 def times_stand_across(cells: Cells) -> bool:
@@ -69,13 +74,22 @@ def _is_of_the_day(row: Sequence[str]) -> bool:
     return any(map(_is_hour, row)) and any(map(is_value, filter(None, row)))
 
 
-def _is_reading(row: Sequence[str], usual: int) -> bool:
+def _is_reading(row: Sequence[str], usual: int, is_time: Callable[[str], bool] = looks_like_time) -> bool:
     """Tell whether a row has a time and a value."""
     filled = [cell for cell in row if cell]
-    return len(row) >= 0.5 * usual and any(map(looks_like_time, filled)) and any(map(is_value, filled))
+    return len(row) >= 0.5 * usual and any(map(is_time, filled)) and any(map(is_value, filled))
 
 
-def _why_none(rows: Sequence[Sequence[str]]) -> str:
+def times_have_no_day(cells: Cells) -> bool:
+    """Tell whether most rows have a time of day, and none of those a date; a number is taken for no date here."""
+    rows = cells.rows[:_SAMPLE]
+    timed = [row for row in rows if any(map(_is_hour, row))]
+    return len(timed) > 0.5 * len(rows) and not any(
+        looks_like_time(cell) and _NUMERIC.fullmatch(cell) is None for row in timed for cell in row if cell
+    )
+
+
+def _why_none(rows: Sequence[Sequence[str]], sheet: str) -> str:
     """Return why no row of a table is a reading, and what would be right."""
     parts = next((found for row in rows if len(found := parts_of_time(row)) > 2), ())
     if parts:
@@ -85,7 +99,7 @@ def _why_none(rows: Sequence[Sequence[str]]) -> str:
         if len(row) > 1 and any(map(is_value, row)):
             clock = next(filter(_is_hour, first), None)
             if clock is not None:
-                return f"its times, such as {clock!r}, have no date: put the date in a column of its own"
+                return f"its times, such as {clock!r}, have no date: {how_to_date(sheet)}"
             dated = next((cell for cell in first if _WITHOUT_YEAR.fullmatch(cell)), None)
             if dated is not None:
                 return f"its times, such as {dated!r}, have no year: write it in, such as 2020-02-01 13:30"

@@ -60,9 +60,14 @@ def whole(path: Path, layout: Layout, cells: Cells) -> tuple[Layout, dict[str, C
     """Return a layout for all sheets of a workbook that go on where the found one ends, and the cells by sheet."""
     every = replace(layout, sheet=None)
     found = {} if layout.sheet is None else cells_like(path, every, head_of(cells, layout))
-    if len(found) < 2 or not go_on([as_table(one, layout.header, layout.first_row) for one in found.values()]):
+    if len(found) < 2 or not go_on([table_of(one, layout) for one in found.values()]):
         return layout, {layout.sheet or "": cells}
     return every, found
+
+
+def table_of(cells: Cells, layout: Layout) -> ExportTable:
+    """Return the table of cells of a layout; raises IgrowError where they are of another one."""
+    return as_table(cells, layout.header, layout.first_row, day_in_name=layout.day_in_name)
 
 
 def joined(tables: Sequence[ExportTable]) -> ExportTable:

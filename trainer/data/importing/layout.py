@@ -18,8 +18,14 @@ from igrow.core.errors import IgrowError
 from igrow.trainer.data import vocabulary
 from igrow.trainer.data.cells import Cells, is_text, is_workbook, read_bytes, read_cells, unquoted
 from igrow.trainer.data.fixed_places import stands_at_fixed_places
-from igrow.trainer.data.importing.first_reading import first_reading, is_value, times_stand_across
+from igrow.trainer.data.importing.first_reading import (
+    first_reading,
+    is_value,
+    times_have_no_day,
+    times_stand_across,
+)
 from igrow.trainer.data.importing.sheets import fullest_sheet
+from igrow.trainer.data.named_days import day_in
 
 DELIMITERS = (";", "\t", "|", ",")
 """In the order in which they are believed: a comma may be a decimal sign."""
@@ -47,6 +53,8 @@ class Layout:
     first_row: int
     transposed: bool = False
     """Whether times stand across."""
+    day_in_name: bool = False
+    """Whether rows have a time of day alone, and the day is that of the sheet's or the file's name."""
 
 
 def find_layout(path: Path, sheet: str | None = None) -> tuple[Layout, Cells]:
@@ -66,7 +74,8 @@ def find_layout(path: Path, sheet: str | None = None) -> tuple[Layout, Cells]:
     transposed = times_stand_across(cells)
     if transposed:
         cells = read_cells(path, delimiter=delimiter, encoding=encoding, sheet=sheet, transposed=True)
-    first = first_reading(cells)
+    day_in_name = times_have_no_day(cells) and bool(day_in(cells.sheet) or day_in(path.name))
+    first = first_reading(cells, day_in_name=day_in_name)
     head, units = _header(cells, first)
     body = list(zip_longest(*cells.rows[first : first + _SAMPLE], fillvalue=""))
     return Layout(
@@ -78,6 +87,7 @@ def find_layout(path: Path, sheet: str | None = None) -> tuple[Layout, Cells]:
         None if units is None else cells.lines[units],
         cells.lines[first],
         transposed,
+        day_in_name,
     ), cells
 
 

@@ -11,12 +11,12 @@ from igrow.core.quantities import QUANTITIES
 from igrow.core.site import Site
 from igrow.trainer.data import vocabulary
 from igrow.trainer.data.export import readings
-from igrow.trainer.data.export_table import ExportTable, as_table, chosen_rows
+from igrow.trainer.data.export_table import ExportTable, chosen_rows
 from igrow.trainer.data.importing import columns as names
 from igrow.trainer.data.importing.capacity import add_lamp_power, by_capacity
 from igrow.trainer.data.importing.compartments import chosen_compartment, rows_of_one
 from igrow.trainer.data.importing.error_codes import MEASURED, error_codes
-from igrow.trainer.data.importing.folder import further_cells, head_of, joined, whole
+from igrow.trainer.data.importing.folder import further_cells, head_of, joined, table_of, whole
 from igrow.trainer.data.importing.layout import Layout, find_layout
 from igrow.trainer.data.importing.long_table import find_long, units_beside
 from igrow.trainer.data.importing.odd_times import what_is_odd
@@ -106,7 +106,7 @@ def propose(
     if answers.sheet is None:
         layout, sheets = whole(path, layout, cells)
     of_layout = (*sheets.values(), *further_cells(further, layout, head))
-    tables = [as_table(one, layout.header, layout.first_row) for one in of_layout]
+    tables = [table_of(one, layout) for one in of_layout]
     read_sheets = tuple(filter(None, sheets))
     table = joined(tables)
     unit_line = _unit_line(cells.rows, cells.lines, layout, table)

@@ -24,7 +24,7 @@ _LAMP_POWER = 117.0
 
 def recognises(folder: Path) -> bool:
     """Tell whether a folder is laid out as this challenge's."""
-    return excel_tables.find(folder, "meteo") is not None
+    return challenge.is_set(folder, excel_tables.find(folder, "meteo"), *_CLIMATE)
 
 
 def read(folder: Path, compartment: str | None = None) -> Source:

@@ -28,7 +28,7 @@ _LED_POWER = {"int_blue_vip": 7.27, "int_red_vip": 25.3, "int_farred_vip": 6.23,
 
 def recognises(folder: Path) -> bool:
     """Tell whether a folder is laid out as this challenge's."""
-    return excel_tables.find(folder / "Weather", "Weather") is not None
+    return challenge.is_set(folder, excel_tables.find(folder / "Weather", "Weather"), *_CLIMATE)
 
 
 def read(folder: Path, compartment: str | None = None) -> Source:

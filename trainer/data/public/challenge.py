@@ -33,19 +33,22 @@ def compartments(folder: Path, *stems: str) -> list[str]:
     return [child.name for child in sorted(folder.iterdir()) if excel_tables.find(child, *stems) is not None]
 
 
+def is_set(folder: Path, weather: Path | None, *stems: str) -> bool:
+    """Tell whether a folder is a challenge's by its weather and a compartment: many a grower has a weather file too."""
+    return weather is not None and bool(compartments(folder, *stems))
+
+
 def choose(folder: Path, compartment: str | None, *stems: str) -> str:
     """Return the name of the compartment to read; raises IgrowError that names those there are."""
     there = compartments(folder, *stems)
     if compartment is None:
         if len(there) == 1:
             return there[0]
-        raise IgrowError(f"{folder}: name a compartment: {', '.join(there) or 'none has a climate file'}")
+        raise IgrowError(f"{folder}: name a compartment: {', '.join(there)}")
     for name in there:
         if name.lower() == compartment.lower():
             return name
-    raise IgrowError(
-        f"{folder}: compartment {compartment} has no climate file; those that have: {', '.join(there) or 'none'}"
-    )
+    raise IgrowError(f"{folder}: compartment {compartment} has no climate file; those that have: {', '.join(there)}")
 
 
 def weather(frame: Any) -> dict[str, Floats]:
