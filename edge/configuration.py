@@ -188,7 +188,7 @@ def _check_exchange(path: Path, file: DaemonFile) -> None:
         raise ConfigurationError(f"{place(path, 'exchange')}: {error}") from None
     if address.scheme == "sftp" and file.transfer.known_hosts is None:
         raise ConfigurationError(
-            f"{place(path, 'exchange')}: the server's key must be pinned: write what `ssh-keyscan {address.host}` "
+            f"{place(path, 'exchange')}: the server's key must be pinned: write what `{address.keyscan}` "
             "prints into a file, compare the fingerprint with its owner's, and name the file in `transfer: known_hosts`"
         )
 

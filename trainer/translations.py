@@ -55,6 +55,7 @@ _SPEAKING = (
 _NO_TEXT = re.compile(
     r"PRAGMA|SELECT|INSERT|DELETE|CREATE|BEGIN|HTTP/|://|\.json|%[sYdH]|\n|^[./-]|^igrow-|category IN|"
     r"Connection closed|subsystem|canonicalize|mkdir|verification failed|HOST IDENT|Permission denied|No space left|"
+    r"is known for|bad permissions|Load key|"
     r"^([ckM]?(J|W|Wh) [ck]?m-2|g m-3|kg ha-1 h-1|g m-2 h-1)$|"
     r"^(sensor|service|write|link|registers|bus|interlock|connect|aside:|put|get|rename) \{0\}"
 )

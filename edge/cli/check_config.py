@@ -96,6 +96,13 @@ def describe(configuration: Configuration) -> Iterator[str]:
     yield from _page(file.page)
     exchange = configuration.exchange
     yield f"state       {configuration.state_folder}; exchange: {exchange if exchange else 'none'}"
+    for key, path in (
+        ("transfer.known_hosts", configuration.known_hosts),
+        ("transfer.identity", configuration.identity),
+        ("updates.trusted_root", configuration.trusted_root),
+    ):
+        if path is not None and not path.is_file():
+            yield f"  note      {key}: {path} is not there"
     yield f"planning    {_planning(configuration)}"
     if file.updates.enabled and configuration.trusted_root is None:
         yield "updates     off: no updates.trusted_root, so nothing could be verified"

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from igrow import __version__
 from igrow.core.errors import IgrowError
+from igrow.core.exchange.address import parse_address
 from igrow.core.exchange.documents import parse_object
 from igrow.edge.cli.common import DEFAULT_CONFIGURATION, configuration_of
 from igrow.edge.clock import EARLIEST_PLAUSIBLE
@@ -54,6 +55,8 @@ def order(configuration: Configuration, url: str | None) -> Order:
     if url is None and configuration.exchange is None:
         raise IgrowError(f"{configuration.path}: no exchange in it; name a place with --url")
     transfer, hosts, identity = configuration.file.transfer, configuration.known_hosts, configuration.identity
+    if url is not None and (address := parse_address(url)).scheme == "file" and not Path(address.path).is_dir():
+        raise IgrowError(f"{url}: there is no such folder; is the stick mounted?")
     now = time.time()
     # A simulated plant has a time of its own, which the daemon knows: then only what is sealed is sent.
     known = configuration.file.cycle.clock is ClockSource.SYSTEM and now >= EARLIEST_PLAUSIBLE
@@ -67,6 +70,7 @@ def order(configuration: Configuration, url: str | None) -> Order:
         int(transfer.segment.total_seconds()),
         transfer.budget * 10**6,
         partly=True,
+        by_hand=True,
         known_hosts=None if hosts is None else str(hosts),
         identity=None if identity is None else str(identity),
     )

@@ -33,6 +33,8 @@ STATUS_FILE = "status.json"
 LARGEST_BUNDLE = 512 * 2**20
 MOST_ROOTS = 1000
 """Versions of the root metadata; one a replaced key."""
+LONGEST_WAIT = 60.0
+"""Seconds that a round by hand waits for the daemon's own."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,8 @@ class Order:
     """Seconds after which the round is ended, wherever it is."""
     seen: tuple[float, float] | None = None
     """Lowest and highest time that the clock showed after it went back, where no round has noted it yet."""
+    by_hand: bool = False
+    """Wait for the daemon's own round, and let its exchange be what it was."""
 
 
 @dataclass
@@ -85,10 +89,12 @@ class RoundStatus:
 
 def run_round(order: Order, place: Place | None = None) -> RoundStatus:
     """Make one round and leave its status; never raises for a disk, a server or a file that fails."""
-    folder, status = Path(order.folder), RoundStatus()
+    folder = Path(order.folder)
+    # A round that does not get far knows no more than the one before.
+    status = _kept(_status_before(folder))
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with _alone(folder):
+        with _alone(folder, LONGEST_WAIT if order.by_hand else 0.0):
             _round(order, folder, place, status)
     except (IgrowError, OSError) as error:
         text = error if isinstance(error, IgrowError) else error.strerror or str(error)
@@ -110,8 +116,9 @@ def _round(order: Order, folder: Path, place: Place | None, status: RoundStatus)
             status.sealed = seal_due(outbox, Path(order.store), order.time, order.period, partly=order.partly)
         place = place or open_place(order.url, known_hosts=order.known_hosts, identity=order.identity)
         # What is put into an empty mount point reaches nobody, and a report is sent only once.
-        status.file_system = str(_status_before(folder).get("file_system", ""))
-        status.file_system = file_system_of(place, order.url, folder, status.file_system)
+        mounted = file_system_of(place, order.url, folder, status.file_system)
+        # A stick does not take the place of the daemon's own exchange.
+        status.file_system = status.file_system if order.by_hand else mounted
         _receive(outbox, place, order.site, status)
         _send(outbox, place, order.site, status)
         _send_reports(folder / REPORTS, place, order.site)
@@ -129,6 +136,15 @@ def _status_before(folder: Path) -> dict[str, Any]:
         return parse_object((folder / STATUS_FILE).read_bytes(), STATUS_FILE)
     except (IgrowError, OSError):
         return {}
+
+
+def _kept(before: dict[str, Any]) -> RoundStatus:
+    """Return a status with what holds until a round knows better."""
+    status = RoundStatus()
+    for name in ("waiting", "waiting_bytes", "file_system"):
+        if isinstance(before.get(name), type(getattr(status, name))):
+            setattr(status, name, before[name])
+    return status
 
 
 def _receive(outbox: Outbox, place: Place, site: str, status: RoundStatus) -> None:
@@ -214,12 +230,17 @@ def _copy(path: Path, content: bytes) -> int:
 
 
 @contextmanager
-def _alone(folder: Path) -> Iterator[None]:
+def _alone(folder: Path, longest: float) -> Iterator[None]:
+    until = time.monotonic() + longest
     with (folder / "lock").open("w") as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise IgrowError("an earlier round hangs still") from None
+        while True:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                if time.monotonic() >= until:
+                    raise IgrowError("another round is under way, or hangs") from None
+                time.sleep(0.1)
         yield
 
 

@@ -30,9 +30,11 @@ class SftpPlace:
         self._timeout = timeout
         if not known_hosts.is_file():
             raise ExchangeError(
-                f"{known_hosts}: no such file; it must hold the key of {address.host}, as `ssh-keyscan {address.host}` "
+                f"{known_hosts}: no such file; it must hold the key of {address.host}, as `{address.keyscan}` "
                 "prints it (compare the fingerprint with the server's owner)"
             )
+        if identity is not None and not identity.is_file():
+            raise ExchangeError(f"{identity}: no such file; it must hold our private key")
         options = [
             "BatchMode=yes",
             "LogLevel=ERROR",
@@ -133,8 +135,11 @@ def _reason(output: str) -> str:
     """Say in one line what OpenSSH said."""
     lines = [line.strip() for line in output.splitlines() if line.strip()]
     for words, meaning in (
+        ("host key is known for", "the file of known hosts lacks the server's key, or has it for another port"),
         ("Host key verification failed", "the server's key is not the pinned one: somebody may be listening in"),
         ("REMOTE HOST IDENTIFICATION", "the server's key is not the pinned one: somebody may be listening in"),
+        ("bad permissions", "others may read our private key, which SSH then does not use: chmod 600"),
+        ("Load key", "our private key cannot be read: one of OpenSSH without a passphrase is needed"),
         ("Permission denied (publickey", "the server does not know our key"),
         ("No space left", "the server's disk is full"),
     ):

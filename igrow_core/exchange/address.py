@@ -26,6 +26,11 @@ class Address:
     endpoint: str = ""
     """Web address of an S3-compatible service; empty for the default one."""
 
+    @property
+    def keyscan(self) -> str:
+        """The command that prints an SFTP server's key."""
+        return f"ssh-keyscan {self.host}" if self.port == 22 else f"ssh-keyscan -p {self.port} {self.host}"
+
     def __str__(self) -> str:
         if self.scheme == "file":
             return self.path

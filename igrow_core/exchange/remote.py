@@ -126,7 +126,12 @@ def _pinned_sftp(address: Address, known_hosts: Path | None, identity: Path | No
     sftp = _package("fsspec.implementations.sftp", "exchange")
     pinned = known_hosts or Path.home() / ".ssh" / "known_hosts"
     if not pinned.is_file():
-        raise ExchangeError(f"{pinned}: no such file; it must hold the key of {address.host}")
+        raise ExchangeError(
+            f"{pinned}: no such file; it must hold the key of {address.host}, as `{address.keyscan}` prints it "
+            "(compare the fingerprint with the server's owner); another file: --known-hosts"
+        )
+    if identity is not None and not identity.is_file():
+        raise ExchangeError(f"{identity}: no such file; it must hold our private key")
 
     base: Any = sftp.SFTPFileSystem
 
@@ -163,6 +168,14 @@ def _pinned_sftp(address: Address, known_hosts: Path | None, identity: Path | No
         raise ExchangeError(
             f"{address}: the server's key is not the pinned one: somebody may be listening in"
         ) from None
+    except paramiko.PasswordRequiredException:
+        raise ExchangeError(f"{address}: our private key has a passphrase: one without is needed") from None
+    except paramiko.AuthenticationException:
+        raise ExchangeError(f"{address}: the server does not know our key") from None
+    except paramiko.SSHException as error:
+        if "authentication methods" not in str(error):
+            raise
+        raise ExchangeError(f"{address}: there is no private key to show: name its file with --identity") from None
 
 
 def _package(name: str, extra: str) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import threading
 from collections.abc import Callable, Iterator
@@ -175,6 +176,45 @@ def test_a_client_whose_key_the_server_does_not_know_is_told_so(sftp: Sftp, tmp_
     keys: dict[str, Any] = {"known_hosts": str(sftp.known_hosts), "identity": str(tmp_path / "mine")}
     with pytest.raises(ExchangeError, match="does not know our key"):
         open_at_gateway(sftp.url, **keys).entries("x")
+    with pytest.raises(ExchangeError, match="does not know our key"):
+        open_at_trainer(sftp.url, **keys)
+
+
+def test_what_is_wrong_with_keys_is_told_on_both_sides(sftp: Sftp, tmp_path: Path) -> None:
+    (tmp_path / "empty").write_text("")
+    (tmp_path / "rubbish").write_text("rubbish\n")
+    (tmp_path / "rubbish").chmod(0o600)
+    (tmp_path / "open").write_bytes(sftp.identity.read_bytes())
+    (tmp_path / "open").chmod(0o644)
+    subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "secret", "-f", str(tmp_path / "locked")], check=True)
+    known = str(sftp.known_hosts)
+    at_gateway = {
+        (known, "none"): "none: no such file; it must hold our private key",
+        (known, "rubbish"): "our private key cannot be read: one of OpenSSH without a passphrase is needed",
+        (known, "open"): "others may read our private key, which SSH then does not use: chmod 600",
+        (str(tmp_path / "empty"), "open"): "the file of known hosts lacks the server's key, or has it for another port",
+        (str(tmp_path / "none"), "open"): f"as `ssh-keyscan -p {sftp.port} 127.0.0.1` prints it",
+    }
+    for (hosts, identity), told in at_gateway.items():
+        with pytest.raises(ExchangeError, match=re.escape(told)):
+            open_at_gateway(sftp.url, known_hosts=hosts, identity=str(tmp_path / identity)).entries("x")
+    at_trainer = {
+        (known, "none"): "none: no such file; it must hold our private key",
+        (known, "locked"): "our private key has a passphrase: one without is needed",
+        (str(tmp_path / "none"), "open"): f"as `ssh-keyscan -p {sftp.port} 127.0.0.1` prints it",
+    }
+    for (hosts, identity), told in at_trainer.items():
+        with pytest.raises(ExchangeError, match=re.escape(told)):
+            open_at_trainer(sftp.url, known_hosts=hosts, identity=str(tmp_path / identity))
+
+
+def test_a_trainer_without_a_key_is_told_which_option_names_one(
+    sftp: Sftp, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.delenv("SSH_AUTH_SOCK", raising=False)
+    with pytest.raises(ExchangeError, match="there is no private key to show: name its file with --identity"):
+        open_at_trainer(sftp.url, known_hosts=str(sftp.known_hosts))
 
 
 def test_an_upload_that_was_cut_off_goes_on_where_it_stopped(sftp: Sftp, tmp_path: Path) -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import fcntl
+import json
+import threading
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -58,3 +61,39 @@ def test_without_a_place_it_says_what_to_give(configuration: Path, capsys: pytes
     assert main(["exchange", "status", str(configuration)]) == 0
     assert main(["exchange", "sync", str(configuration)]) == 2
     assert "name a place with --url" in capsys.readouterr().err
+
+
+def test_a_stick_that_is_not_mounted_is_told_and_nothing_is_written_in_its_place(
+    configuration: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stick = tmp_path / "stick"
+    assert main(["exchange", "sync", str(configuration), "--url", str(stick)]) == 2
+    assert f"{stick}: there is no such folder; is the stick mounted?" in capsys.readouterr().err
+    assert not stick.exists()
+
+
+def test_a_round_by_hand_waits_for_the_daemons_own(
+    configuration: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "stick").mkdir()
+    sync = ["exchange", "sync", str(configuration), "--url", str(tmp_path / "stick")]
+    folder = tmp_path / "state" / "exchange"
+    folder.mkdir(parents=True)
+    lock = (folder / "lock").open("w")
+    fcntl.flock(lock, fcntl.LOCK_EX)
+    threading.Timer(0.3, lock.close).start()
+    assert main(sync) == 0
+    assert "1 segments wait for a receipt" in capsys.readouterr().out
+
+    # What is known of the exchange outlasts a round that could not be made, and one to a stick.
+    status = json.loads((folder / "status.json").read_text())
+    (folder / "status.json").write_text(json.dumps(status | {"file_system": "/srv/share"}))
+    monkeypatch.setattr("igrow.edge.exchange.courier.LONGEST_WAIT", 0.2)
+    with (folder / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        assert main(sync) == 1
+    told = capsys.readouterr().out
+    assert "another round is under way, or hangs" in told
+    assert "1 segments wait for a receipt" in told
+    assert main(sync) == 0
+    assert json.loads((folder / "status.json").read_text())["file_system"] == "/srv/share"

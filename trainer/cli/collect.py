@@ -45,7 +45,8 @@ def run(arguments: argparse.Namespace) -> int:
             print(f"{site}: error; {error}", flush=True)
             failed = True
             continue
-        last = "nothing yet" if done.newest is None else f"the last row is of {done.newest:%Y-%m-%d %H:%M} UTC"
+        nothing = f"nothing came yet, and {site}/segments of {place} is empty"
+        last = nothing if done.newest is None else f"the last row is of {done.newest:%Y-%m-%d %H:%M} UTC"
         print(f"{site}: {done.segments} segments, {done.rows} rows, {done.bytes / 1e6:.2f} MB; {last}")
         for note in done.notes:
             print(f"  {note}", flush=True)
