@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from igrow.trainer.data.mapping import ExportMapping
 from igrow.trainer.data.plausibility import find_faults
 from igrow.trainer.data.plausibility.relations import units_by_relation
 from igrow.trainer.data.plausibility.sums import running_sum
+from igrow.trainer.data.plausibility.sunlight import against_the_sun
 from igrow.trainer.data.rows import merge
 from tests.virtual_log import virtual_log
 
@@ -138,6 +140,22 @@ def test_a_clock_that_jumps_where_clocks_change_is_wall_time() -> None:
     shifted = merge(spring.time + np.where(later, 3600, 0).astype("timedelta64[s]"), spring.columns).telemetry
     kinds = [fault.kind for fault in find_faults(shifted, SITE)]
     assert kinds == ["local_time"]
+
+
+@pytest.mark.parametrize("latitude", [52.0, -34.5])
+def test_a_latitude_on_the_wrong_side_of_the_equator_is_named(clean: Clean, latitude: float) -> None:
+    """A minus that is left out, or one too many: noon is right, the days are of another season."""
+    site = replace(SITE, latitude=latitude, time_zone="UTC")
+    table = clean.telemetry
+    winter = np.datetime64("2020-01-05T00:00:00") if latitude > 0.0 else np.datetime64("2020-06-05T00:00:00")
+    table = Telemetry(table.time + (winter - table.time[0]), table.columns)
+    sky = sun.extraterrestrial_radiation(table.time, site.latitude, site.longitude)
+    table = table.with_columns({"global_radiation": 0.6 * sky})
+    assert [fault.kind for fault in against_the_sun(table, site)] == []
+    (fault,) = against_the_sun(table, replace(site, latitude=-latitude))
+    assert fault.kind == "latitude"
+    assert f"as long as at latitude {-latitude:g}, but as at {latitude:g}" in str(fault)
+    assert f"latitude: {latitude:g} in the site file" in str(fault)
 
 
 def test_rows_of_two_compartments_under_each_other_contradict_themselves(clean: Clean) -> None:

@@ -24,6 +24,7 @@ _FAULTS: Mapping[str, str] = {
     "running_sum": N_("Readings are a running sum: {quantity}."),
     "no_daylight": N_("The radiation does not follow the sun."),
     "clock": N_("The clock of the log disagrees with the sun."),
+    "latitude": N_("The days are as long as on the other side of the equator."),
     "local_time": N_("The times are local ones without their time zone."),
     "repeated_times": N_("The same times stand in the log more than once."),
     "shuffled_rows": N_("The times do not belong to the readings."),

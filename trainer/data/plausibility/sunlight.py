@@ -20,9 +20,10 @@ from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data.fault import DataFault, Remedy
 from igrow.trainer.data.grid import own_step
+from igrow.trainer.data.plausibility.hemisphere import other_hemisphere
 from igrow.trainer.data.plausibility.sums import running_sum
 
-CLOCK = ("clock", "local_time", "no_daylight")
+CLOCK = ("clock", "local_time", "no_daylight", "latitude")
 """Faults after which nothing can be said of day and night."""
 LARGEST_OFFSET = 0.4
 """Hours between the radiation's noon and the sun's that mornings of fog, mountains and chimneys explain; half a step
@@ -90,8 +91,8 @@ def against_the_sun(telemetry: Telemetry, site: Site) -> list[DataFault]:
     clock = _clock(telemetry, daylight, site)
     if clock:
         return clock
-    unit = _unit(telemetry, site)
-    return [unit] if unit is not None else []
+    found = other_hemisphere(telemetry, site) or _unit(telemetry, site)
+    return [found] if found is not None else []
 
 
 def noon_is_late(telemetry: Telemetry, site: Site) -> float:
