@@ -149,15 +149,10 @@ def _date(seconds: float) -> str:
 class SystemClock:
     """The machine's clock. Functions are passed in so that tests need no patching."""
 
-    def __init__(
-        self,
-        monotonic: Callable[[], float] = time.monotonic,
-        wall: Callable[[], float] = time.time,
-        trusted: TrustedTime | None = None,
-    ) -> None:
+    def __init__(self, monotonic: Callable[[], float] = time.monotonic, wall: Callable[[], float] = time.time) -> None:
         self._monotonic = monotonic
         self._wall = wall
-        self._trusted = trusted or TrustedTime()
+        self._trusted = TrustedTime()
 
     @property
     def doubt(self) -> str:

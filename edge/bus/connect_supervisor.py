@@ -10,6 +10,11 @@ from typing import Protocol
 
 from igrow.edge.bus.errors import NotConnectedError
 
+LONGEST_WAIT = 10.0
+"""Seconds between two attempts."""
+SETTLED = 1.0
+"""Seconds after which a line that is lost was no failed attempt."""
+
 _log = logging.getLogger(__name__)
 
 
@@ -33,9 +38,9 @@ class Line(Protocol):
 class ConnectSupervisor:
     """Opens the line, waits until it is lost, opens it again.
 
-    The wait between attempts doubles from `first_wait` to `longest_wait`; a line that held for `settled` seconds
-    or on which a unit answered, is opened again at once; one that broke sooner counts as a failed attempt, so that a
-    server which accepts and hangs up is not stormed.
+    The wait between attempts doubles from `first_wait` to `LONGEST_WAIT`; a line that held for `SETTLED` seconds, or on
+    which a unit answered, is opened again at once; one that broke sooner counts as a failed attempt, so that a server
+    which accepts and hangs up is not stormed.
     """
 
     def __init__(
@@ -45,15 +50,11 @@ class ConnectSupervisor:
         *,
         monotonic: Callable[[], float],
         first_wait: float = 0.5,
-        longest_wait: float = 10.0,
-        settled: float = 1.0,
     ) -> None:
         self._line = line
         self._name = name
         self._monotonic = monotonic
         self._first_wait = first_wait
-        self._longest_wait = longest_wait
-        self._settled = settled
         self._lost = asyncio.Event()
         self._attempt_over = asyncio.Event()
         self._hurried = asyncio.Event()
@@ -108,7 +109,7 @@ class ConnectSupervisor:
                 if str(error) != complained:  # say it once, not every ten seconds of a long night
                     _log.warning("%s; trying on", error)
                     complained = str(error)
-                wait = min(max(2 * wait, self._first_wait), self._longest_wait)
+                wait = min(max(2 * wait, self._first_wait), LONGEST_WAIT)
             else:
                 since, self._served = self._monotonic(), False
                 self.connects += 1
@@ -118,11 +119,7 @@ class ConnectSupervisor:
                 await self._lost.wait()
                 held = self._monotonic() - since
                 _log.warning("bus %s: the line was lost after %.0f s", self._name, held)
-                wait = (
-                    0.0
-                    if held >= self._settled or self._served
-                    else min(max(2 * wait, self._first_wait), self._longest_wait)
-                )
+                wait = 0.0 if held >= SETTLED or self._served else min(max(2 * wait, self._first_wait), LONGEST_WAIT)
             if wait > 0:
                 self._attempt_over.set()
                 with contextlib.suppress(TimeoutError):

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+LONGEST_REST = 300.0
+"""Seconds that a unit is left alone at the most."""
+
 
 @dataclass
 class UnitHealth:
@@ -20,15 +23,14 @@ class UnitHealth:
 
 
 class HealthBook:
-    """Back-off for each unit: none after one failure, then `step` seconds more for each, up to `longest`.
+    """Back-off for each unit: none after one failure, then `step` seconds more for each, up to `LONGEST_REST`.
 
     One lost frame is no dead unit, hence the first failure is free.
     """
 
-    def __init__(self, monotonic: Callable[[], float], step: float = 2.0, longest: float = 300.0) -> None:
+    def __init__(self, monotonic: Callable[[], float], step: float = 2.0) -> None:
         self._monotonic = monotonic
         self._step = step
-        self._longest = longest
         self.units: dict[int, UnitHealth] = {}
 
     def unit(self, device_id: int) -> UnitHealth:
@@ -56,5 +58,5 @@ class HealthBook:
             health.timeouts += 1
         else:
             health.bad_answers += 1
-        rest = min(self._step * (health.failures - 1), self._longest)
+        rest = min(self._step * (health.failures - 1), LONGEST_REST)
         health.resting_until = self._monotonic() + max(rest, at_least)

@@ -112,9 +112,9 @@ class LoopClock(SystemClock):
     def __init__(self) -> None:
         self.ahead = 0.0
         self.loop = asyncio.get_running_loop()
-        trusted = TrustedTime(synchronised=lambda: False)
         self._looks = 0
-        super().__init__(self._passing, lambda: 1.8e9 + self.loop.time() + self.ahead, trusted)
+        super().__init__(self._passing, lambda: 1.8e9 + self.loop.time() + self.ahead)
+        self._trusted = TrustedTime(synchronised=lambda: False)
 
     def _passing(self) -> float:
         # Between two looks at a real clock some time has passed, even where a simulated answer takes none.

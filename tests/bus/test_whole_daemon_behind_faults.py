@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from igrow.edge import pace
+from igrow.edge.bus import connect_supervisor
 from igrow.edge.bus import plc as bus_of_plc
 from igrow.edge.bus.modbus_bus import ModbusBus
 from igrow.edge.daemon import Daemon
@@ -62,10 +63,9 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let no unit or line rest and the plant not be waited for, so that faults follow one another quickly."""
 
     def make_bus(settings: BusSettings, devices: Collection[Device], *, others_asked: bool = False) -> ModbusBus:
-        bus = ModbusBus(settings, rest_step=0.0, first_wait=0.01, quiet=0.005, others_asked=others_asked)
-        bus._supervisor._longest_wait = 0.02
-        return bus
+        return ModbusBus(settings, rest_step=0.0, first_wait=0.01, quiet=0.005, others_asked=others_asked)
 
+    monkeypatch.setattr(connect_supervisor, "LONGEST_WAIT", 0.02)
     monkeypatch.setattr(bus_of_plc, "make_bus", make_bus)
     monkeypatch.setattr(pace, "PATIENCE", 0.1)
 
