@@ -60,6 +60,15 @@ class FolderPlace:
             raise self._away(folder, error) from None
         return sorted(found, key=lambda entry: entry.name)
 
+    def folders(self) -> list[str]:
+        """Return the names of the folders directly in it."""
+        try:
+            return sorted(path.name for path in self.root.iterdir() if path.is_dir() and not path.name.startswith("."))
+        except FileNotFoundError:
+            return []
+        except OSError as error:
+            raise self._away("", error) from None
+
     def get(self, path: str, largest: int) -> bytes | None:
         """Return a file's content, or None."""
         file = self.root / path

@@ -8,7 +8,7 @@ from typing import Any
 
 from igrow.core.exchange.address import Address, parse_address
 from igrow.core.exchange.errors import ExchangeError
-from igrow.core.exchange.place import Entry, FolderPlace, Place
+from igrow.core.exchange.place import Entry, FolderPlace
 
 TIMEOUT_SECONDS = 60
 
@@ -28,17 +28,23 @@ class RemotePlace:
 
     def entries(self, folder: str) -> list[Entry]:
         """Return the files directly in `folder`, by name."""
+        found = self._listing(f"{self._root}/{folder}")
+        entries = [Entry(_last(one["name"]), int(one["size"] or 0)) for one in found if one["type"] == "file"]
+        return sorted((one for one in entries if one.name and not one.name.startswith(".")), key=lambda one: one.name)
+
+    def folders(self) -> list[str]:
+        """Return the names of the folders directly in it."""
+        names = {_last(one["name"]) for one in self._listing(self._root) if one["type"] == "directory"}
+        return sorted(name for name in names if name and not name.startswith("."))
+
+    def _listing(self, folder: str) -> list[Any]:
         try:
             self._system.invalidate_cache()
-            found = self._system.ls(f"{self._root}/{folder}", detail=True)
+            return list(self._system.ls(folder, detail=True))
         except FileNotFoundError:
             return []
         except Exception as error:
             raise self._failed(error) from None
-        entries = [
-            Entry(one["name"].rsplit("/", 1)[-1], int(one["size"] or 0)) for one in found if one["type"] == "file"
-        ]
-        return sorted((one for one in entries if one.name and not one.name.startswith(".")), key=lambda one: one.name)
 
     def get(self, path: str, largest: int) -> bytes | None:
         """Return a file's content, or None."""
@@ -83,9 +89,13 @@ class RemotePlace:
         return ExchangeError(f"{self._name}: {text[:200]}")
 
 
+def _last(path: str) -> str:
+    return path.rstrip("/").rsplit("/", 1)[-1]
+
+
 def open_place(
     text: str, *, base: Path | None = None, known_hosts: str | None = None, identity: str | None = None
-) -> Place:
+) -> FolderPlace | RemotePlace:
     """Return the place at an address: a folder, below `base` where it is relative, or a server. Raises IgrowError."""
     address = parse_address(text, base)
     if address.scheme == "file":

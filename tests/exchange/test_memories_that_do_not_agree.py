@@ -74,6 +74,19 @@ def test_a_damaged_day_says_how_it_is_mended_and_comes_again(
     assert day.with_suffix(".damaged").read_bytes() == whole[: len(whole) // 2]
 
 
+def test_a_site_that_nobody_has_heard_of_is_an_error_and_leaves_nothing(
+    world: World, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    world.run_days(0, 1)
+    arguments = ["--exchange", str(tmp_path / "exchange"), "--state", str(tmp_path / "new")]
+    assert main(["collect", f"{SITE}x", *arguments]) == 1
+    said = capsys.readouterr().out
+    assert said.startswith(f"{SITE}x: error; neither ")
+    assert said.endswith(f"has anything of it; known: {SITE}\n")
+    assert not (tmp_path / "exchange" / f"{SITE}x").exists()
+    assert main(["collect", SITE, *arguments]) == 0
+
+
 def test_a_second_trainer_is_told_so_and_takes_nothing(world: World, tmp_path: Path, capsys) -> None:
     world.run_days(0, 1)
     world.collect(START + DAY)

@@ -14,6 +14,7 @@ import pytest
 
 from igrow.core.exchange import ExchangeError, FolderPlace, Place
 from igrow.core.exchange.address import parse_address
+from igrow.core.exchange.remote import RemotePlace
 from igrow.core.exchange.remote import open_place as open_at_trainer
 from igrow.edge.exchange.places import open_place as open_at_gateway
 from igrow.edge.exchange.sftp import SftpPlace
@@ -69,6 +70,16 @@ def test_every_place_keeps_files_whole(sides: tuple[Place, Place]) -> None:
             place.get("a/b/c d.txt", 5)
         place.delete("a/b/c d.txt")
         assert place.entries("a/b") == []
+
+
+def test_the_trainer_sees_whose_folders_are_there(sides: tuple[Place, Place]) -> None:
+    gateway, trainer = sides
+    assert isinstance(trainer, FolderPlace | RemotePlace)
+    assert trainer.folders() == []
+    gateway.put("north/segments/a.zip", b"a")
+    gateway.put("south/reports/b.json", b"b")
+    gateway.put("file.txt", b"c")
+    assert trainer.folders() == ["north", "south"]
 
 
 def test_a_log_arrives_once_is_receipted_and_a_bundle_comes_back(sides: tuple[Place, Place], tmp_path: Path) -> None:

@@ -61,7 +61,11 @@ def test_a_paused_site_is_left_alone_and_an_unknown_one_is_refused(tmp_path: Pat
     assert main(["fleet", "collect", str(fleet)]) == 0
     assert "[1/1] one" in capsys.readouterr().out
     assert main(["fleet", "collect", str(fleet), "--site", "three"]) == 2
-    assert "three: no such site" in capsys.readouterr().err
+    assert re.search(r"three: no such site in \S+; known: (one, two|two, one)\n", capsys.readouterr().err)
+    assert main(["fleet", "collect", str(fleet), "--site", "one", "--site", "two"]) == 2
+    assert "error: two: it is paused" in capsys.readouterr().err
+    assert main(["fleet", "learn", str(fleet), "--site", "one"]) == 2
+    assert "error: one: it does not say learning: true" in capsys.readouterr().err
 
 
 def test_a_site_that_took_its_bundle_back_and_one_with_a_finding_come_before_those_that_are_well(

@@ -11,6 +11,7 @@ from igrow.trainer.cli.common import add_exchange, exchange_of, utc_now
 from igrow.trainer.service.archive import Archive
 from igrow.trainer.service.collecting import collect
 from igrow.trainer.service.forwarding import forward
+from igrow.trainer.service.known_sites import known_sites
 
 EXAMPLE = (
     "igrow-trainer collect north --exchange /srv/igrow --state state\n"
@@ -38,6 +39,9 @@ def run(arguments: argparse.Namespace) -> int:
     failed = False
     for site in arguments.site:
         try:
+            known = {*place.folders(), *archive.collected()}
+            if site not in known:
+                raise IgrowError(f"neither {place} nor {archive.root} has anything of it; {known_sites(site, known)}")
             done = collect(place, site, archive, utc_now(), take_over=arguments.take_over, again=arguments.again)
             if arguments.forward is not None:
                 forward(archive, site, arguments.forward, utc_now().date() + timedelta(days=1))

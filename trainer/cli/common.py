@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from igrow.core.bundle import Bundle
-from igrow.core.exchange import Place
-from igrow.core.exchange.remote import open_place
+from igrow.core.exchange import FolderPlace
+from igrow.core.exchange.remote import RemotePlace, open_place
 
 if TYPE_CHECKING:
     from igrow.trainer.fit import FittedModel
@@ -30,7 +30,7 @@ def add_exchange(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--identity", metavar="FILE", help="our private key for SFTP (default: the user's own)")
 
 
-def exchange_of(arguments: argparse.Namespace) -> Place:
+def exchange_of(arguments: argparse.Namespace) -> FolderPlace | RemotePlace:
     """Return the exchange; raises IgrowError."""
     return open_place(arguments.exchange, known_hosts=arguments.known_hosts, identity=arguments.identity)
 

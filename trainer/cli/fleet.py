@@ -9,6 +9,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from igrow.core.errors import IgrowError
 from igrow.trainer.cli.common import utc_now
 from igrow.trainer.fleet.overview import SiteRow, overview, utc
 from igrow.trainer.fleet.registry import Entry, Registry, load_registry
@@ -72,7 +73,10 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     for name, problem in registry.problems.items():
         print(f"{name}: error; {problem}", flush=True)
-    entries = [entry for entry in registry.entries if takes_part(entry, arguments.action)]
+    entries = [entry for entry in registry.entries if not left_out(entry, arguments.action)]
+    for entry in registry.entries if arguments.site else ():
+        if why := left_out(entry, arguments.action):
+            raise IgrowError(f"{entry.site.name}: {why} ({registry.folder / 'fleet.yaml'})")
     tasks = [make_task(arguments, registry, entry, now) for entry in entries]
     failed = len(registry.problems)
     file = registry.file
@@ -120,9 +124,11 @@ def make_task(arguments: argparse.Namespace, registry: Registry, entry: Entry, n
     )
 
 
-def takes_part(entry: Entry, action: str) -> bool:
-    """Tell whether a site has a task in this action."""
-    return not entry.paused and (action != "learn" or entry.learning)
+def left_out(entry: Entry, action: str) -> str:
+    """Return why a site has no task in this action; empty where it has one."""
+    if entry.paused:
+        return "it is paused"
+    return "it does not say learning: true" if action == "learn" and not entry.learning else ""
 
 
 def shared(entry: Entry, file: Path) -> str | None:

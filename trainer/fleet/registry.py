@@ -16,6 +16,7 @@ from pathlib import Path
 from igrow.core.errors import IgrowError
 from igrow.core.site import Site, load_site
 from igrow.core.yaml_schema import load, place, setting
+from igrow.trainer.service.known_sites import known_sites
 
 _MINUTE = datetime.timedelta(minutes=1)
 
@@ -142,7 +143,7 @@ def load_registry(folder: Path, only: Sequence[str] = ()) -> Registry:
         problems[name] = f"{place(path, 'sites', name)}: no site {name} in {folder / 'sites'}"
     for name in only:
         if name not in known:
-            raise IgrowError(f"{name}: no such site in {folder / 'sites'}; there are {len(known)}")
+            raise IgrowError(f"{name}: no such site in {folder / 'sites'}; {known_sites(name, known)}")
     if only:
         entries = {name: entry for name, entry in entries.items() if name in only}
         problems = {name: problem for name, problem in problems.items() if name in only}

@@ -63,6 +63,10 @@ class Archive:
     def __init__(self, root: Path) -> None:
         self.root = root
 
+    def collected(self) -> list[str]:
+        """Return the names of the sites of which telemetry was collected."""
+        return sorted(path.name.removeprefix("site=") for path in (self.root / "telemetry").glob("site=*"))
+
     def telemetry_folder(self, site: str) -> Path:
         """Return the folder with the Parquet files of one site."""
         return self.root / "telemetry" / f"site={site}"
