@@ -9,6 +9,7 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+import resource
 import signal
 import sys
 import time
@@ -252,6 +253,9 @@ def main(arguments: list[str]) -> int:
         os.killpg(0, signal.SIGKILL)
 
     end_with_parent(int(arguments[0]), end)
+    # Also for `sftp`: a server's listing or file may have no end. A file is held in memory, and packed once.
+    resource.setrlimit(resource.RLIMIT_FSIZE, (LARGEST_BUNDLE, LARGEST_BUNDLE))
+    resource.setrlimit(resource.RLIMIT_DATA, (2 * LARGEST_BUNDLE, 2 * LARGEST_BUNDLE))
     order = Order(**json.loads(sys.stdin.read()))
     signal.signal(signal.SIGALRM, end)
     signal.setitimer(signal.ITIMER_REAL, order.deadline)

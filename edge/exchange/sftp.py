@@ -68,7 +68,12 @@ class SftpPlace:
         with tempfile.TemporaryDirectory() as scratch:
             target = Path(scratch) / "file"
             self._run([f"get {_quoted(self._remote(path))} {_quoted(str(target))}"])
-            return target.read_bytes()
+            # The size was the server's own word.
+            with target.open("rb") as file:
+                content = file.read(largest + 1)
+        if len(content) > largest:
+            raise ExchangeError(f"{self._address}/{path}: more than {largest} bytes")
+        return content
 
     def put(self, path: str, content: bytes) -> None:
         """Write a file, going on where an earlier attempt was cut off."""

@@ -7,5 +7,5 @@ answer is an alarm by itself.
 - `settings.py`: the section `notifications` of the daemon's file.
 - `outbox.py`: which messages are due; no clock, no network.
 - `acknowledged.py`: what people have said that they know.
-- `notifier.py`: the loop around them, and the services.
+- `notifier.py`: the loop around them; `services.py`, `sending.py`: the services, each message in a process of its own.
 """

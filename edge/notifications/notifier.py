@@ -12,13 +12,14 @@ from igrow.core.errors import IgrowError
 from igrow.edge.alarm_levels import Level
 from igrow.edge.notifications.acknowledged import read_acknowledged
 from igrow.edge.notifications.outbox import Alarm, Message, Outbox, Told
+from igrow.edge.notifications.sending import SEND_SECONDS
 from igrow.edge.notifications.settings import NotificationSettings
 from igrow.edge.state_file import read_state, write_state
 
 _log = logging.getLogger("igrow.edge.notifications")
 OUTBOX_FILE = "outbox.json"
-SEND_SECONDS = 60.0
-"""A service that takes longer is left behind; it may still get through."""
+WAIT_SECONDS = SEND_SECONDS + 5.0
+"""A service that takes longer is left behind; its sending ends itself before that."""
 
 
 class Service(Protocol):
@@ -105,10 +106,10 @@ def send_to_all(services: Sequence[Service], message: Message) -> bool:
     for thread in threads:
         thread.start()
     for thread in threads:
-        thread.join(SEND_SECONDS)
+        thread.join(WAIT_SECONDS)
     for service in services:
         if not results.get(service.name, False):
-            why = "refused or failed" if service.name in results else f"did not answer within {SEND_SECONDS:.0f} s"
+            why = "refused or failed" if service.name in results else f"did not answer within {WAIT_SECONDS:.0f} s"
             _log.warning("%s %s: %s", service.name, why, message.title)
     return any(results.values())
 

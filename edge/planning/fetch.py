@@ -13,6 +13,7 @@ import urllib.request
 from pathlib import Path
 
 from igrow.core.errors import IgrowError
+from igrow.core.exchange.documents import LARGEST_DOCUMENT
 from igrow.core.site import Site
 from igrow.edge.planning.open_meteo import COLUMNS, read_forecast
 
@@ -21,8 +22,6 @@ ENSEMBLE = "https://ensemble-api.open-meteo.com/v1/ensemble"
 ENSEMBLE_MODEL = "icon_seamless"
 SECONDS = 30.0
 """Longest wait for the server."""
-LARGEST = 8 * 2**20
-"""Bytes of the largest answer that is taken: an ensemble of 40 members over 16 days has less than one million."""
 EXTRA_DAYS = 2
 """Beyond the plan's horizon: the day after it, and the one that has begun."""
 
@@ -51,14 +50,14 @@ def fetch(url: str, path: Path) -> int:
     """
     try:
         with urllib.request.urlopen(url, timeout=SECONDS) as answer:
-            content = answer.read(LARGEST + 1)
+            content = answer.read(LARGEST_DOCUMENT + 1)
     except urllib.error.HTTPError as error:
         raise IgrowError(f"{url}: the server says {error.code} {error.reason}") from None
     except (OSError, ValueError, http.client.HTTPException) as error:
         reason = getattr(error, "reason", None) or error
         raise IgrowError(f"{url}: no answer: {reason}") from None
-    if len(content) > LARGEST:
-        raise IgrowError(f"{url}: the answer is larger than {LARGEST >> 20} MiB, which is no forecast")
+    if len(content) > LARGEST_DOCUMENT:
+        raise IgrowError(f"{url}: the answer is larger than {LARGEST_DOCUMENT >> 20} MiB, which is no forecast")
     partial = path.with_name(f".{path.stem}.partial.json")
     try:
         partial.write_bytes(content)

@@ -16,6 +16,8 @@ from igrow.edge.planning.open_meteo import read_forecast
 
 NEEDED = WEATHER[:6]
 """The weather that plans are made from, in the registry's order."""
+LOWEST, HIGHEST = (np.array([getattr(QUANTITIES[name], end) for name in NEEDED]) for end in ("low", "high"))
+"""What no weather leaves."""
 HOUR = 3600
 DAYS = 3
 """Days whose same hours are averaged."""
@@ -68,17 +70,19 @@ def persistence(log: Telemetry, start: int, hours: int) -> Floats:
     ahead = np.arange(hours)
     fading = np.exp(-(ahead + 1.0) / ANOMALY_HOURS)
     expected = typical[ahead % 24] + fading[:, None] * anomaly
-    low = np.array([QUANTITIES[name].low for name in NEEDED])
-    high = np.array([QUANTITIES[name].high for name in NEEDED])
-    return np.asarray(np.clip(expected, low, high))
+    return np.asarray(np.clip(expected, LOWEST, HIGHEST))
 
 
 def from_forecast(forecast: Telemetry, log: Telemetry, start: int, hours: int) -> Floats:
-    """Return the weather of a forecast as hourly means, (hours, 6), with persistence where it has gaps."""
+    """Return the weather of a forecast as hourly means, (hours, 6), with persistence where it has gaps.
+
+    What no weather can be is a gap too, such as the -9999 of a model that knows nothing.
+    """
     table = hourly(forecast, start, hours)
-    if np.isfinite(table).all():
+    known = (table >= LOWEST) & (table <= HIGHEST)
+    if known.all():
         return table
-    return np.where(np.isfinite(table), table, persistence(log, start, hours))
+    return np.where(known, table, persistence(log, start, hours))
 
 
 def hourly(telemetry: Telemetry, start: int, hours: int, names: Sequence[str] = NEEDED) -> Floats:

@@ -7,7 +7,6 @@ See https://open-meteo.com/en/docs and https://open-meteo.com/en/docs/ensemble-a
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,6 +16,7 @@ import numpy as np
 
 from igrow.core.arrays import Floats
 from igrow.core.errors import IgrowError
+from igrow.core.exchange.documents import LARGEST_DOCUMENT, parse_object
 from igrow.core.telemetry import Telemetry, read_csv
 
 COLUMNS = {
@@ -32,6 +32,8 @@ SPEED = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704, "kn": 0.514444}
 TEMPERATURE = {"°C": (1.0, 0.0), "°F": (1.0 / 1.8, -32.0 / 1.8)}
 MOST_MEMBERS = 8
 """Members of an ensemble that are planned with: as many, evenly taken, as a gateway has time for."""
+LATEST = 4e9
+"""Seconds since 1970: beyond it there is no weather."""
 _MEMBER = re.compile(r"_member(\d+)$")
 
 
@@ -43,22 +45,23 @@ def read_forecast(path: Path) -> tuple[Telemetry, ...]:
     if path.suffix.lower() != ".json":
         return (read_csv(path),)
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise IgrowError(f"{path}: cannot be read: {error}") from None
-    except json.JSONDecodeError as error:
-        raise IgrowError(f"{path}:{error.lineno}:{error.colno}: is not JSON: {error.msg}") from None
+        with path.open("rb") as file:
+            content = parse_object(file.read(LARGEST_DOCUMENT + 1), str(path))
+    except OSError as error:
+        raise IgrowError(f"{path}: cannot be read: {error.strerror}") from None
     return _members(path, content)
 
 
-def _members(path: Path, content: Any) -> tuple[Telemetry, ...]:
-    hourly = content.get("hourly") if isinstance(content, Mapping) else None
+def _members(path: Path, content: Mapping[str, Any]) -> tuple[Telemetry, ...]:
+    hourly = content.get("hourly")
     if not isinstance(hourly, Mapping):
-        reason = content.get("reason") if isinstance(content, Mapping) else None
+        reason = content.get("reason")
         told = f": it says {reason!r}" if reason else ""
         raise IgrowError(f"{path}: holds no `hourly` weather of Open-Meteo{told}")
     time = _times(path, hourly.get("time"), content.get("utc_offset_seconds", 0))
     units = content.get("hourly_units") or {}
+    if not isinstance(units, Mapping):
+        raise IgrowError(f"{path}: `hourly_units` holds no units by name")
     found = sorted({match.group() for name in hourly if (match := _MEMBER.search(name))})
     suffixes = [""] * any(name in hourly for name in NEEDED) + found
     if not suffixes:
@@ -114,6 +117,8 @@ def _times(path: Path, given: Any, offset: Any) -> Floats:
             seconds = np.array(given, dtype=np.float64)
     except (TypeError, ValueError):
         raise IgrowError(f"{path}: `hourly.time` holds what is no time") from None
+    if not (np.abs(seconds) < LATEST).all():
+        raise IgrowError(f"{path}: `hourly.time` holds what is no time")
     if (np.diff(seconds) <= 0.0).any():
         raise IgrowError(f"{path}: the times of `hourly` must follow one another")
     return seconds

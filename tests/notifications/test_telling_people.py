@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import http.server
+import resource
+import socket
 import threading
 import time
 
@@ -11,9 +14,11 @@ import pytest
 from igrow.core.errors import IgrowError
 from igrow.edge.alarm_levels import Level
 from igrow.edge.notifications import notifier as module
+from igrow.edge.notifications import sending
 from igrow.edge.notifications.acknowledged import acknowledge, read_acknowledged
 from igrow.edge.notifications.notifier import Notifier, send_to_all
 from igrow.edge.notifications.outbox import Message
+from igrow.edge.notifications.sending import MOST_BYTES
 from igrow.edge.notifications.services import open_services
 from igrow.edge.notifications.settings import NotificationSettings
 
@@ -97,7 +102,7 @@ def test_a_restart_tells_nothing_twice(tmp_path):
 
 
 def test_a_broken_and_a_hanging_service_keep_nothing_from_the_others(tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "SEND_SECONDS", 0.2)
+    monkeypatch.setattr(module, "WAIT_SECONDS", 0.2)
     mailbox = Mailbox()
     assert send_to_all([Broken(), Hanging(), mailbox], Message("title", "body", Level.NOTICE))
     assert len(mailbox.messages) == 1
@@ -145,3 +150,37 @@ def test_a_web_hook_gets_title_and_text():
         server.server_close()
     assert '"title": "hillside: CRITICAL, an alarm"' in received[0]
     assert "too cold" in received[0]
+
+
+def test_an_answer_without_end_takes_no_memory_and_is_no_success():
+    class Endless(http.server.BaseHTTPRequestHandler):
+        def do_POST(self):
+            self.rfile.read(int(self.headers["Content-Length"]))
+            self.send_response(200)
+            self.end_headers()
+            with contextlib.suppress(OSError):
+                while True:
+                    self.wfile.write(bytes(2**20))
+
+        def log_message(self, *_):
+            pass
+
+    server = http.server.HTTPServer(("127.0.0.1", 0), Endless)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    try:
+        (service,) = open_services([f"json://127.0.0.1:{server.server_port}/"])
+        assert not service.send(Message("hillside: CRITICAL, an alarm", "too cold", Level.CRITICAL))
+    finally:
+        server.shutdown()
+        server.server_close()
+    assert (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 < MOST_BYTES
+    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024 < 3 * MOST_BYTES
+
+
+def test_a_service_that_answers_drop_by_drop_is_given_up(monkeypatch):
+    monkeypatch.setattr(sending, "SEND_SECONDS", 0.5)
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        (service,) = open_services([f"json://127.0.0.1:{silent.getsockname()[1]}/"])
+        with pytest.raises(TimeoutError, match="no end within"):
+            service.send(Message("title", "body", Level.NOTICE))

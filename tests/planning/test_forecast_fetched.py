@@ -64,7 +64,7 @@ def test_a_forecast_is_fetched_for_the_site_and_read_as_plans_read_it(server: st
 @pytest.mark.parametrize(
     ("status", "body", "reason"),
     [
-        (200, b"<html>maintenance</html>", "is not JSON"),
+        (200, b"<html>maintenance</html>", "not JSON"),
         (200, b'{"error": true, "reason": "too many requests"}', "too many requests"),
         (503, b"", "503"),
         (200, b" " * 100, "larger"),
@@ -74,7 +74,7 @@ def test_an_answer_that_is_no_forecast_leaves_the_old_one(
     server: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, status: int, body: bytes, reason: str
 ) -> None:
     if reason == "larger":
-        monkeypatch.setattr(fetching, "LARGEST", 50)
+        monkeypatch.setattr(fetching, "LARGEST_DOCUMENT", 50)
     Server.status, Server.body = status, body
     path = tmp_path / "forecast.json"
     path.write_text("the old one")

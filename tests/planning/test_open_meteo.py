@@ -65,9 +65,16 @@ def test_an_ensemble_is_read_by_its_members_as_many_as_there_is_time_for(tmp_pat
 @pytest.mark.parametrize(
     ("given", "told"),
     [
-        ("{", "forecast.json:1:2: is not JSON"),
+        ("{", "forecast.json: not JSON"),
         ({"error": True, "reason": "Daily API request limit exceeded"}, "Daily API request limit exceeded"),
-        ([], "holds no `hourly` weather"),
+        ([], "a list where an object with names is needed"),
+        ({"hourly": 5}, "holds no `hourly` weather"),
+        ("[" * 100_000, "nested too deeply"),
+        ("9" * 5000, "forecast.json: not JSON"),
+        ({"hourly": {"time": [1, 2], "temperature_2m": [1, 10**400]}}, "forecast.json: not JSON"),
+        ({"hourly": {"time": [1, 2]}, "hourly_units": ["m/s"]}, "holds no units by name"),
+        ({"hourly": {"time": [None, 2]}}, "is no time"),
+        ({"hourly": {"time": [1, 1e300]}}, "is no time"),
         ({"hourly": {"time": []}}, "lacks time"),
         ({"hourly": {"time": ["2026-05-29T00:00", "yesterday"]}}, "is no time"),
         ({"hourly": {"time": [2, 1], "temperature_2m": [1, 2]}}, "must follow one another"),

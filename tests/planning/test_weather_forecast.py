@@ -109,3 +109,19 @@ def test_a_forecast_on_a_share_that_hangs_costs_the_forecast_and_says_so(tmp_pat
     members, problem = forecast_in_time(path)
     assert members == ()
     assert f"{path}: not read within 0.2 s" in problem
+
+
+def test_what_no_weather_can_be_is_a_gap_of_the_forecast() -> None:
+    """Of a model that knows nothing of an hour, or of a server's fault."""
+    expected = persistence(log(), START, 24)
+    hours = np.arange(START, START + 24 * 3600, 3600).astype("datetime64[s]")
+    columns = {name: expected[:, column] + 0.5 for name, column in COLUMN.items()}
+    columns["outdoor_temperature"] = columns["outdoor_temperature"].copy()
+    columns["wind_speed"] = columns["wind_speed"].copy()
+    columns["outdoor_temperature"][:4] = -9999.0, np.inf, 1e308, np.nan
+    columns["wind_speed"][5] = -1.0
+    table = from_forecast(Telemetry(hours, columns), log(), START, 24)
+    temperature, wind = COLUMN["outdoor_temperature"], COLUMN["wind_speed"]
+    np.testing.assert_allclose(table[:4, temperature], expected[:4, temperature])
+    np.testing.assert_allclose(table[4:, temperature], expected[4:, temperature] + 0.5)
+    assert table[5, wind] == pytest.approx(expected[5, wind])

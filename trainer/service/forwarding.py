@@ -13,6 +13,7 @@ and have not changed since are left out.
 
 from __future__ import annotations
 
+import http.client
 import importlib
 import json
 import math
@@ -127,13 +128,13 @@ def _post(url: str, body: bytes) -> None:
     if token := os.environ.get("INFLUX_TOKEN"):
         request.add_header("Authorization", f"Token {token}")
     try:
-        with urllib.request.urlopen(request, timeout=TIMEOUT_SECONDS) as answer:
-            answer.read()
+        with urllib.request.urlopen(request, timeout=TIMEOUT_SECONDS):
+            pass  # taken; whatever else is answered is not read, as it may be endless
     except urllib.error.HTTPError as error:
         raise IgrowError(
             f"{url}: refused with {error.code}: {error.read(300).decode(errors='replace').strip()}"
         ) from None
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, http.client.HTTPException) as error:
         raise IgrowError(f"{url}: {getattr(error, 'reason', error)}") from None
 
 
