@@ -117,6 +117,22 @@ def test_the_document_tells_what_a_finding_takes_from_the_whole_greenhouse(leak:
     assert document["findings"][0]["eur_per_week"] == pytest.approx(area * found.money, abs=0.01)
 
 
+def test_a_greenhouse_without_lamps_is_told_what_a_cause_costs(leak: Diagnosis, tmp_path: Path) -> None:
+    (finding,) = leak.findings
+    lit, evidence, site = worth(leak, finding), leak.evidence, leak.model.site
+    assert lit is not None
+    assert evidence is not None
+    log = replace(evidence.log, record=replace(evidence.log.record, lamp_efficacy=0.0))
+    dark = replace(site, greenhouse=replace(site.greenhouse, lamps=None))
+    unlit = replace(leak, evidence=replace(evidence, log=log), model=replace(leak.model, site=dark))
+    found = worth(unlit, finding)
+    assert found is not None
+    assert (found.heat, found.lamp_light) == (lit.heat, 0.0)
+    assert found.money == pytest.approx(lit.money, rel=0.1)
+    write_diagnosis(tmp_path / "unlit", unlit)
+    assert np.isfinite(json.loads((tmp_path / "unlit" / "diagnosis.json").read_text())["findings"][0]["eur_per_week"])
+
+
 def test_rivals_are_sentences_and_each_has_its_check(leak: Diagnosis) -> None:
     rivals = ("wind_infiltration", "vent_backlash", "screen_gap")
     page = render_report(replace(leak, findings=(replace(leak.findings[0], confounded=rivals),)))

@@ -67,17 +67,16 @@ def worth(result: Diagnosis, finding: Finding) -> Worth | None:
         taken[paid] = _brought_in(record, stage, finding.effect, paid)
     share = _WEEK / float(counted.sum())
     sums = {name: share * float(np.sum(values[counted])) for name, values in taken.items()}
-    electricity = taken["light"] / record.lamp_efficacy / 3.6e6
+    lamps = site.greenhouse.lamps
+    # A greenhouse without lamps pays for no light; their efficacy is 0 there.
+    electricity = np.zeros(len(record)) if lamps is None else taken["light"] / lamps.efficacy / 3.6e6
     price = electricity_price(site.prices, record.time, site.time_zone)
-    lit = site.greenhouse.lamps is not None
     money = (
         site.prices.heat * 1e-6 * sums["heat"]
         + _priced_co2(site, sums["co2"])
-        + lit * share * float(np.sum((electricity * price)[counted]))
+        + share * float(np.sum((electricity * price)[counted]))
     )
-    return Worth(
-        1e-6 * sums["heat"], sums["co2"], lit * share * float(np.sum(electricity[counted])), money, _spread(finding)
-    )
+    return Worth(1e-6 * sums["heat"], sums["co2"], share * float(np.sum(electricity[counted])), money, _spread(finding))
 
 
 def _without(stage: Stage, finding: Finding) -> Stage | None:
