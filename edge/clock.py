@@ -1,7 +1,8 @@
 """Clocks: the daemon measures durations on one that never jumps, and dates on one that may be wrong.
 
-Everything inside (ages, slew, leases, budgets) runs on `monotonic`. Dates are for the log, the time of day and
-signatures; they come from `true_time`, which is None while the clock cannot be trusted. A simulated plant runs
+Everything inside (ages, slew, leases, budgets) runs on `monotonic`, on which time also passes while the machine sleeps:
+no hand, lease or plan waits for it, and what was read before is old afterwards. Dates are for the log, the time of day
+and signatures; they come from `true_time`, which is None while the clock cannot be trusted. A simulated plant runs
 faster than time, so it publishes its own clock in a register and the daemon follows that (`PlcClock`).
 """
 
@@ -40,6 +41,11 @@ FASTEST_PLANT = 86_400.0
 """What a plant's clock moves on at once, or in seconds per second, at the most; more is a jump."""
 PLANT_SETTLES = 3600.0
 """Plant's seconds for which its clock must run evenly after a jump before its dates are believed again."""
+
+
+def since_boot() -> float:
+    """Return seconds on a clock that never jumps and runs on while the machine sleeps."""
+    return time.clock_gettime(time.CLOCK_BOOTTIME)
 
 
 class Clock(Protocol):
@@ -149,7 +155,7 @@ def _date(seconds: float) -> str:
 class SystemClock:
     """The machine's clock. Functions are passed in so that tests need no patching."""
 
-    def __init__(self, monotonic: Callable[[], float] = time.monotonic, wall: Callable[[], float] = time.time) -> None:
+    def __init__(self, monotonic: Callable[[], float] = since_boot, wall: Callable[[], float] = time.time) -> None:
         self._monotonic = monotonic
         self._wall = wall
         self._trusted = TrustedTime()

@@ -9,16 +9,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 
+from igrow.edge.clock import since_boot
+
 LONGEST = 60.0
 """Seconds between the beginning of a cycle and its last write, where cycles are no longer apart. A line whose requests
 all time out needs half of it."""
 
 
-def _since_boot() -> float:
-    return time.clock_gettime(time.CLOCK_BOOTTIME)
-
-
-CLOCKS: Sequence[Callable[[], float]] = (time.monotonic, _since_boot, time.time)
+CLOCKS: Sequence[Callable[[], float]] = (time.monotonic, since_boot, time.time)
 """The first stands still while the machine sleeps, the second where a hypervisor sleeps; the date is set after that. A
 date that is stepped on costs one cycle's writes, which the next one makes good."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import time
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -12,6 +11,7 @@ from igrow.edge.bus.block_reader import BlockReader
 from igrow.edge.bus.errors import BusError, NoValueError, TurnedWordsError, UnknownPointError, ValueDoesNotFitError
 from igrow.edge.bus.modbus_bus import ModbusBus
 from igrow.edge.bus.protocol import Bus, Priority, WriteRequest
+from igrow.edge.clock import since_boot
 from igrow.edge.registers.codec import NotEncodableError, decode, encode, turned
 from igrow.edge.registers.model import BusSettings, Device, Point, RegisterMap
 
@@ -60,7 +60,7 @@ class RegisterPlc:
         self,
         register_map: RegisterMap,
         *,
-        monotonic: Callable[[], float] = time.monotonic,
+        monotonic: Callable[[], float] = since_boot,
         buses: Mapping[str, Bus] | None = None,
         others_asked: bool = False,
     ) -> None:

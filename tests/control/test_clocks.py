@@ -1,5 +1,6 @@
 """Clocks: wrong dates, jumps, and a plant's own clock."""
 
+import time
 from datetime import UTC, datetime
 
 import pytest
@@ -29,6 +30,19 @@ def test_a_clock_of_1970_is_not_trusted_and_its_correction_is_taken_at_once():
     assert machine.run(100.0) is None
     machine.wall = NOW
     assert machine.run(1.0) == NOW + 1.0
+
+
+def test_while_the_machine_sleeps_time_passes_and_its_date_has_not_jumped(monkeypatch):
+    """A hand or an override ends in time, no plan is followed that was for the hours before, old values are old."""
+    real, slept = time.clock_gettime, [0.0]
+    monkeypatch.setattr(time, "clock_gettime", lambda one: real(one) + slept[0] * (one == time.CLOCK_BOOTTIME))
+    clock = SystemClock(wall=lambda: NOW + real(time.CLOCK_MONOTONIC) + slept[0])
+    before = clock.monotonic()
+    assert clock.true_time() is not None
+    slept[0] = 6 * 3600.0
+    assert clock.monotonic() - before >= 6 * 3600.0
+    assert clock.true_time() is not None
+    assert clock.doubt == ""
 
 
 def test_a_jump_costs_trust_until_the_clock_has_run_evenly_again():

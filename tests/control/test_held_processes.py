@@ -4,7 +4,7 @@ import pytest
 
 from igrow.edge.held import CLOCKS, LONGEST, Held
 from tests.control.control_fakes import FixedSource
-from tests.control.stubborn_plc import make_stubborn_bench
+from tests.control.stubborn_plc import SAFE, make_stubborn_bench
 
 WISH = {"heating_setpoint": 21.0, "co2_setpoint": 700.0, "lamp_on": 1.0, "irrigation_on": 0.5}
 
@@ -70,3 +70,16 @@ async def test_a_slow_cycle_is_no_held_one(interval, answer):
     await bench.run(1)
     assert {name: bench.plc.values[name] for name in WISH} == WISH
     assert len(bench.plc.written("heartbeat")) == 1
+
+
+async def test_what_a_plc_fell_back_to_while_the_gateway_slept_is_no_hand():
+    """The clock that all ages are on runs on in the sleep, so the silence is seen."""
+    bench = make_stubborn_bench(FixedSource(dict(WISH)))
+    bench.plc.fallback_after = 60.0
+    await bench.run(10)
+    bench.clock.advance(6 * 3600.0)
+    bench.plc.advance(6 * 3600.0)
+    assert bench.plc.values["heating_setpoint"] == SAFE["heating_setpoint"]
+    await bench.run(20)
+    assert bench.events("changed_by_hand") == []
+    assert {name: bench.plc.values[name] for name in WISH} == WISH
