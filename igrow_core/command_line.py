@@ -27,6 +27,7 @@ def run_command(
         commands: name -> (module, summary).
         arguments: what follows the program's name; None takes the process's own.
     """
+    _open_standard_files()
     given = list(sys.argv[1:] if arguments is None else arguments)
     options = _parse(program, description, commands, given)
     try:
@@ -44,6 +45,15 @@ def run_command(
         return 2
     except KeyboardInterrupt:
         return 130
+
+
+def _open_standard_files() -> None:
+    """Open what whoever started us has closed: the first file or socket would get its number, and our words with it."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
 
 
 def _parse(

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import os
 import resource
 import signal
 import socket
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from tests.service.attacked_daemon import SAFE, AttackedDaemon
+from tests.service.running_daemon import COMMAND, ROOT
 
 FEW = 40
 
@@ -36,6 +39,23 @@ def test_visitors_that_take_the_last_handle_cost_one_line_and_no_beat(attacked: 
     attacked.until(lambda: served(attacked.port_of_status()))
     assert len(attacked.log().splitlines()) < 50
     assert "Traceback" not in attacked.log()
+    attacked.signal(signal.SIGTERM)
+    assert attacked.ended() == 0
+    assert {name: attacked.plc.shows(name) for name in SAFE} == SAFE
+
+
+def test_a_daemon_that_is_started_without_standard_files_gives_their_numbers_to_no_file(
+    attacked: AttackedDaemon,
+) -> None:
+    """What is said to people, and by its processes, would go into the file or the line that has the number."""
+    (attacked.folder / "daemon.log").touch()
+    attacked.process = subprocess.Popen(
+        ["sh", "-c", 'exec "$@" 0<&- 1>&- 2>&-', "sh", *COMMAND, "run", str(attacked.configuration)],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    attacked.controls()
+    files = Path(f"/proc/{attacked.process.pid}/fd")
+    assert [str((files / str(number)).readlink()) for number in range(3)] == [os.devnull] * 3
     attacked.signal(signal.SIGTERM)
     assert attacked.ended() == 0
     assert {name: attacked.plc.shows(name) for name in SAFE} == SAFE
