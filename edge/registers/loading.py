@@ -168,13 +168,15 @@ class MapFile:
         )
 
     def _check_devices(self) -> None:
-        seen: dict[tuple[str, int], str] = {}
+        seen: dict[tuple[object, int], str] = {}
         for name, device in self.devices.items():
             if device.bus not in self.buses:
                 raise SettingError(_unknown("bus", device.bus, self.buses), "devices", name, "bus")
-            other = seen.setdefault((device.bus, device.device_id), name)
+            # Two buses may name one line: what two points have there in common would be written by both.
+            other = seen.setdefault((_line(self.buses[device.bus]), device.device_id), name)
             if other != name:
-                what = f"device_id {device.device_id} is {other}'s already on bus {device.bus}: one of them is another"
+                buses = " and ".join(sorted({device.bus, self.devices[other].bus}))
+                what = f"device_id {device.device_id} is {other}'s already on bus {buses}: one of them is another"
                 raise SettingError(what, "devices", name, "device_id")
             if device.device_id == 0 and self.buses[device.bus].transport in ("rtu", "rtu_over_tcp"):
                 what = "device_id 0 is the broadcast, which nobody answers: 1 to 247 on a serial line"
@@ -224,6 +226,11 @@ class MapFile:
                 continue
             what = f"{name} shares {point.function.value} {address} with {first}: one of the addresses is wrong"
             raise SettingError(what, "points", name, "address")
+
+
+def _line(bus: TcpBus | RtuBus | RtuOverTcpBus | TlsBus) -> object:
+    """Return what tells a line from another one."""
+    return bus.serial_port if isinstance(bus, RtuBus) else (bus.host.lower().rstrip("."), bus.port)
 
 
 def _unknown(kind: str, name: str, known: Mapping[str, object]) -> str:
