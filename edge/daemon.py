@@ -240,6 +240,7 @@ class Daemon:
         asked = schedule.tick(result.image, self.services.updates.active())
         if asked and control.lockstep:
             await self._unless_stopped(planning.wait(LOCKSTEP_WAIT))
+        self._journal.alarm("planning", planning.health, Level.NOTICE)
         if planning.health and not planning.busy:
             schedule.retry_soon(result.image.monotonic)
         plan = planning.latest()

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -16,10 +17,12 @@ from dataclasses import dataclass
 from typing import IO, Any
 
 from igrow.core.errors import IgrowError
-from igrow.edge.planning.messages import MessageError, receive, send
+from igrow.edge.planning.messages import EndedError, MessageError, receive, send
 
 SEND_SECONDS = 30.0
 """Longest time for a call to reach a process that has just been started on a busy machine."""
+FROM_OUTSIDE = (signal.SIGKILL, signal.SIGTERM)
+"""No call ends its own process so: the kernel does where memory is short, whoever took it, or a person."""
 END_SECONDS = 1.0
 """How long a killed process is waited for."""
 
@@ -29,7 +32,8 @@ class ProcessError(IgrowError):
 
 
 class NotCalledError(IgrowError):
-    """The call was not made, or not finished, for a reason that is not its own: no process, or the daemon's end."""
+    """The call was not made, or not finished, for a reason that is not its own: no process, one that somebody else has
+    killed, or the daemon's end."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +71,8 @@ class GraphProcess:
                 status = self._end()
                 if self._closed:
                     raise NotCalledError("the daemon is on its way out") from None
+                if isinstance(error, EndedError) and -(status or 0) in FROM_OUTSIDE:
+                    raise NotCalledError(f"its process was killed{_how(status)}: is memory short?") from None
                 raise ProcessError(f"{error}{_how(status)}") from None
             if kind == "failed":
                 self._end()  # what failed so may have left little of the process

@@ -20,6 +20,10 @@ class MessageError(Exception):
     """The other side is gone, too slow, or sends what is no message."""
 
 
+class EndedError(MessageError):
+    """The other side has ended."""
+
+
 def send(descriptor: int, message: object, timeout: float) -> None:
     """Write one message; raises MessageError after `timeout` seconds, or when the other side is gone."""
     body = pickle.dumps(message, protocol=5)
@@ -31,7 +35,7 @@ def send(descriptor: int, message: object, timeout: float) -> None:
             _wait(descriptor, select.POLLOUT, until)
             view = view[os.write(descriptor, view) :]
     except OSError as error:
-        raise MessageError(f"the process is gone ({error.strerror})") from None
+        raise EndedError(f"the process is gone ({error.strerror})") from None
 
 
 def receive(descriptor: int, timeout: float) -> Any:
@@ -49,7 +53,7 @@ def _read(descriptor: int, count: int, until: float) -> bytes:
         _wait(descriptor, select.POLLIN, until)
         chunk = os.read(descriptor, min(count, 1 << 20))
         if not chunk:
-            raise MessageError("it ended")
+            raise EndedError("it ended")
         chunks.append(chunk)
         count -= len(chunk)
     return b"".join(chunks)

@@ -179,7 +179,6 @@ class BundleLife:
         state, rules = self._bundles.state, self._rules
         active, previous = self._bundles.active, self._bundles.previous
         assert state.watch_since is not None
-        self._next_watch = time + 24 * HOUR
         if active is None or previous is None:
             state.watch_since = None
             return
@@ -190,6 +189,7 @@ class BundleLife:
         except ProcessError as error:
             self._go_back(time, active, f"cannot predict: {error}", None, {})
             return
+        self._next_watch = time + 24 * HOUR
         if not any(pair.count for pair in comparison.pairs):
             return
         tolerance, worst = (rules.tolerance, rules.worst) if over else (rules.early_tolerance, 2.0 * rules.worst)

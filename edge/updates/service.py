@@ -8,6 +8,7 @@ from concurrent.futures import Future
 from pathlib import Path
 
 from igrow.core.bundle import BundleError
+from igrow.core.errors import IgrowError
 from igrow.edge.hand_off import HandOff, LateError, settled
 from igrow.edge.planning.graph_process import ProcessError
 from igrow.edge.ports import ActiveBundle
@@ -24,7 +25,8 @@ from igrow.edge.updates.worsening import Worsening, find_worsening, worsening_se
 LATE_AFTER = 1800.0
 """Seconds after which the thread counts as held by a share: longer than the longest comparison."""
 RETRY = 600.0
-"""Seconds after a start that failed until it is tried again."""
+"""Seconds after work that failed until it is tried again; each failure in a row doubles them."""
+LONGEST_RETRY = 86_400.0
 CLOSE_SECONDS = 2.0
 """How long work under way is waited for at the stop, after the process for graphs was ended."""
 
@@ -65,7 +67,11 @@ class BundleUpdates:
         self._wishes = HandOff("the operator's wishes")
         self._look: Future[Wishes] | None = None
         self._begun = False
-        self._begin_again = 0.0
+        self._again = 0.0
+        """When work that has failed is tried again."""
+        self._failures = 0
+        """In a row."""
+        self._problem = ""
         self._task: Future[None] | None = self._aside.post(self._begin)
 
     def active(self) -> ActiveBundle | None:
@@ -82,27 +88,38 @@ class BundleUpdates:
     @property
     def health(self) -> str:
         """Empty when all is well, else one line."""
-        return self._aside.problem
+        return self._aside.problem or self._problem
 
     def tick(self, time: float | None) -> None:
         """Start what is due at this time (plant's clock, seconds since 1970 UTC); never blocks."""
         if self.busy:
             return
-        if self._task is not None and (error := self._task.exception()) is not None:
-            reason = f"{type(error).__name__}: {error}"
-            self._teller.event(time, "update_failed", {"reason": reason})
-            self._begin_again = 0.0 if time is None else time + RETRY
+        if self._task is not None:
+            self._hear_how_it_ended(time, self._task.exception())
         self._task = None
         self._hear_wishes()
         if time is None:
             return
         self._life.keep_up(time)
-        self._begin_again = min(self._begin_again, time + RETRY)
+        self._again = min(self._again, time + LONGEST_RETRY)
+        if time < self._again:
+            return
         if not self._begun:
-            if time >= self._begin_again:
-                self._task = self._aside.post(self._begin)
+            self._task = self._aside.post(self._begin)
         elif self._life.is_due(time):
             self._task = self._aside.post(lambda: self._work(time))
+
+    def _hear_how_it_ended(self, time: float | None, error: BaseException | None) -> None:
+        """Take note of what the thread's work has come to; what fails again and again is told once."""
+        if error is None:
+            self._failures, self._problem = 0, ""
+            return
+        reason = str(error) if isinstance(error, IgrowError) else f"{type(error).__name__}: {error}"
+        if not self._failures:
+            self._teller.event(time, "update_failed", {"reason": reason})
+        self._problem = f"updates: {reason}"
+        self._again = 0.0 if time is None else time + min(RETRY * 2.0**self._failures, LONGEST_RETRY)
+        self._failures = min(self._failures + 1, 10)
 
     def _hear_wishes(self) -> None:
         """Take over what the operator asked for, when it has been read, and look again."""
@@ -170,14 +187,13 @@ class BundleUpdates:
 
     def _begin(self) -> None:
         self._bundles.begin()
+        if self._bundles.state.active is None and self._first_bundle is not None:
+            try:
+                self._bundles.install(self._first_bundle)
+            except (BundleError, UpdateError, ProcessError) as error:
+                self._life.last_refusal = str(error)
+                self._teller.event(None, "update_refused", {"reason": str(error)})
         self._begun = True
-        if self._bundles.state.active is not None or self._first_bundle is None:
-            return
-        try:
-            self._bundles.install(self._first_bundle)
-        except (BundleError, UpdateError, ProcessError) as error:
-            self._life.last_refusal = str(error)
-            self._teller.event(None, "update_refused", {"reason": str(error)})
 
     def _work(self, time: float) -> None:
         with contextlib.suppress(LateError):

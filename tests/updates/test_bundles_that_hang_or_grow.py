@@ -131,6 +131,61 @@ def test_a_first_bundle_that_took_the_gateway_down_is_not_tried_again(gateway: G
     assert bundles.WENT_DOWN in gateway.described()["refusal"]
 
 
+class Killer:
+    """Kills the process for graphs each time that it starts, as a kernel does whose memory is short."""
+
+    def __init__(self, graphs: GraphProcess) -> None:
+        self.killed: set[int] = set()
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._kill, args=(graphs,), daemon=True)
+
+    def _kill(self, graphs: GraphProcess) -> None:
+        while not self._over.wait(0.002):
+            if (pid := graphs.pid) is not None:
+                os.kill(pid, signal.SIGKILL)
+                self.killed.add(pid)
+
+    def __enter__(self) -> Killer:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._thread.join()
+
+
+def test_a_process_that_is_killed_again_and_again_is_held_against_no_bundle(gateway: Gateway) -> None:
+    """Neither the first one, a candidate at its self-test or after its shadow run, nor one on probation."""
+    assert isinstance(gateway.graphs, GraphProcess)
+    gateway.stop()
+    with Killer(gateway.graphs) as killer:
+        gateway.start(first_bundle=write_tiny_bundle(gateway.folder / "first", offset=4.0).folder)
+        gateway.run(1.0)
+        assert 2 <= len(killer.killed) <= 4, "each pause is twice as long as the one before"
+        assert "was killed (signal 9): is memory short?" in gateway.updates.health
+    gateway.run(3.0)
+    first = gateway.updates.active()
+    assert first is not None
+    assert gateway.updates.health == ""
+    candidate = send(gateway)
+    with Killer(gateway.graphs):
+        gateway.run(2.0)
+    gateway.run(4.0)
+    assert gateway.described()["candidate"] == candidate.label
+    gateway.run(25.0)
+    with Killer(gateway.graphs):
+        gateway.run(6.0)
+    gateway.run(12.0)
+    assert gateway.active.name == candidate.label
+    with Killer(gateway.graphs):
+        gateway.run(26.0)
+    gateway.run(60.0)
+    assert gateway.active.name == candidate.label
+    assert gateway.described()["rejected"] == {}
+    assert gateway.described()["probation_until"] is None
+    assert gateway.kinds().count("update_failed") == 4, "once each time that it begins"
+
+
 def test_a_candidate_that_took_the_gateway_down_in_its_shadow_run_gives_way(gateway: Gateway) -> None:
     gateway.stop()
     gateway.start(first_bundle=write_tiny_bundle(gateway.folder / "first", offset=4.0).folder)
