@@ -112,6 +112,13 @@ class Crop:
     humidity_high: float = setting(unit="%", low=50, high=100, default=93.0, help="damper air invites disease")
     agronomy: Agronomy = setting(help="what no plan may leave", default_factory=Agronomy)
 
+    def __post_init__(self) -> None:
+        if self.end_date is not None and self.end_date < self.planting_date:
+            raise SettingError(f"end_date {self.end_date} lies before planting_date {self.planting_date}", "end_date")
+        if self.temperature_low >= self.temperature_high:
+            told = f"temperature_low {self.temperature_low:g} is not below temperature_high {self.temperature_high:g}"
+            raise SettingError(told, "temperature_low")
+
 
 @dataclass(frozen=True)
 class ElectricityTariff:
@@ -200,6 +207,8 @@ class SetpointLimits:
     )
 
     def __post_init__(self) -> None:
+        if self.low > self.high:
+            raise SettingError(f"low {self.low:g} is above high {self.high:g}", "low")
         if not self.low <= self.safe <= self.high:
             raise SettingError(f"safe {self.safe:g} is outside low {self.low:g} to high {self.high:g}", "safe")
 

@@ -52,6 +52,10 @@ _SECONDS = {
 }
 
 
+_NONE = ("none", "no", "false", "off", "nothing", "n/a", "-")
+"""What people write where there is none of something."""
+
+
 class SchemaError(IgrowError):
     """An error in a configuration file, with its place."""
 
@@ -201,7 +205,9 @@ class _Reader:
         hints = get_type_hints(schema)
         for key, (key_node, _) in pairs.items():
             if key not in fields:
-                raise self.error(key_node, f"{_join(where, key)} is not known: {nearest(key, fields)}")
+                above = next((name for name in fields if key in _names_in(hints[name])), None)
+                what = "is not known: " + nearest(key, fields) if above is None else f"stands below {above}, indented"
+                raise self.error(key_node, f"{_join(where, key)} {what}")
         values: dict[str, Any] = {}
         for name, field in fields.items():
             default = getattr(base, name) if type(base) is schema else _default(field)
@@ -222,6 +228,8 @@ class _Reader:
         if type(None) in kinds:
             if isinstance(node, yaml.ScalarNode) and node.style is None and node.value in ("", "null", "~"):
                 return None
+            if isinstance(node, yaml.ScalarNode) and node.style is None and node.value.lower() in _NONE:
+                raise self.error(node, f"{where} is {node.value!r}: where there is none, write null")
             kinds = tuple(kind for kind in kinds if kind is not type(None))
         if len(kinds) == 1:
             return self.read(node, kinds[0], where, limits, base)
@@ -257,6 +265,12 @@ class _Reader:
     def _bounds(self, node: yaml.Node, value: Any, low: Any, high: Any, what: str) -> None:
         if (low is not None and value < low) or (high is not None and value > high):
             raise self.error(node, what)
+
+
+def _names_in(kind: Any) -> set[str]:
+    """Return the keys of a dataclass of a schema, also where it may be left out; none of anything else."""
+    schemas = [one for one in (kind, *get_args(kind)) if dataclasses.is_dataclass(one)]
+    return {field.name for schema in schemas for field in dataclasses.fields(schema) if field.init}
 
 
 def _convert(text: str, kind: Any) -> Any:
