@@ -119,6 +119,17 @@ class Crop:
             told = f"temperature_low {self.temperature_low:g} is not below temperature_high {self.temperature_high:g}"
             raise SettingError(told, "temperature_low")
 
+    @property
+    def unlike_its_species(self) -> str:
+        """What is said of a crop that is no tomato and is described as one, in a sentence; empty for all others."""
+        plain = Crop()
+        told = ("dry_matter_fraction", "fruit_share", "days_to_harvest")
+        same = [f"{name} ({getattr(self, name):g})" for name in told if getattr(self, name) == getattr(plain, name)]
+        same += ["agronomy"] if self.agronomy == plain.agronomy else []
+        if not same or self.species.lower() == plain.species:
+            return ""
+        return f"crop.species is {self.species}, but {', '.join(same)} are those of a tomato: state this crop's own"
+
 
 @dataclass(frozen=True)
 class ElectricityTariff:

@@ -104,5 +104,7 @@ def describe(configuration: Configuration) -> Iterator[str]:
         if path is not None and not path.is_file():
             yield f"  note      {key}: {path} is not there"
     yield f"planning    {_planning(configuration)}"
+    if site.crop.unlike_its_species:
+        yield f"  note      {site.crop.unlike_its_species}"
     if file.updates.enabled and configuration.trusted_root is None:
         yield "updates     off: no updates.trusted_root, so nothing could be verified"

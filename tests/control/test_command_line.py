@@ -67,6 +67,26 @@ def test_check_config_says_what_a_configuration_means(tmp_path, capsys):
     assert "interlock wind: NOT AT WORK, as nothing that it moves can be written (vent_" in out
 
 
+def test_check_config_names_files_that_are_not_there_and_a_crop_that_is_described_as_another(tmp_path, capsys):
+    path = write_files(tmp_path, 5020)
+    more = (
+        "transfer: {known_hosts: hosts, identity: key}\nupdates: {trusted_root: root.json}\n"
+        "exchange: sftp://igrow@trainer.example/srv/igrow\n"
+    )
+    path.write_text(path.read_text() + more)
+    (tmp_path / "site.yaml").write_text((tmp_path / "site.yaml").read_text() + "crop: {species: lettuce}\n")
+    code, out, _ = call(capsys, "check-config", path)
+    assert code == 0
+    for key, name in (
+        ("transfer.known_hosts", "hosts"),
+        ("transfer.identity", "key"),
+        ("updates.trusted_root", "root.json"),
+    ):
+        assert f"note      {key}: {tmp_path / name} is not there" in out
+    assert "crop.species is lettuce, but dry_matter_fraction (0.09), fruit_share (0.7)" in out
+    assert "agronomy are those of a tomato: state this crop's own" in out
+
+
 def test_an_override_is_left_for_the_daemon_and_given_back(tmp_path, capsys):
     path = write_files(tmp_path, 5020)
     leases = tmp_path / "state" / "override.json"

@@ -12,6 +12,8 @@ from benchmarks.forecasts.totals import daily_totals
 from igrow.core.arrays import Array
 from igrow.core.simulator import actuation
 from igrow.core.simulator.hybrid.nominal import nominal, site_record
+from igrow.core.telemetry import Telemetry, concatenate
+from igrow.trainer.data import prepare_log
 from igrow.trainer.fit.actuation import by_its_own_rules, fit_actuation, setpoint_columns
 from igrow.trainer.fit.climate import site_prior
 from tests.virtual_log import SITE, virtual_log
@@ -88,3 +90,12 @@ def test_daily_totals_of_heat_and_co2_follow_from_setpoints() -> None:
     for name in ("heat (MJ m-2)", "lamp electricity (kWh m-2)", "CO2 (kg m-2)"):
         predicted, measured = totals[name]
         assert abs(predicted.sum() / measured.sum() - 1.0) < 0.15, name
+
+
+def test_a_gap_that_is_longer_than_the_log_hides_no_setpoints() -> None:
+    table = virtual_log(8, seed=1)
+    late = Telemetry(table.time + np.timedelta64(20, "D"), table.columns)
+    log = prepare_log(concatenate([table, late]), SITE)
+    setpoints, inferred = setpoint_columns(log.telemetry, log.record())
+    assert inferred == ()
+    assert np.isin(setpoints["heating_setpoint"][:600], (17.0, 20.0)).mean() > 0.9

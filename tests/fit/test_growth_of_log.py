@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from igrow.core.agronomy import Agronomy
 from igrow.core.local_time import to_local
 from igrow.core.simulator.crop import CropStages
 from igrow.core.simulator.growth import GrowthFit, prior_of
@@ -121,9 +122,11 @@ def test_a_crop_that_is_described_as_another_is_told_to_state_its_own(before: Cr
     site = replace(SITE, crop=Crop(species="cucumber", dry_matter_fraction=0.03))
     fit = GrowthFit(before.conversion, before.maintenance, prior_of(before), 0, (), float("nan"))
     told = growth_notes(site, before, fit)[1]
-    missing = "fruit_share (0.7), days_to_harvest (47)"
+    missing = "fruit_share (0.7), days_to_harvest (47), agronomy"
     assert told == f"crop.species is cucumber, but {missing} are those of a tomato: state this crop's own"
-    for crop in (Crop(), Crop(species="cucumber", dry_matter_fraction=0.03, fruit_share=0.6, days_to_harvest=14)):
+    own = Agronomy(dark_hours=4.0)
+    described = Crop(species="cucumber", dry_matter_fraction=0.03, fruit_share=0.6, days_to_harvest=14, agronomy=own)
+    for crop in (Crop(), described):
         assert growth_notes(replace(SITE, crop=crop), before, fit) == (fit.sentence,)
 
 

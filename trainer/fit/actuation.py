@@ -44,9 +44,11 @@ def setpoint_columns(telemetry: Telemetry, record: Record) -> tuple[dict[str, Fl
     grid = to_grid(telemetry, int(record.step))
     inferred = []
     columns: dict[str, Floats] = {}
+    # A gap in the log says nothing of what its rows hold.
+    logged = np.isfinite(record.measured["air_temperature"])
     for name in SETPOINTS:
         values = grid.columns.get(name, np.full(len(record), np.nan))
-        if np.isfinite(values).mean() > 0.5:
+        if np.isfinite(values[logged]).sum() > 0.5 * logged.sum():
             columns[name] = gaps.held(values)
             continue
         inferred.append(name)

@@ -18,7 +18,7 @@ from igrow.core.simulator.crop import CropStages
 from igrow.core.simulator.growth import Count, GrowthDays, GrowthFit, fit_growth, prior_of, warmth
 from igrow.core.simulator.hybrid import climate
 from igrow.core.simulator.hybrid.record import Record, observe
-from igrow.core.site import Crop, Site
+from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import Log
 from igrow.trainer.data.source import DailyTable
@@ -106,7 +106,7 @@ def growth_since(
 
 def growth_notes(site: Site, before: CropStages, fit: GrowthFit) -> tuple[str, ...]:
     """Return what a grower must know of a fit of growth, in sentences."""
-    notes = [fit.sentence, *_another_crop(site.crop)]
+    notes = [fit.sentence, *filter(None, [site.crop.unlike_its_species])]
     spread = float(np.sqrt(prior_of(before)[0, 0]))
     if fit.counts and abs(fit.conversion - before.conversion) > FAR * spread:
         notes.append(
@@ -115,17 +115,6 @@ def growth_notes(site: Site, before: CropStages, fit: GrowthFit) -> tuple[str, .
             f"({site.crop.fruit_share:g}) and days_to_harvest ({site.crop.days_to_harvest:g}) those of this crop?"
         )
     return tuple(notes)
-
-
-def _another_crop(crop: Crop) -> list[str]:
-    """Return what must be said of a crop that is no tomato but is described as one, in sentences."""
-    if crop.species.lower() == "tomato":
-        return []
-    told = ("dry_matter_fraction", "fruit_share", "days_to_harvest")
-    same = [f"{name} ({getattr(crop, name):g})" for name in told if getattr(crop, name) == getattr(Crop(), name)]
-    if not same:
-        return []
-    return [f"crop.species is {crop.species}, but {', '.join(same)} are those of a tomato: state this crop's own"]
 
 
 def growth_days(record: Record, parameters: Mapping[str, float], time_zone: str) -> tuple[np.datetime64, GrowthDays]:
