@@ -134,6 +134,7 @@ def test_without_wind_a_leak_is_among_what_it_could_be_whatever_is_named(leaky_l
     assert all("wind_infiltration" in one.confounded[1:] for one in result.findings)
     assert "calm with a windy night" in result.findings[0].separating_test
     assert "it could be wind_infiltration" in result.summary()
+    assert "wind_infiltration" not in result.untestable, "the report said both, in one breath"
 
 
 def test_an_effect_that_is_taken_out_is_not_named(leaky_log: Log) -> None:

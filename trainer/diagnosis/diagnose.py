@@ -127,6 +127,7 @@ def diagnose(
         *((wording.NEWEST,) if log is not given else ()),
         *((opened.sentence,) if opened is not None and off else ()),
     )
+    told = {name for one in findings for name in one.confounded}
     return Diagnosis(
         site=site.name,
         verdict=verdict,
@@ -139,7 +140,10 @@ def diagnose(
         screened=log.screened,
         model=model,
         corrected=remembering(corrected, result.parameter, rules),
-        untestable=first.design.untestable,
+        # What is told as a cause that it may as well be is not told as one that nothing can be said of.
+        untestable=tuple(
+            name for name in first.design.untestable if not any(name in one.confounded for one in findings)
+        ),
         missing=logged.record.missing,
         notes=notes,
         evidence=Evidence(
