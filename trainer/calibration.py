@@ -22,6 +22,7 @@ from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.data import Log
 from igrow.trainer.data.splits import alternate_weeks
 from igrow.trainer.diagnosis import DEFAULT, discrepancy_of, examine, history_of
+from igrow.trainer.diagnosis.wording import thin_air
 from igrow.trainer.fit.actuation import by_its_own_rules, fit_actuation, setpoint_columns
 from igrow.trainer.fit.climate import fit_climate
 from igrow.trainer.fit.evaluation import held_out_errors
@@ -99,7 +100,7 @@ def calibrate(
             read_bundle(default_bundle_folder()).manifest.training_range,
         ),
         errors=_held_out_errors(record, before.posterior, say),
-        notes=(*_notes(record, inferred), *counted),
+        notes=(*_notes(record, inferred), *counted, *thin_air(site)),
     )
     model = replace(model, omission=_omission(record, model, say))
     return _with_discrepancy(model.completed() if complete else model, record, log.days, population, say)

@@ -9,6 +9,7 @@ import pytest
 
 from igrow.core.bundle import Estimate
 from igrow.core.effects import EFFECTS
+from igrow.core.site import Site
 from igrow.trainer.diagnosis import wording
 from igrow.trainer.diagnosis.candidates import Candidate, Pattern
 from igrow.trainer.diagnosis.estimate import Estimated
@@ -79,3 +80,10 @@ def test_a_discrepancy_is_told_by_its_hours_weather_and_channels() -> None:
     assert (size.value, size.unit) == (5.0, "W m-2")
     assert size.high == pytest.approx(5.0 * (1.0 + 1.6449 / 10.0), rel=1e-4)
     assert found.p_value == 0.001
+
+
+def test_in_thin_air_it_is_said_which_amounts_are_told_too_large() -> None:
+    """Air of 3000 m weighs seven tenths of that at the sea, with which the simulator counts."""
+    assert wording.thin_air(Site(name="quito", latitude=0.5, longitude=-78.2, elevation=3000.0)) == (wording.THIN_AIR,)
+    assert "43 % at 3000 m" in wording.THIN_AIR
+    assert wording.thin_air(Site(name="madrid", latitude=40.4, longitude=-3.7, elevation=650.0)) == ()

@@ -125,6 +125,7 @@ def diagnose(
     notes = (
         *((wording.NOT_CALIBRATED,) if knowledge.transferred else ()),
         *((wording.NEWEST,) if log is not given else ()),
+        *wording.thin_air(site),
         *((opened.sentence,) if opened is not None and off else ()),
     )
     told = {name for one in findings for name in one.confounded}
