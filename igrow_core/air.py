@@ -6,6 +6,7 @@ traced. Temperatures are degC, pressures Pa, gas contents kg m-3.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from igrow.core.arrays import Array
@@ -24,6 +25,14 @@ LATENT_HEAT = 2.45e6
 """Heat of evaporation of water at 20 degC, J kg-1."""
 STEFAN_BOLTZMANN = 5.670374419e-8
 """W m-2 K-4."""
+
+
+def thinness(elevation: float) -> float:
+    """Return how many times denser air is at the sea than at an elevation in m; 1 below the sea.
+
+    Barometric formula of an atmosphere of 288 K, whose scale height is 8434 m.
+    """
+    return math.exp(max(elevation, 0.0) / 8434.0)
 
 
 def saturation_pressure(xp: Any, temperature: Array) -> Array:

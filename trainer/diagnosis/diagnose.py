@@ -128,7 +128,7 @@ def diagnose(
         *wording.thin_air(site),
         *((opened.sentence,) if opened is not None and off else ()),
     )
-    told = {name for one in findings for name in one.confounded}
+    possible = {name for one in findings for name in one.confounded}
     return Diagnosis(
         site=site.name,
         verdict=verdict,
@@ -141,10 +141,8 @@ def diagnose(
         screened=log.screened,
         model=model,
         corrected=remembering(corrected, result.parameter, rules),
-        # What is told as a cause that it may as well be is not told as one that nothing can be said of.
-        untestable=tuple(
-            name for name in first.design.untestable if not any(name in one.confounded for one in findings)
-        ),
+        # What a cause may as well be is told already.
+        untestable=tuple(name for name in first.design.untestable if name not in possible),
         missing=logged.record.missing,
         notes=notes,
         evidence=Evidence(

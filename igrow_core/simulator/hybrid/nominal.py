@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from igrow.core.air import thinness
 from igrow.core.arrays import Floats, Times
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.core.simulator.hybrid.record import Record, make_record
@@ -48,6 +49,9 @@ def nominal(site: Site) -> dict[str, float]:
     ):
         if screen is not None and reference is not None:
             scale(name, screen.saving, reference.saving)
+    # Content and ppm are converted as at the sea: what changes thinner air by so many ppm is so much less.
+    for name in ("dosing_share", "assimilation_maximum", "respiration"):
+        values[name] *= thinness(site.elevation)
     return _within_bounds(values)
 
 

@@ -289,7 +289,16 @@ _ROWS = (
         "CO2 that crop and substrate respire at 20 degC",
         "Vanthoor (2011)",
     ),
-    ("dosing_share", "1", 1.0, 0.08, 0.4, 1.3, "share of the dosed CO2 that reaches the air", "Nederhoff (1994)"),
+    (
+        "dosing_share",
+        "1",
+        1.0,
+        0.08,
+        0.4,
+        2.0,
+        "share of the dosed CO2 that reaches the air, times the air's density at the sea over that here",
+        "Nederhoff (1994)",
+    ),
 )
 
 PARAMETERS: Mapping[str, PhysicalParameter] = MappingProxyType({row[0]: PhysicalParameter(*row) for row in _ROWS})
