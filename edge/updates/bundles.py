@@ -15,7 +15,7 @@ from pathlib import Path
 from igrow.core.bundle import MANIFEST_FILE, Bundle, BundleError
 from igrow.edge.updates.rules import Graphs
 from igrow.edge.updates.shelf import Shelf
-from igrow.edge.updates.signed_source import Fetched, UpdateError
+from igrow.edge.updates.signed_source import BundleRefusedError, Fetched, UpdateError
 from igrow.edge.updates.state import UpdateState, load_state, save_in_place, save_state
 from igrow.edge.updates.telling import Teller, Verdict
 
@@ -83,7 +83,7 @@ class Bundles:
         """Take a bundle that an operator gives, into force; raises UpdateError, BundleError or ProcessError."""
         identity = _identity_of(folder)
         if identity == self.state.attempt or identity in self.state.rejected:
-            raise UpdateError(f"{folder}: {self.state.rejected.get(identity, WENT_DOWN)}")
+            raise BundleRefusedError(f"{folder}: {self.state.rejected.get(identity, WENT_DOWN)}")
         with self.attempt(identity):
             bundle: Bundle = self._call("take_folder", folder)
         with self.lock:

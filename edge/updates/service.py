@@ -17,7 +17,7 @@ from igrow.edge.updates.life import HOUR, BundleLife
 from igrow.edge.updates.rules import Graphs, ReportBox, UpdateRules, UpdateStore
 from igrow.edge.updates.shadow import Predictor
 from igrow.edge.updates.shelf import Shelf
-from igrow.edge.updates.signed_source import SignedSource, UpdateError
+from igrow.edge.updates.signed_source import BundleRefusedError, SignedSource, UpdateError
 from igrow.edge.updates.telling import Teller
 from igrow.edge.updates.wishes import Wishes, read_wishes
 from igrow.edge.updates.worsening import Worsening, find_worsening, worsening_sentence
@@ -190,8 +190,11 @@ class BundleUpdates:
         if self._bundles.state.active is None and self._first_bundle is not None:
             try:
                 self._bundles.install(self._first_bundle)
+                self._life.last_refusal = ""
             except (BundleError, UpdateError, ProcessError) as error:
                 self._life.last_refusal = str(error)
+                if isinstance(error, UpdateError) and not isinstance(error, BundleRefusedError):
+                    raise  # such as for a disk without room: another attempt may succeed
                 self._teller.event(None, "update_refused", {"reason": str(error)})
         self._begun = True
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -131,6 +133,23 @@ def test_a_first_bundle_that_took_the_gateway_down_is_not_tried_again(gateway: G
     assert bundles.WENT_DOWN in gateway.described()["refusal"]
 
 
+def test_a_first_bundle_that_the_disk_does_not_take_comes_into_force_once_it_does(gateway: Gateway) -> None:
+    gateway.stop()
+    first = write_tiny_bundle(gateway.folder / "first", offset=4.0)
+    shelf = gateway.folder / "updates" / "bundles"
+    shutil.rmtree(shelf, ignore_errors=True)
+    shelf.write_text("a file")
+    gateway.start(first_bundle=first.folder)
+    gateway.run(0.5)
+    assert gateway.updates.active() is None
+    assert str(shelf) in gateway.updates.health
+    shelf.unlink()
+    gateway.run(2.0)
+    assert gateway.active.name == first.label
+    assert (gateway.updates.health, gateway.described()["refusal"]) == ("", "")
+    assert gateway.kinds().count("update_failed") == 1
+
+
 class Killer:
     """Kills the process for graphs each time that it starts, as a kernel does whose memory is short."""
 
@@ -142,7 +161,8 @@ class Killer:
     def _kill(self, graphs: GraphProcess) -> None:
         while not self._over.wait(0.002):
             if (pid := graphs.pid) is not None:
-                os.kill(pid, signal.SIGKILL)
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGKILL)
                 self.killed.add(pid)
 
     def __enter__(self) -> Killer:
