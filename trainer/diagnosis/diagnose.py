@@ -52,6 +52,7 @@ def diagnose(
     nuisance: NuisanceSubspace | None = None,
     drift: Drift | None = None,
     progress: Report | None = None,
+    changed: str = "",
 ) -> Diagnosis:
     """Return the diagnosis of a log.
 
@@ -64,6 +65,7 @@ def diagnose(
         nuisance: what greenhouses show though nothing is missing (None: what came with the trainer).
         drift: how greenhouses like it change with time (None: what came with the trainer).
         progress: is told what is being done, in lines.
+        changed: the one parameter that is asked whether it has changed (empty: all).
 
     Raises:
         IgrowError: the log is shorter than a week, or lacks outdoor or air temperature.
@@ -94,13 +96,13 @@ def diagnose(
     found = [replace(one, confounded=(*one.confounded, *rivals)) for one in found]
     # A parameter can stand in for an actuator that the log lacks, found or not.
     lacking = not set(REPLACEABLE).isdisjoint(logged.record.missing)
-    parameter = None if lacking else search.changed_parameter(rng)
+    parameter = None if lacking else search.changed_parameter(rng, changed)
     patterns = last.patterns
     if parameter is not None and parameter.onset is not None:
-        if parameter.leads or not (found or patterns):
+        if parameter.leads or not patterns:
             again = partial(
                 diagnose, model=model, without=without, seed=seed, rules=rules, nuisance=nuisance, drift=drift,
-                progress=progress,
+                progress=progress, changed=parameter.parameter,
             )  # fmt: skip
             told = _since(parameter, log.select(parameter.onset.time), again, rules)
             if told is not None:
@@ -111,7 +113,7 @@ def diagnose(
         found, patterns = [], ()
     say("correcting the model")
     result = correct(days, knowledge, found, patterns, site.longitude, rules)
-    if parameter is not None and not (result.kept or patterns):
+    if parameter is not None and not patterns:
         result = with_parameter(days, knowledge, result, parameter, rules)
     verdict, findings = _verdict(completed, result, patterns, rules)
     stages = _stages(result, completed, logged)
