@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import tarfile
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -145,6 +146,24 @@ def test_an_archive_that_holds_itself_for_ever_ends(tmp_path: Path, capsys) -> N
     assert imported(tmp_path, export="export.zip") == 2
     told = capsys.readouterr().err
     assert "no table in it (CSV, Excel or Parquet): it holds more.zip" in told
+    assert told.count("\n") == 1
+
+
+@pytest.mark.parametrize("name", ["export.7z", "export.rar", "export.csv", "export.tar.gz"])
+def test_an_archive_of_another_kind_is_told_as_one(tmp_path: Path, log: Telemetry, capsys, name: str) -> None:
+    content = (
+        b"Rar!\x1a\x07\x01\x00" + bytes(range(256))
+        if name != "export.7z"
+        else b"7z\xbc\xaf\x27\x1c\x00\x04" + bytes(99)
+    )
+    (tmp_path / name).write_bytes(content)
+    if name == "export.tar.gz":
+        written(log, PLAIN).to_csv(tmp_path / "log.csv", index=False)
+        with tarfile.open(tmp_path / name, "w:gz") as archive:
+            archive.add(tmp_path / "log.csv", "log.csv")
+    assert imported(tmp_path, export=name) == 2
+    told = capsys.readouterr().err
+    assert f"{name}: is an archive that is not read: unpack it, and give the folder" in told
     assert told.count("\n") == 1
 
 

@@ -50,6 +50,8 @@ class Cells:
 _MARKS = (b"\xff\xfe", b"\xfe\xff")
 """Of texts in UTF-16, which are full of zeros."""
 _ZIP, _OLD_WORKBOOK, _PDF = b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"%PDF"
+_OTHER_ARCHIVES = (b"7z\xbc\xaf\x27\x1c", b"Rar!")
+_TAR, _TAR_AT = b"ustar", 257
 
 
 def is_text(path: Path) -> bool:
@@ -77,6 +79,8 @@ def _refuse_what_is_no_text(path: Path, data: bytes) -> None:
         _PDF: "a PDF: a table is needed, such as CSV or Excel",
     }
     told = next((text for start, text in what.items() if data.startswith(start)), None)
+    if data.startswith(_OTHER_ARCHIVES) or data[_TAR_AT:].startswith(_TAR):
+        told = "an archive that is not read: unpack it, and give the folder, or a zip archive of it"
     if told is None and re.match(rb"\s*<(!doctype|html|table|\?xml)", data[:200], re.IGNORECASE):
         told = "a page of HTML or XML: open it in a spreadsheet and save it as CSV or .xlsx"
     if told is None and re.match(rb"\s*(\{\s*\"|\[\s*[\[{])", data[:200]):
