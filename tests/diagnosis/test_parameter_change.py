@@ -105,6 +105,10 @@ def test_every_parameter_that_may_be_named_has_words_in_every_language() -> None
             assert sentences.title(name, speak(code, SITE.time_zone)) != visible.title
 
 
+def test_air_that_leaks_may_come_in_by_a_vent_that_does_not_close() -> None:
+    assert all("vents" in VISIBLE[name].check for name in ("leakage_still", "leakage_wind"))
+
+
 @pytest.fixture(scope="module")
 def log() -> tuple[Telemetry, Telemetry]:
     """The same weeks twice: with the cover as it was, and with a third of its light taken."""

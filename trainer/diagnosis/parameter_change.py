@@ -23,7 +23,7 @@ from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.fit.climate import bounds
 
 _COVER = N_("compare the light above the cover and below it; look for dirt, shading paint and wet glass")
-_GAPS = N_("look for open panes, doors and gaps, and compare a calm night with a windy one")
+_GAPS = N_("look for open panes, doors, gaps and vents that do not close, and compare a calm night with a windy one")
 _SCREEN = N_("close the screen by day and look for gaps, tears and light at its edges")
 _PIPES = N_("feel the pipes along their length; check pump, valve and air in the pipes")
 _LAMPS = N_("count the lamps that burn, and compare their power and their light with those of the weeks before")
