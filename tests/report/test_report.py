@@ -133,6 +133,22 @@ def test_a_greenhouse_without_lamps_is_told_what_a_cause_costs(leak: Diagnosis, 
     assert np.isfinite(json.loads((tmp_path / "unlit" / "diagnosis.json").read_text())["findings"][0]["eur_per_week"])
 
 
+def test_a_greenhouse_that_is_never_heated_pays_for_no_heat(leak: Diagnosis) -> None:
+    """An unheated tunnel was told which heat a cause takes from it, and at what price."""
+    (finding,) = leak.findings
+    heated, evidence, site = worth(leak, finding), leak.evidence, leak.model.site
+    assert heated is not None
+    assert evidence is not None
+    cold = replace(site, greenhouse=replace(site.greenhouse, heating_capacity=0.0, lamps=None))
+    found = worth(replace(leak, model=replace(leak.model, site=cold)), finding)
+    assert found is not None
+    assert (found.heat, found.co2) == (0.0, heated.co2)
+    record = evidence.log.record
+    undosed = replace(record, inputs={**record.inputs, "co2_dosing": np.zeros(len(record))})
+    tunnel = replace(leak, evidence=replace(evidence, log=replace(evidence.log, record=undosed)))
+    assert worth(replace(tunnel, model=replace(leak.model, site=cold)), finding) is None
+
+
 def test_rivals_are_sentences_and_each_has_its_check(leak: Diagnosis) -> None:
     rivals = ("wind_infiltration", "vent_backlash", "screen_gap")
     page = render_report(replace(leak, findings=(replace(leak.findings[0], confounded=rivals),)))

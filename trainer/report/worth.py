@@ -62,6 +62,9 @@ def worth(result: Diagnosis, finding: Finding) -> Worth | None:
         return None
     full, less = _needed(record, stage), _needed(record, reduced)
     taken = {name: full[name] - less[name] for name in full}
+    if site.greenhouse.heating_capacity == 0.0:
+        # What is never heated is colder or warmer, and nobody pays for it.
+        taken["heat"] = np.zeros(len(record))
     paid = _PAID.get(finding.effect)
     if paid is not None:
         taken[paid] = _brought_in(record, stage, finding.effect, paid)
@@ -70,6 +73,8 @@ def worth(result: Diagnosis, finding: Finding) -> Worth | None:
     lamps = site.greenhouse.lamps
     # A greenhouse without lamps pays for no light; their efficacy is 0 there.
     electricity = np.zeros(len(record)) if lamps is None else taken["light"] / lamps.efficacy / 3.6e6
+    if not (sums["heat"] or sums["co2"] or electricity.any()):
+        return None
     price = electricity_price(site.prices, record.time, site.time_zone)
     money = (
         site.prices.heat * 1e-6 * sums["heat"]
