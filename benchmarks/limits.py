@@ -17,14 +17,14 @@ from datetime import time, timedelta
 import numpy as np
 from numpy.typing import NDArray
 
-from igrow.core.agronomy import Agronomy, Band, Place, Rest
+from igrow.core.agronomy import Place
 from igrow.core.agronomy.inspection import violations
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.planner import Budget, PlanningState, optimise
 from igrow.core.planner.optimise import RADIATION
 from igrow.core.quantities import SETPOINTS
 from igrow.core.simulator.plan import BundleSimulator
-from igrow.core.site import Greenhouse, Site
+from igrow.core.site import Agronomy, Band, Greenhouse, Rest, Site
 
 ZONES = ("Europe/Amsterdam", "UTC", "Asia/Kolkata", "America/New_York", "Australia/Adelaide", "Asia/Kathmandu")
 HOURS = 48

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from igrow.core.agronomy.limits import Agronomy
 from igrow.core.language import N_
 from igrow.core.planner.explain import PARTS, SAME, Amount, Change, limits_in_force
 from igrow.core.quantities import SETPOINTS
+from igrow.core.site import Agronomy
 from igrow.edge.page.svg import Stretch
 from igrow.edge.page.words import Words
 

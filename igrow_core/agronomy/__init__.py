@@ -1,6 +1,7 @@
 """What a crop must be given and must be spared, whatever it would earn: limits, not prices.
 
-limits    what the site's crop states, each with its unit and its source
+The limits themselves are the site's (`igrow.core.site.Agronomy`), each with its unit and its source.
+
 moment    what the calendar and the sun say of an instant: night, local day, working hours
 memory    what has stood in the greenhouse so far, as far as limits count it
 hold      the nearest setpoints that leave no limit, and the limits that stood in the way
@@ -10,19 +11,15 @@ so that no plan leaves a limit, and what leads in place of a plan does not eithe
 """
 
 from igrow.core.agronomy.hold import NO_SUN, Held, SunToCome, hold, sun_to_come
-from igrow.core.agronomy.limits import Agronomy, Band, Rest
 from igrow.core.agronomy.memory import Memory, observe, one_of, remember
 from igrow.core.agronomy.moment import Moment, Place, moment
 
 __all__ = [
     "NO_SUN",
-    "Agronomy",
-    "Band",
     "Held",
     "Memory",
     "Moment",
     "Place",
-    "Rest",
     "SunToCome",
     "hold",
     "moment",

@@ -5,14 +5,10 @@ from __future__ import annotations
 import datetime
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from igrow.core.agronomy.limits import Agronomy
 from igrow.core.local_time import zone
+from igrow.core.site import Agronomy, Site
 from igrow.core.sun import declination_and_equation, position
-
-if TYPE_CHECKING:
-    from igrow.core.site import Site
 
 PHOTONS = 2.1
 """umol of PAR per J of global radiation: 46 % of it is PAR, at 4.57 umol J-1."""

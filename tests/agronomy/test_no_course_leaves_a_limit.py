@@ -8,11 +8,11 @@ from datetime import time, timedelta
 import numpy as np
 import pytest
 
-from igrow.core.agronomy import Agronomy, Band, Memory, Place, Rest, remember
+from igrow.core.agronomy import Memory, Place, remember
 from igrow.core.agronomy.inspection import violations
 from igrow.core.planner.template import for_site
 from igrow.core.quantities import SETPOINTS
-from igrow.core.site import Site
+from igrow.core.site import Agronomy, Band, Rest, Site
 from igrow.core.telemetry import Telemetry
 
 UNKNOWN = np.full(4, np.nan)

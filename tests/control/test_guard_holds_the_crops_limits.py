@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from igrow.core.agronomy import Band, Place
+from igrow.core.agronomy import Place
 from igrow.core.agronomy.inspection import violations
-from igrow.core.site import Site
+from igrow.core.site import Band, Site
 from igrow.edge.guard import GuardRules, GuardState, PointRule, Request, guard
 from igrow.edge.image import Image, Quality, Value
 
