@@ -30,10 +30,10 @@ from igrow.core.arrays import Floats
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.greenhouse import tomato
 from igrow.core.planner import PlanResult
-from igrow.core.planner.objective import Outcome, Simulator
 from igrow.core.planner.recent_use import totals
 from igrow.core.planner.season import SeasonPlan, valued
 from igrow.core.planner.season.search import rule_and_strategy
+from igrow.core.simulator.outcome import Outcome, Simulator
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Site
 from igrow.trainer import FittedModel, Log, calibrate, compare, diagnose, export, prepare_log, read_model

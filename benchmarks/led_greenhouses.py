@@ -16,10 +16,10 @@ from igrow.core.greenhouse.parameters import stack
 from igrow.core.greenhouse.plant import Plant
 from igrow.core.greenhouse.sensors import EXACT
 from igrow.core.greenhouse.weather_table import WeatherTable
-from igrow.core.planner.objective import Outcome
 from igrow.core.planner.optimise import RADIATION
 from igrow.core.planner.template import Setpoints, for_site
 from igrow.core.quantities import SETPOINTS
+from igrow.core.simulator.outcome import Outcome
 from igrow.core.site import Site
 from igrow.core.sun import unix_seconds
 

@@ -26,13 +26,13 @@ from igrow.core.arrays import Floats
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.greenhouse import tomato
 from igrow.core.planner import Budget, EvolutionSettings, NumpyGeneration, PlanningState, PlanResult, optimise
-from igrow.core.planner.objective import Outcome, Simulator
 from igrow.core.planner.recent_use import grown_days, totals
 from igrow.core.planner.season import SeasonPlan, valued
 from igrow.core.planner.season.course import RADIATION
 from igrow.core.planner.season.search import rule_and_strategy
 from igrow.core.planner.template import for_site
 from igrow.core.quantities import SETPOINTS
+from igrow.core.simulator.outcome import Outcome, Simulator
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Site
 from igrow.edge.planning.make_plan import RECENT_DAYS

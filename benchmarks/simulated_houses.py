@@ -12,9 +12,9 @@ from benchmarks.strategies import beside
 from igrow.core.arrays import Floats
 from igrow.core.greenhouse import tomato
 from igrow.core.greenhouse.described import parameters_of
-from igrow.core.planner.objective import Outcome
 from igrow.core.planner.season.course import DAY, MORNING, believed
 from igrow.core.planner.season.crop import fresh, like, live, supplied
+from igrow.core.simulator.outcome import Outcome
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Site
 

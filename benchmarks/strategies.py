@@ -30,7 +30,7 @@ from igrow.core.arrays import Floats
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.economics import harvest_income, local_days
 from igrow.core.greenhouse import hourly_weather, recipe_by_hour
-from igrow.core.planner import Objective, Outcome, PlanningState, Simulator, optimise
+from igrow.core.planner import Objective, PlanningState, optimise
 from igrow.core.planner.recent_use import (
     SCALED,
     Corrected,
@@ -42,6 +42,7 @@ from igrow.core.planner.recent_use import (
 )
 from igrow.core.planner.template import for_site
 from igrow.core.quantities import SETPOINTS
+from igrow.core.simulator.outcome import Outcome, Simulator
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Site, load_site
 from igrow.core.sun import unix_seconds

@@ -16,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from igrow.core.bundle import read_bundle
-from igrow.core.planner.objective import Objective, Outcome
+from igrow.core.planner.objective import Objective
 from igrow.core.planner.season import SeasonPlan
 from igrow.core.planner.season.worth import CropWorth
 from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator.hindcast import HindcastPredictor
+from igrow.core.simulator.outcome import Outcome
 from igrow.core.site import Site, load_site
 from igrow.core.telemetry import Telemetry, read_csv, to_grid
 from igrow.trainer.service.archive import Archive

@@ -14,7 +14,7 @@ from igrow.core.agronomy import Place, remember
 from igrow.core.bundle import Bundle, read_bundle
 from igrow.core.co2_count import co2_since_planting
 from igrow.core.errors import IgrowError
-from igrow.core.planner import Budget, PlanningState, PlanResult, Simulator, optimise
+from igrow.core.planner import Budget, PlanningState, PlanResult, optimise
 from igrow.core.planner.explain import explain, limits_in_force
 from igrow.core.planner.onnx_generation import OnnxGeneration
 from igrow.core.planner.recent_use import (
@@ -34,6 +34,7 @@ from igrow.core.planner.template import for_site
 from igrow.core.planner.weather_ensemble import WeatherEnsemble
 from igrow.core.quantities import SETPOINTS
 from igrow.core.simulator.growth import GrowthBalance
+from igrow.core.simulator.outcome import Simulator
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Greenhouse, Site
 from igrow.core.telemetry import Telemetry

@@ -7,7 +7,7 @@ optimise   the loop: decode, simulate, value, select; the recipe competes and is
 """
 
 from igrow.core.planner.evolution import EvolutionSettings, NumpyGeneration
-from igrow.core.planner.objective import Objective, Outcome, Simulator
+from igrow.core.planner.objective import Objective
 from igrow.core.planner.optimise import Budget, PlanningState, PlanResult, optimise
 from igrow.core.planner.template import Template
 
@@ -16,10 +16,8 @@ __all__ = [
     "EvolutionSettings",
     "NumpyGeneration",
     "Objective",
-    "Outcome",
     "PlanResult",
     "PlanningState",
-    "Simulator",
     "Template",
     "optimise",
 ]

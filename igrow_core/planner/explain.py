@@ -12,10 +12,10 @@ import numpy as np
 
 from igrow.core.arrays import Floats, Integers
 from igrow.core.economics import Balance
-from igrow.core.planner.objective import Simulator
 from igrow.core.planner.optimise import PlanningState, PlanResult
 from igrow.core.planner.template import Setpoints, Template
 from igrow.core.quantities import QUANTITIES, SETPOINTS
+from igrow.core.simulator.outcome import Simulator
 
 PARTS = ("income", "heat", "electricity", "co2")
 WORDS = {"income": "growth", "heat": "heat", "electricity": "electricity", "co2": "CO2"}

@@ -13,9 +13,10 @@ from igrow.core.agronomy import Memory
 from igrow.core.arrays import Floats, Times
 from igrow.core.errors import IgrowError
 from igrow.core.planner.evolution import WORST, Generation, NumpyGeneration, draw
-from igrow.core.planner.objective import Objective, Outcome, Simulator, Valuation, Worth, cautious, damp_hours
+from igrow.core.planner.objective import Objective, Valuation, Worth, cautious, damp_hours
 from igrow.core.planner.template import Setpoints, Template, for_site
 from igrow.core.quantities import SETPOINTS, WEATHER
+from igrow.core.simulator.outcome import Outcome, Simulator
 from igrow.core.site import Site
 
 RADIATION = WEATHER.index("global_radiation")

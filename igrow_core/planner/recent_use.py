@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from igrow.core.arrays import Floats
-from igrow.core.planner.objective import Outcome, Simulator
 from igrow.core.simulator.growth import Count, GrowthBalance, GrowthDays, GrowthFit, regress, warmth
+from igrow.core.simulator.outcome import Outcome, Simulator
 from igrow.core.site import Crop, Greenhouse
 from igrow.core.telemetry import Telemetry
 
@@ -138,7 +138,7 @@ class Corrected:
     """K by which the air is warmer; growth was counted at the simulator's own temperatures, and stays there."""
 
     def simulate(self, initial: dict[str, float], weather: Floats, setpoints: Floats, start: np.datetime64) -> Outcome:
-        """Return what candidates do; see `objective.Simulator`."""
+        """Return what candidates do; see `igrow.core.simulator.outcome.Simulator`."""
         outcome = self.simulator.simulate(initial, weather, setpoints, start)
         changes = {name: self.factor[name] * getattr(outcome, name) for name in SCALED}
         changes["air_temperature"] = outcome.air_temperature + self.warmer

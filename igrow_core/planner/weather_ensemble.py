@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from igrow.core.arrays import Floats
-from igrow.core.planner.objective import Outcome, Simulator
+from igrow.core.simulator.outcome import Outcome, Simulator
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,10 @@ class WeatherEnsemble:
     """Each (H, 6), hourly means."""
 
     def simulate(self, initial: dict[str, float], weather: Floats, setpoints: Floats, start: np.datetime64) -> Outcome:
-        """Return what candidates do; see `objective.Simulator`. `weather` is not read: the courses stand for it."""
+        """Return what candidates do; see `igrow.core.simulator.outcome.Simulator`.
+
+        `weather` is not read: the courses stand for it.
+        """
         outcomes = [self.simulator.simulate(initial, course, setpoints, start) for course in self.courses]
         return Outcome(
             **{part.name: np.concatenate([getattr(one, part.name) for one in outcomes]) for part in fields(Outcome)}

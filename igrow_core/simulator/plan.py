@@ -10,11 +10,11 @@ from igrow.core import sun
 from igrow.core.arrays import Floats, Times
 from igrow.core.bundle import Bundle, BundleError, open_session
 from igrow.core.errors import IgrowError
-from igrow.core.planner.objective import Outcome
 from igrow.core.quantities import GROWTH, WEATHER
 from igrow.core.simulator.growth import GrowthBalance
 from igrow.core.simulator.hindcast import SimulatorSettings
 from igrow.core.simulator.hybrid.measurement import PREDICTED
+from igrow.core.simulator.outcome import Outcome
 from igrow.core.site import Greenhouse
 
 STEPS_PER_HOUR = 2
@@ -43,7 +43,7 @@ _USUAL = {
 
 
 class BundleSimulator:
-    """Runs simulator.onnx of a bundle; implements `igrow.core.planner.objective.Simulator`."""
+    """Runs simulator.onnx of a bundle; implements `igrow.core.simulator.outcome.Simulator`."""
 
     def __init__(self, bundle: Bundle, greenhouse: Greenhouse, *, members: int | None = None) -> None:
         """Open the graph.
@@ -77,7 +77,7 @@ class BundleSimulator:
         self._heat_paid = _heat_paid(greenhouse, dict(zip(names, self._parameters.T, strict=True)))
 
     def simulate(self, initial: dict[str, float], weather: Floats, setpoints: Floats, start: np.datetime64) -> Outcome:
-        """Return what candidates do; see `igrow.core.planner.objective.Simulator`.
+        """Return what candidates do; see `igrow.core.simulator.outcome.Simulator`.
 
         Raises:
             IgrowError: the horizon is not a number of whole days.

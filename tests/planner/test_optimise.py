@@ -10,10 +10,10 @@ import pytest
 
 from igrow.core.errors import IgrowError
 from igrow.core.planner import Budget, NumpyGeneration, Objective, PlanningState, PlanResult, optimise
-from igrow.core.planner.objective import Simulator
 from igrow.core.planner.onnx_generation import OnnxGeneration
 from igrow.core.planner.template import for_site
 from igrow.core.quantities import SETPOINTS
+from igrow.core.simulator.outcome import Simulator
 from igrow.core.site import Site
 from tests.planner.toy_greenhouse import HOURS, START, ToySimulator, with_planning
 

@@ -7,7 +7,6 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from igrow.core.planner import Outcome
 from igrow.core.planner.recent_use import (
     SCALED,
     Corrected,
@@ -19,6 +18,7 @@ from igrow.core.planner.recent_use import (
     warmer,
 )
 from igrow.core.simulator.growth import GrowthBalance
+from igrow.core.simulator.outcome import Outcome
 from igrow.core.site import Crop, Greenhouse
 from igrow.core.telemetry import Telemetry
 from tests.planner.toy_greenhouse import START, ToySimulator

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from igrow.core.planner import Outcome
+from igrow.core.simulator.outcome import Outcome
 from igrow.core.site import Site
 
 

@@ -15,8 +15,9 @@ import pytest
 
 from igrow.core.bundle import default_bundle_folder
 from igrow.core.co2_count import CO2Count, co2_since_planting
-from igrow.core.planner import Budget, Outcome, PlanResult, optimise
+from igrow.core.planner import Budget, PlanResult, optimise
 from igrow.core.quantities import SETPOINTS
+from igrow.core.simulator.outcome import Outcome
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 from igrow.edge.cli.plan import reasons

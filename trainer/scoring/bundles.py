@@ -15,9 +15,9 @@ from igrow.core.arrays import Floats, Integers
 from igrow.core.bundle import Bundle
 from igrow.core.effects import EFFECTS
 from igrow.core.errors import IgrowError
-from igrow.core.planner.objective import Outcome
 from igrow.core.quantities import SETPOINTS, WEATHER
 from igrow.core.simulator.hybrid.record import Record
+from igrow.core.simulator.outcome import Outcome
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Site
 from igrow.trainer.data import Log

@@ -12,11 +12,12 @@ from igrow.core.economics import Balance, harvest_income, local_days, running_co
 from igrow.core.greenhouse import tomato
 from igrow.core.greenhouse.parameters import GreenhouseParameters
 from igrow.core.greenhouse.tomato import Crop
-from igrow.core.planner.objective import DISBELIEF, OUTSIDE_PENALTY, Outcome, Simulator
+from igrow.core.planner.objective import DISBELIEF, OUTSIDE_PENALTY
 from igrow.core.planner.season.crop import fresh, like, live, supplied
 from igrow.core.planner.season.strategy import Strategy
 from igrow.core.planner.template import Setpoints, Template, for_site
 from igrow.core.quantities import WEATHER
+from igrow.core.simulator.outcome import Outcome, Simulator
 from igrow.core.site import Site
 
 DAY = np.timedelta64(86_400, "s")

@@ -16,10 +16,11 @@ from igrow.core.arrays import Floats, Times
 from igrow.core.economics import local_days, product_price
 from igrow.core.greenhouse.parameters import GreenhouseParameters
 from igrow.core.greenhouse.tomato import STAGES, Crop
-from igrow.core.planner.objective import DISBELIEF, Outcome
+from igrow.core.planner.objective import DISBELIEF
 from igrow.core.planner.season.course import Season, run_season
 from igrow.core.planner.season.crop import fresh, like, live, supplied
 from igrow.core.planner.season.strategy import Strategy
+from igrow.core.simulator.outcome import Outcome
 from igrow.core.site import Site
 
 STEP = 0.1

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from igrow.core.agronomy import Memory, one_of
 from igrow.core.greenhouse import generate_weather, hourly_weather, recipe_by_hour
-from igrow.core.planner.objective import Objective, Simulator
+from igrow.core.planner.objective import Objective
 from igrow.core.planner.optimise import RADIATION
 from igrow.core.planner.template import BLOCK_STARTS, for_site
 from igrow.core.quantities import SETPOINTS
+from igrow.core.simulator.outcome import Simulator
 from igrow.core.site import Site
 from igrow.trainer.research.policies.policy import ACTIONS, HOURS, OBSERVATIONS, PRESENT, chosen, observe, to_setpoints
 

@@ -20,7 +20,7 @@ from torch import nn
 
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.errors import IgrowError
-from igrow.core.planner.objective import Simulator
+from igrow.core.simulator.outcome import Simulator
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Site, load_site
 from igrow.trainer.exporting.wiring import finished_model

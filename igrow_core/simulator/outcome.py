@@ -1,0 +1,61 @@
+"""What every simulator says of candidates, in whatever way it works: climate, resources, growth and harvest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Protocol
+
+import numpy as np
+
+from igrow.core.arrays import Floats
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What B candidates do over H hours, by each of M members of an ensemble; all arrays (M, B, H).
+
+    A simulator without an ensemble has M = 1. Amounts belong to the hour, they are not cumulative.
+    """
+
+    air_temperature: Floats
+    """degC, mean of the hour or its end."""
+    air_humidity: Floats
+    """%."""
+    air_co2: Floats
+    """ppm."""
+    heat: Floats
+    """MJ m-2."""
+    electricity: Floats
+    """kWh m-2."""
+    co2: Floats
+    """kg m-2 dosed."""
+    net_growth: Floats
+    """kg m-2 of dry matter."""
+    fruit_fresh_weight: Floats
+    """kg m-2 harvested."""
+    leaf_area_index: Floats
+    """m2 m-2 of the leaves that grew it."""
+    outside: Floats
+    """How far the hour lies outside the training data, in widths of its range; 0 inside."""
+
+    def first(self, hours: int) -> Outcome:
+        """Return what happens in the first hours."""
+        return Outcome(**{one.name: getattr(self, one.name)[..., :hours] for one in fields(self)})
+
+    def last(self, hours: int) -> Outcome:
+        """Return what happens in the last hours."""
+        return Outcome(**{one.name: getattr(self, one.name)[..., -hours:] for one in fields(self)})
+
+
+class Simulator(Protocol):
+    """Anything that says what setpoints do: a bundle's graph, a model in numpy, the mechanistic greenhouse."""
+
+    def simulate(self, initial: dict[str, float], weather: Floats, setpoints: Floats, start: np.datetime64) -> Outcome:
+        """Return what candidates do.
+
+        Args:
+            initial: present value of quantities (climate, growth, yield, actuators), in the registry's units.
+            weather: (H, 6), the hours' means of `quantities.WEATHER`'s first six, in its order.
+            setpoints: (B, H, 4), in the order of `quantities.SETPOINTS`.
+            start: UTC time at which the first hour begins.
+        """
