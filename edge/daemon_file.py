@@ -5,17 +5,18 @@
 from __future__ import annotations
 
 import datetime
+import ipaddress
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
+from typing import Literal
 
 from igrow.core.quantities import QUANTITIES
-from igrow.core.yaml_schema import setting
+from igrow.core.yaml_schema import SettingError, setting
+from igrow.edge.alarm_levels import Level
 from igrow.edge.climate_alarms import ClimateAlarm
 from igrow.edge.guard_settings import GuardSettings, SensorSettings
-from igrow.edge.mqtt.settings import MqttSettings
-from igrow.edge.notifications.settings import NotificationSettings
-from igrow.edge.page.settings import PageSettings
+from igrow.edge.host_names import check_host
 from igrow.edge.sources.recipe import Recipe
 
 _SECOND = datetime.timedelta(seconds=1)
@@ -26,6 +27,8 @@ BUILT_IN_BUNDLE = "built_in"
 """What `bundle` says for the one that is installed with igrow."""
 STATUS_PORT = 8420
 """The one port that the systemd unit lets the daemon listen on (SocketBindAllow)."""
+PAGE_PORT = 8421
+"""The one port that the systemd unit lets the page listen on (SocketBindAllow)."""
 
 
 class ClockSource(Enum):
@@ -119,6 +122,71 @@ class TransferSettings:
     budget: int = setting(low=8, high=100_000, default=256, help="MB that may wait for the trainer's receipt")
     known_hosts: str | None = setting(default=None, help="file with the SFTP server's key; sftp needs one")
     identity: str | None = setting(default=None, help="file with our private key for SFTP, or null")
+
+
+@dataclass(frozen=True)
+class PageSettings:
+    """Where the grower's page is, and for how long one is signed in there."""
+
+    address: str = setting(
+        default="127.0.0.1", help="address to listen on; 127.0.0.1 is this machine alone, 0.0.0.0 every network"
+    )
+    port: int = setting(low=0, high=65535, default=PAGE_PORT, help="TCP port; 0 takes a free one")
+    names: tuple[str, ...] = setting(
+        default=(), help="names that browsers call this machine by, beside localhost and its addresses"
+    )
+    language: Literal["", "en", "nl", "de", "es", "zh"] = setting(
+        default="", help="of the page: en, nl, de, es or zh; empty: what each browser asks for"
+    )
+    session: datetime.timedelta = setting(
+        low=_HOUR, high=30 * 24 * _HOUR, default=12 * _HOUR, help="how long a sign-in lasts"
+    )
+
+    def __post_init__(self) -> None:
+        try:
+            ipaddress.ip_address(self.address)
+        except ValueError:
+            raise SettingError(
+                f"{self.address!r} is no address: 127.0.0.1, ::1 or 0.0.0.0 is right", "address"
+            ) from None
+
+
+@dataclass(frozen=True)
+class NotificationSettings:
+    """Who is told of alarms, and how often."""
+
+    services: tuple[str, ...] = setting(default=(), help="Apprise addresses, such as ntfys://ntfy.example/greenhouse")
+    level: Level = setting(default=Level.WARNING, help="least level that is told: notice, warning or critical")
+    ends: bool = setting(default=True, help="tell when an alarm is over, too")
+    repeat: datetime.timedelta = setting(
+        low=5 * _MINUTE, high=7 * _DAY, default=datetime.timedelta(hours=4), help="told again until acknowledged"
+    )
+    most_per_hour: int = setting(low=1, high=60, default=6, help="messages an hour; the rest come together later")
+    silent_daemon: datetime.timedelta = setting(
+        low=_MINUTE, high=_DAY, default=5 * _MINUTE, help="silence of the daemon after which that is told"
+    )
+
+
+@dataclass(frozen=True)
+class MqttSettings:
+    """Where the state is published, and whether anything may come back."""
+
+    host: str | None = setting(default=None, help="the broker, or null: nothing is published")
+    port: int = setting(low=1, high=65535, default=1883, help="its port; 8883 is usual with TLS")
+    tls: bool = setting(default=False, help="true encrypts, and checks the broker's certificate")
+    username: str | None = setting(default=None, help="name at the broker, or null")
+    password_file: str | None = setting(default=None, help="file that holds the password alone, or null")
+    prefix: str = setting(default="igrow", help="first part of every topic")
+    discovery: str | None = setting(default="homeassistant", help="Home Assistant's discovery prefix, or null")
+    every: datetime.timedelta = setting(low=_SECOND, high=_HOUR, default=10 * _SECOND, help="pace of publishing")
+    permit_override: bool = setting(default=False, help="true lets messages override setpoints within the limits")
+    override_for: datetime.timedelta = setting(
+        low=60 * _SECOND, high=24 * _HOUR, default=2 * _HOUR, help="how long such an override lasts"
+    )
+
+    def __post_init__(self) -> None:
+        if self.host is not None:
+            check_host(self.host)
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,7 @@ from collections.abc import Iterator
 from igrow.core.bundle import Bundle, read_bundle
 from igrow.edge.cli.common import add_configuration, configuration_of
 from igrow.edge.configuration import Configuration
-from igrow.edge.daemon_file import STATUS_PORT, ClockSource
-from igrow.edge.page.settings import PAGE_PORT, PageSettings
+from igrow.edge.daemon_file import PAGE_PORT, STATUS_PORT, ClockSource, PageSettings
 from igrow.edge.registers.bus_load import estimate
 from igrow.edge.registers.model import SYSTEM_POINTS
 

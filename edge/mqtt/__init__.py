@@ -4,7 +4,6 @@
 broker that is down, slow or hostile holds nothing. It only reads, unless `mqtt.permit_override` lets it do what
 `igrow-edge override` does: within the guard's limits, for a time that ends by itself.
 
-- `settings.py`: the section `mqtt` of the daemon's file.
 - `topics.py`: the daemon's state as topics and payloads, and Home Assistant's discovery; no network.
 - `commands.py`: what a message from the broker may do.
 - `bridge.py`: the connection.

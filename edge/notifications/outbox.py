@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 
 from igrow.edge.alarm_levels import Level
-from igrow.edge.notifications.settings import NotificationSettings
+from igrow.edge.daemon_file import NotificationSettings
 
 HOUR = 3600.0
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import datetime
 
 from igrow.edge.alarm_levels import Level
+from igrow.edge.daemon_file import NotificationSettings
 from igrow.edge.notifications.outbox import Alarm, Outbox
-from igrow.edge.notifications.settings import NotificationSettings
 
 SETTINGS = NotificationSettings()
 COLD = {"climate too_cold": Alarm("too cold: now 9.5", Level.CRITICAL)}

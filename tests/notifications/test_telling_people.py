@@ -13,6 +13,7 @@ import pytest
 
 from igrow.core.errors import IgrowError
 from igrow.edge.alarm_levels import Level
+from igrow.edge.daemon_file import NotificationSettings
 from igrow.edge.notifications import notifier as module
 from igrow.edge.notifications import sending
 from igrow.edge.notifications.acknowledged import acknowledge, read_acknowledged
@@ -20,7 +21,6 @@ from igrow.edge.notifications.notifier import Notifier, send_to_all
 from igrow.edge.notifications.outbox import Message
 from igrow.edge.notifications.sending import MOST_BYTES
 from igrow.edge.notifications.services import open_services
-from igrow.edge.notifications.settings import NotificationSettings
 
 
 class Daemon:

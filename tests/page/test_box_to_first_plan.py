@@ -18,7 +18,7 @@ import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 
-from igrow.edge.page.settings import PAGE_PORT
+from igrow.edge.daemon_file import PAGE_PORT
 from tests.control.daemon_bench import free_port
 from tests.page.page_bench import ROOT, found_in
 from tests.patience import PATIENCE
