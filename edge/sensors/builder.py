@@ -10,31 +10,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
 
 from igrow.core.quantities import with_unit
 from igrow.edge.bus.errors import NoValueError, TurnedWordsError
 from igrow.edge.image import MISSING, Image, Quality, Value
 from igrow.edge.sensors.belief import Belief
-from igrow.edge.sensors.contact import Contact
+from igrow.edge.sensors.contact import Contact, RawReading
 from igrow.edge.sensors.pairs import PAIR_CHECKS, PairContext, TwinSensors, suspects
 from igrow.edge.sensors.rules import SensorRule
 from igrow.edge.sensors.sense import Sense, Shown
 
 NO_NUMBER = "the register holds no number"
-
-
-class RawReading(Protocol):
-    """What the bus gives for one point: a value or an error, and when, on any clock."""
-
-    @property
-    def value(self) -> float | None: ...  # noqa: D102
-
-    @property
-    def error(self) -> Exception | None: ...  # noqa: D102
-
-    @property
-    def at(self) -> float: ...  # noqa: D102
 
 
 @dataclass(slots=True)

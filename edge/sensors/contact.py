@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from igrow.edge.bus.errors import (
     AddressRefusedError,
@@ -14,8 +14,18 @@ from igrow.edge.bus.errors import (
     UnknownPointError,
 )
 
-if TYPE_CHECKING:
-    from igrow.edge.sensors.builder import RawReading
+
+class RawReading(Protocol):
+    """What the bus gives for one point: a value or an error, and when, on any clock."""
+
+    @property
+    def value(self) -> float | None: ...  # noqa: D102
+
+    @property
+    def error(self) -> Exception | None: ...  # noqa: D102
+
+    @property
+    def at(self) -> float: ...  # noqa: D102
 
 
 class Contact:
