@@ -19,12 +19,11 @@ from igrow.trainer.diagnosis.correction import (
     stands,
     with_parameter,
 )
-from igrow.trainer.diagnosis.estimate import Estimated
+from igrow.trainer.diagnosis.estimate import Estimated, OnsetInterval
 from igrow.trainer.diagnosis.freerun import FreeRuns, Stage
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, knowledge_of
 from igrow.trainer.diagnosis.linear import Term
 from igrow.trainer.diagnosis.parameter_change import ParameterChange
-from igrow.trainer.diagnosis.result import OnsetInterval
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.diagnosis.wording import discrepancy, finding

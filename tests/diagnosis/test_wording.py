@@ -12,10 +12,10 @@ from igrow.core.effects import EFFECTS
 from igrow.core.site import Site
 from igrow.trainer.diagnosis import wording
 from igrow.trainer.diagnosis.candidates import Candidate, Pattern
-from igrow.trainer.diagnosis.estimate import Estimated
+from igrow.trainer.diagnosis.estimate import Estimated, OnsetInterval
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
 from igrow.trainer.diagnosis.linear import Term
-from igrow.trainer.diagnosis.result import OnsetInterval, plain
+from igrow.trainer.diagnosis.result import plain
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.diagnosis.search import Hypothesis
 

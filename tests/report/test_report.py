@@ -23,7 +23,7 @@ from igrow.trainer.data.plausibility import find_faults
 from igrow.trainer.data.plot import plot_log
 from igrow.trainer.diagnosis import Diagnosis, plots
 from igrow.trainer.diagnosis.open_vents import OpenVents
-from igrow.trainer.diagnosis.persistence import misfits, persistence_errors
+from igrow.trainer.diagnosis.persistence import persistence_errors
 from igrow.trainer.report import data_faults, render_report, sentences, write_diagnosis
 from igrow.trainer.report.page import error_rows
 from igrow.trainer.report.worth import Worth, worth
@@ -69,7 +69,7 @@ def test_no_verdict_says_that_a_model_fits_where_its_errors_say_that_it_does_not
     good = replace(leak, verdict=verdict)
     bad = with_errors(good, "air_humidity", deployed=35.0, recalibrated=35.0, corrected=35.0)
     # Where nothing was found it is the model in force that stands, which lacks the leak and fits nothing here.
-    assert [one.quantity for one in misfits(bad) if verdict != "nothing" or one.quantity == "air_humidity"] == [
+    assert [one.quantity for one in bad.misfits if verdict != "nothing" or one.quantity == "air_humidity"] == [
         "air_humidity"
     ]
     assert "does not fit" in sentences.verdict(bad, speak("en")) or "none makes it fit" in sentences.verdict(
@@ -86,7 +86,7 @@ def test_yesterdays_readings_are_taken_on_unseen_days_alone(leak: Diagnosis) -> 
     air, day = record.measured["air_temperature"], round(86_400 / record.step)
     rows = [row for row in range(day, len(record)) if not split.fit_rows[row]]
     by_hand = np.nanmean([abs(air[row] - air[row - day]) for row in rows])
-    assert persistence_errors(leak)["air_temperature"] == pytest.approx(by_hand)
+    assert persistence_errors(leak.evidence.log, ["air_temperature"])["air_temperature"] == pytest.approx(by_hand)
 
 
 def test_a_leak_costs_what_the_outdoor_air_that_comes_in_must_be_heated(leak: Diagnosis) -> None:
@@ -254,9 +254,12 @@ def test_errors_and_differences_of_an_american_site_are_in_its_degrees(leak: Dia
     regimes = {"calm": Estimate(1.0, 0.5, 1.5, "K"), "windy": Estimate(2.0, 1.5, 2.5, "K")}
     ours, theirs = (drawn(plots.coefficient_by_regime(regimes, one, "K")) for one in (metric, us))
     assert theirs[:, 0] == pytest.approx(ours[:, 0] * 1.8)
-    assert leak.log is not None
+    log = leak.log
+    assert log is not None
     bands = [
-        plot_log(leak.log, only=("outdoor_temperature",), language=one).axes[0].dataLim.intervaly
+        plot_log(log.name, log.telemetry, log.screened, only=("outdoor_temperature",), language=one)
+        .axes[0]
+        .dataLim.intervaly
         for one in (metric, us)
     ]
     assert bands[1] == pytest.approx(bands[0] * 1.8 + 32.0)

@@ -141,4 +141,4 @@ class Log:
         from igrow.trainer.data.plot import plot_log  # noqa: PLC0415  (matplotlib is slow to import)
 
         language = speak("en", self.site.time_zone if self.site else "UTC")
-        return plot_log(self, path, language=language)
+        return plot_log(self.name, self.telemetry, self.screened, path, language=language)

@@ -16,9 +16,17 @@ from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
 from igrow.trainer.diagnosis.linear import Fit, Term
 from igrow.trainer.diagnosis.refit import Refitted
-from igrow.trainer.diagnosis.result import OnsetInterval
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.diagnosis.search import Hypothesis
+
+
+@dataclass(frozen=True)
+class OnsetInterval:
+    """When something began, UTC, with its confidence interval."""
+
+    time: np.datetime64
+    low: np.datetime64
+    high: np.datetime64
 
 
 @dataclass(frozen=True)

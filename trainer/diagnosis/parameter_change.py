@@ -17,8 +17,7 @@ from igrow.core.bundle import Estimate
 from igrow.core.language import N_
 from igrow.trainer.diagnosis import change, linear, search
 from igrow.trainer.diagnosis.design import Design
-from igrow.trainer.diagnosis.estimate import onset_interval, reach
-from igrow.trainer.diagnosis.result import OnsetInterval
+from igrow.trainer.diagnosis.estimate import OnsetInterval, onset_interval, reach
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.fit.climate import bounds
 

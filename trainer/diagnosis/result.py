@@ -12,12 +12,13 @@ from igrow.core.bundle import Estimate
 from igrow.core.language import Language, speak
 from igrow.core.quantities import QUANTITIES
 from igrow.trainer.data.screening import Screened
-from igrow.trainer.diagnosis.persistence import misfits
+from igrow.trainer.diagnosis.persistence import persistence_errors
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from igrow.trainer.data.log import Log
+    from igrow.trainer.diagnosis.estimate import OnsetInterval
     from igrow.trainer.diagnosis.evidence import Evidence
     from igrow.trainer.fit.model import FittedModel
 
@@ -29,15 +30,6 @@ WORSE = 0.02
 """Share by which an error must grow to be told as worse."""
 DISCREPANCY = "discrepancy"
 """Effect and kind of a finding that no effect of the catalogue explains: what the model lacks, by outside drivers."""
-
-
-@dataclass(frozen=True)
-class OnsetInterval:
-    """When something began, UTC, with its confidence interval."""
-
-    time: np.datetime64
-    low: np.datetime64
-    high: np.datetime64
 
 
 @dataclass(frozen=True)
@@ -64,6 +56,17 @@ class Finding:
     """The coefficient refitted by regime."""
     resembles: tuple[str, ...] = ()
     """Parameters of the model whose growth would be the same finding: more air leaks in the wind either way."""
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """A quantity that a model predicts no better than yesterday's readings do."""
+
+    quantity: str
+    error: float
+    """Mean absolute error of the model a day ahead on unseen days."""
+    persistence: float
+    """The same of yesterday's readings."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -115,6 +118,18 @@ class Diagnosis:
             if (day := horizons.get("24_h", {})) and day["corrected"] > (1.0 + WORSE) * day["recalibrated"]
         )
 
+    @property
+    def misfits(self) -> tuple[Misfit, ...]:
+        """The quantities that the model which stands predicts no better than yesterday's readings do."""
+        if self.evidence is None:
+            return ()
+        stage = "deployed" if self.verdict == "nothing" else "corrected"
+        return tuple(
+            Misfit(quantity, error, yesterday)
+            for quantity, yesterday in persistence_errors(self.evidence.log, self.errors).items()
+            if (error := self.errors[quantity].get("24_h", {}).get(stage)) is not None and error >= yesterday
+        )
+
     def __repr__(self) -> str:
         causes = ", ".join(one.effect for one in self.findings)
         return f"Diagnosis({self.site!r}, {self.verdict}{': ' if causes else ''}{causes})"
@@ -135,7 +150,7 @@ class Diagnosis:
             if day:
                 stages = ", ".join(f"{stage} {value:.3g}" for stage, value in day.items())
                 lines.append(f"  {quantity}, 24 h ahead on unseen days: {stages}")
-        for one in misfits(self):
+        for one in self.misfits:
             lines.append(
                 f"  the model does not fit {one.quantity}: yesterday's readings are off by {one.persistence:.3g}"
             )

@@ -13,9 +13,9 @@ from igrow.core.language.units import written
 from igrow.core.site import Site
 from igrow.trainer.diagnosis.actuators import Replaced
 from igrow.trainer.diagnosis.candidates import UNIT_FLUX, Pattern
-from igrow.trainer.diagnosis.estimate import Estimated, normal_quantile
+from igrow.trainer.diagnosis.estimate import Estimated, OnsetInterval, normal_quantile
 from igrow.trainer.diagnosis.parameter_change import VISIBLE, ParameterChange
-from igrow.trainer.diagnosis.result import DISCREPANCY, Finding, OnsetInterval, plain
+from igrow.trainer.diagnosis.result import DISCREPANCY, Finding, plain
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.diagnosis.search import Hypothesis
 

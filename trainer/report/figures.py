@@ -33,7 +33,8 @@ def overview(result: Diagnosis, language: Language) -> list[Picture]:
     """Return the log at a glance, with what was set aside; empty where there is nothing to show."""
     if result.log is None:
         return []
-    draw = partial(plot_log, result.log, only=OVERVIEW, language=language, width=WIDTH)
+    log = result.log
+    draw = partial(plot_log, log.name, log.telemetry, log.screened, only=OVERVIEW, language=language, width=WIDTH)
     return list(_drawn([(language.text("The log; what was set aside is red"), draw)], language))
 
 

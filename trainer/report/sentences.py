@@ -13,7 +13,6 @@ from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator.hybrid.measurement import PREDICTED
 from igrow.trainer.diagnosis.candidates import WEEKDAYS
 from igrow.trainer.diagnosis.parameter_change import VISIBLE
-from igrow.trainer.diagnosis.persistence import misfits
 from igrow.trainer.diagnosis.result import DISCREPANCY, WORSE, Diagnosis, Finding
 from igrow.trainer.fit.omission import Omission
 from igrow.trainer.report.worth import Worth
@@ -62,7 +61,7 @@ _LEAST = {"heat": 0.05, "co2": 0.001, "lamp_light": 0.02}
 def verdict(result: Diagnosis, language: Language) -> str:
     """Return the first sentence; it never says that a model fits where its own errors say that it does not."""
     kind = result.verdict
-    wrong = kind in _NO_FIT and misfits(result)
+    wrong = kind in _NO_FIT and result.misfits
     told = _NO_FIT[kind] if wrong else _VERDICTS[kind]
     return language.text(told)
 
@@ -248,7 +247,7 @@ def gains(result: Diagnosis, language: Language) -> Iterator[str]:
 
 def warnings(result: Diagnosis, language: Language) -> Iterator[str]:
     """Say which quantities the model predicts no better than yesterday's readings, and what could not be judged."""
-    for one in misfits(result):
+    for one in result.misfits:
         unit = QUANTITIES[one.quantity].difference_unit
         yield language.text(
             "The model does not fit {quantity}: a day ahead it is off by {error}, yesterday's readings by {yesterday}.",
