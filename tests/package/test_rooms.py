@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
-from graphlib import TopologicalSorter
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -50,13 +50,45 @@ def test_the_road_imports_no_research_but_to_score_bundles_of_the_network_varian
     assert found == {SCORES_BOTH_VARIANTS}
 
 
-def test_the_rooms_of_the_trainer_stand_above_each_other() -> None:
-    """No room imports one that needs it in turn, within a function or not: whoever reads goes in one direction."""
-    above: dict[str, set[str]] = {}
-    for place, name in imports("trainer"):
-        room, other = place.split("/")[1].removesuffix(".py"), name.removeprefix("igrow.trainer.").split(".")[0]
-        if name.startswith("igrow.trainer.") and room not in (other, "__init__"):
-            above.setdefault(room, set()).add(other)
-    order = list(TopologicalSorter(above).static_order())
+def names_imported(folder: str) -> Iterator[tuple[str, str]]:
+    """Yield each module's path with the path of every module of igrow that it imports, type checkers' ones too."""
+    packages = {"igrow.core": "igrow_core", "igrow.edge": "edge", "igrow.trainer": "trainer"}
+    for path in (ROOT / folder).rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not isinstance(node, ast.ImportFrom) or not node.module or not node.module.startswith("igrow."):
+                continue
+            package, *inside = node.module.split(".")[1:]
+            parent = Path(packages[f"igrow.{package}"], *inside)
+            for alias in node.names:
+                found = [parent / alias.name, parent]
+                module = next(one for one in found if (ROOT / one).is_dir() or (ROOT / f"{one}.py").is_file())
+                yield str(path.relative_to(ROOT)), str(module)
+
+
+def neighbours(folder: str) -> dict[tuple[str, ...], dict[str, set[str]]]:
+    """Return for each folder in a room what stands in it, modules and folders, and which of these each one imports."""
+    found: dict[tuple[str, ...], dict[str, set[str]]] = {}
+    for place, module in names_imported(folder):
+        ours, theirs = Path(place).with_suffix("").parts, Path(module).parts
+        shared = next((k for k, (a, b) in enumerate(zip(ours, theirs, strict=False)) if a != b), None)
+        if shared and ours[shared] != "__init__":
+            found.setdefault(ours[:shared], {}).setdefault(ours[shared], set()).add(theirs[shared])
+    return found
+
+
+@pytest.mark.parametrize("room", BARRED)
+def test_no_two_that_stand_side_by_side_import_each_other_in_a_circle(room: str) -> None:
+    """Whoever reads goes in one direction, within a function or for a type checker too: a module, a folder, a room."""
+    circles = {}
+    for folder, above in neighbours(room).items():
+        try:
+            TopologicalSorter(above).prepare()
+        except CycleError as error:
+            circles["/".join(folder)] = error.args[1]
+    assert not circles
+
+
+def test_the_road_of_the_trainer_leads_through_its_rooms_in_order() -> None:
+    order = list(TopologicalSorter(neighbours("trainer")["trainer",]).static_order())
     road = ("data", "fit", "diagnosis", "calibration", "service", "fleet", "cli")
     assert sorted(road, key=order.index) == list(road)
