@@ -8,7 +8,7 @@
     bundle = export(result.corrected, "out/bundle")     # what a gateway runs
     publish(bundle, "/srv/igrow", "keys")               # signed, into the exchange
 
-    compare([model, result.corrected], later)           # simulators side by side on a log that none has seen
+    compare([model, result.corrected], newest)          # simulators side by side on a log that none has seen
 
 Every command, benchmark and service goes this road. Names are imported when they are first used.
 """

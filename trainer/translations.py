@@ -48,7 +48,8 @@ _SPEAKING = (
     )),
     _CORE / "separating_tests" / "definition.py",
     *(_TRAINER / name for name in (
-        "data/plausibility", "data/rows.py", "data/screening.py", "diagnosis/open_vents.py", "cli/diagnose.py",
+        "data/plausibility", "data/rows.py", "data/screening.py", "diagnosis/diagnosed_days.py",
+        "diagnosis/open_vents.py",
     )),
 )  # fmt: skip
 """Files and folders whose f-strings and sentences people read on the page or in the report."""

@@ -10,14 +10,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from igrow.core.bundle import Span
 from igrow.core.errors import IgrowError
+from igrow.core.local_time import utc_datetime
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import Log, prepare_log
 from igrow.trainer.diagnosis import Diagnosis, diagnose
-from igrow.trainer.diagnosis.diagnose import newest_weeks
+from igrow.trainer.diagnosis.diagnosed_days import newest_weeks, since_calibration
 from igrow.trainer.diagnosis.evidence import errors_with
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, knowledge_of
 from igrow.trainer.diagnosis.rules import DEFAULT
+from igrow.trainer.fit import FittedModel
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.report import render_report, write_diagnosis
@@ -206,6 +209,29 @@ def test_a_stuck_sensor_is_a_data_fault(quiet_log: Log) -> None:
     with pytest.raises(IgrowError, match="nothing to plot"):
         result.plot_errors()
     assert "does not work" in render_report(result)
+
+
+def test_days_that_a_model_was_calibrated_on_do_not_testify(leaky_log: Log) -> None:
+    time, known = leaky_log.telemetry.time, model_in_force()
+
+    def fitted_until(row: int) -> FittedModel:
+        return replace(known, training_span=Span(utc_datetime(time[0]), utc_datetime(time[row])))
+
+    week = len(time) - round(8 * 86_400 / STEP)
+    seen = diagnose(leaky_log, fitted_until(week))
+    assert seen.to_json() == diagnose(leaky_log.select(time[week + 1]), known).to_json()
+    assert "they are left out" in seen.notes[0]
+    elsewhere = replace(fitted_until(week), calibrated_on="elsewhere")
+    assert since_calibration(leaky_log, elsewhere, DEFAULT) == (leaky_log, ())
+
+
+def test_where_less_than_a_week_is_later_than_the_calibration_all_of_a_log_is_diagnosed_and_that_is_said(
+    leaky_log: Log,
+) -> None:
+    span = Span(*(utc_datetime(leaky_log.telemetry.time[row]) for row in (0, -round(6 * 86_400 / STEP))))
+    whole, (note,) = since_calibration(leaky_log, replace(model_in_force(), training_span=span), DEFAULT)
+    assert whole is leaky_log
+    assert "not seen" in note
 
 
 def test_a_log_of_three_days_is_refused_in_one_line(quiet_log: Log) -> None:

@@ -15,8 +15,7 @@ from igrow.core.local_time import utc_datetime
 from igrow.core.telemetry import Telemetry, write_csv
 from igrow.trainer import FittedModel, export, prepare_log
 from igrow.trainer.cli import main
-from igrow.trainer.cli.diagnose import since_calibration
-from igrow.trainer.scoring.bundles import ACTUATORS, BY_SETPOINTS, score_bundle, unseen
+from igrow.trainer.scoring.bundles import ACTUATORS, BY_SETPOINTS, score_bundle, unseen_part
 from tests.virtual_log import SITE, virtual_log
 
 DAYS = 12
@@ -66,13 +65,13 @@ def test_days_that_the_bundle_was_calibrated_on_are_left_out(
     log = prepare_log(telemetry, SITE)
     span = Span(*(utc_datetime(telemetry.time[row]) for row in (0, 5 * 96)))
     bundle = export(replace(truth, training_span=span), tmp_path / "bundle")
-    rest = unseen(log, bundle)
+    rest = unseen_part(log, bundle.manifest)
     assert rest.telemetry.time[0] == telemetry.time[5 * 96 + 1]
     assert "left out" in rest.notes[-1]
     with pytest.raises(IgrowError, match="all days of this log are among them"):
         score_bundle(log.select(None, telemetry.time[4 * 96]), bundle)
     elsewhere = export(replace(truth, training_span=span, calibrated_on="elsewhere"), tmp_path / "elsewhere")
-    assert unseen(log, elsewhere) is log
+    assert unseen_part(log, elsewhere.manifest) is log
 
 
 def test_a_diagnosis_leaves_out_the_days_that_its_bundle_was_calibrated_on(
@@ -88,17 +87,6 @@ def test_a_diagnosis_leaves_out_the_days_that_its_bundle_was_calibrated_on(
     told = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
     assert told["span"]["start"] == f"{telemetry.time[4 * 96 + 1]}Z"
     assert "they are left out" in (tmp_path / "out" / "report.html").read_text()
-
-
-def test_where_less_than_a_week_is_left_the_whole_log_is_diagnosed_and_what_that_cannot_see_is_said(
-    telemetry: Telemetry, truth: FittedModel, tmp_path: Path
-) -> None:
-    span = Span(*(utc_datetime(telemetry.time[row]) for row in (0, 6 * 96)))
-    bundle = export(replace(truth, training_span=span), tmp_path / "bundle")
-    log = prepare_log(telemetry, SITE)
-    whole, (note,) = since_calibration(log, bundle)
-    assert whole is log
-    assert "not seen" in note
 
 
 def test_the_command_prints_a_table_and_writes_it(

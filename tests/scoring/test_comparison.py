@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
-from igrow.core.bundle import default_bundle_folder
+from igrow.core.bundle import Span, default_bundle_folder
+from igrow.core.errors import IgrowError
+from igrow.core.local_time import utc_datetime
 from igrow.trainer.data import prepare_log
 from igrow.trainer.fit import FittedModel
 from igrow.trainer.fit.evaluation import evaluate
@@ -27,6 +31,17 @@ def test_simulators_are_compared_by_the_errors_that_each_has_alone() -> None:
     assert len(table) == 9
     assert set(table["simulator"]) == {"good", "plain", "built in"}
     assert table["mae"].to_list() == [row["mae"] for row in found.rows()]
+
+
+def test_a_simulator_is_judged_on_the_days_that_it_was_not_calibrated_on() -> None:
+    log = prepare_log(virtual_log(6, seed=2, step=900.0), SITE)
+    time, known = log.telemetry.time, replace(model_in_force(), alignment=0.0)
+    seen = replace(known, training_span=Span(utc_datetime(time[0]), utc_datetime(time[2 * 96])))
+    found = compare({"seen": seen, "known": known}, log, ("1_h",)).scores
+    later = compare([known], log.select(time[2 * 96 + 1]), ("1_h",)).scores["1 virtual"]
+    assert found["seen"] == later != found["known"]
+    with pytest.raises(IgrowError, match="give a later one"):
+        compare([seen], log.select(None, time[96]), ("1_h",))
 
 
 def test_simulators_without_names_get_some() -> None:

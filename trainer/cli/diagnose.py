@@ -5,26 +5,21 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
-from igrow.core.bundle import Bundle, default_bundle_folder, read_bundle
+from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.greenhouse import HiddenEffect
 from igrow.core.greenhouse.described import parse_effect
 from igrow.core.language import LANGUAGES
 from igrow.trainer.cli.common import replace_bundle
 from igrow.trainer.cli.log_arguments import add_log_arguments, log_of
 from igrow.trainer.cli.progress import progress
-from igrow.trainer.data.log import LEAST_DAYS, Log
 from igrow.trainer.diagnosis import diagnose
 from igrow.trainer.diagnosis.drift import read_drift
 from igrow.trainer.diagnosis.evidence import errors_with
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
 from igrow.trainer.exporting import read_model
 from igrow.trainer.report import write_diagnosis
-from igrow.trainer.scoring.bundles import calibrated_until
 
 EXAMPLE = "igrow-trainer diagnose logs/ --bundle bundle/ --site site.yaml --out diagnosis/"
 
@@ -60,13 +55,12 @@ def run(arguments: argparse.Namespace) -> int:
     """
     truth = [parse_effect(text) for text in arguments.truth]
     bundle = read_bundle(arguments.bundle or default_bundle_folder())
-    log, note = since_calibration(log_of(arguments), bundle)
+    log = log_of(arguments)
     model = read_model(bundle, log.known_site)
     with progress("diagnosing") as say:
         result = diagnose(
             log, model, without=arguments.without, seed=arguments.seed, drift=read_drift(arguments.drift), progress=say
         )
-        result = replace(result, notes=(*note, *result.notes))
         say("writing the report")
         write_diagnosis(arguments.out, result, arguments.language)
         if result.findings:
@@ -78,23 +72,6 @@ def run(arguments: argparse.Namespace) -> int:
     print(result.summary())
     print(f"written to {arguments.out}", file=sys.stderr)
     return result.exit_code
-
-
-def since_calibration(log: Log, bundle: Bundle) -> tuple[Log, tuple[str, ...]]:
-    """Return what of a log is later than the bundle's calibration, with a note; all of it where too little is.
-
-    What a greenhouse already lacked while its model was calibrated is in the model, and those days fit it best.
-    """
-    until = calibrated_until(log, bundle)
-    if until is None:
-        return log, ()
-    later = log.select(np.datetime64(until.replace(tzinfo=None), "s") + np.timedelta64(1, "s"), None)
-    if later.days < LEAST_DAYS:
-        return log, (
-            f"The model was calibrated on days of this log, up to {until:%Y-%m-%d %H:%M} UTC, and less than a week is "
-            "later: what was wrong already then is not seen. Give a later log.",
-        )
-    return later, (f"The model was calibrated on the days up to {until:%Y-%m-%d %H:%M} UTC: they are left out.",)
 
 
 def known_term(hidden: HiddenEffect) -> ActiveTerm:

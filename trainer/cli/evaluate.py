@@ -15,7 +15,7 @@ from igrow.core.quantities import QUANTITIES
 from igrow.trainer.cli.log_arguments import add_log_arguments, log_of
 from igrow.trainer.cli.progress import progress
 from igrow.trainer.fit.evaluation import Evaluation
-from igrow.trainer.scoring.bundles import score_bundle, unseen
+from igrow.trainer.scoring.bundles import score_bundle, unseen_part
 
 EXAMPLE = "igrow-trainer evaluate later.csv --bundle out/bundle --site config/site.yaml"
 
@@ -31,7 +31,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Score and print."""
     log = log_of(arguments)
     bundle = read_bundle(arguments.bundle or default_bundle_folder())
-    for note in unseen(log, bundle).notes[len(log.notes) :]:
+    for note in unseen_part(log, bundle.manifest).notes[len(log.notes) :]:
         print(f"note: {note}", file=sys.stderr)
     with progress("evaluating") as say:
         found = score_bundle(log, bundle, progress=say)

@@ -23,11 +23,12 @@ from igrow.trainer.diagnosis import history, wording
 from igrow.trainer.diagnosis.actuators import REPLACEABLE, Completed, complete
 from igrow.trainer.diagnosis.candidates import hidden_by_missing_weather
 from igrow.trainer.diagnosis.correction import Corrected, correct, corrected_model, with_parameter
+from igrow.trainer.diagnosis.diagnosed_days import newest_weeks, since_calibration
 from igrow.trainer.diagnosis.drift import Drift
 from igrow.trainer.diagnosis.estimate import normal_quantile
 from igrow.trainer.diagnosis.evidence import Evidence
 from igrow.trainer.diagnosis.freerun import HORIZONS, FreeRuns, LogDays, Stage, log_days, mean_absolute_errors
-from igrow.trainer.diagnosis.knowledge import Knowledge, knowledge_of
+from igrow.trainer.diagnosis.knowledge import knowledge_of
 from igrow.trainer.diagnosis.nuisance import NuisanceSubspace
 from igrow.trainer.diagnosis.open_vents import under_open_vents
 from igrow.trainer.diagnosis.parameter_change import ParameterChange
@@ -57,7 +58,8 @@ def diagnose(
     """Return the diagnosis of a log.
 
     Args:
-        log: of the greenhouse; gaps and missing columns are allowed.
+        log: of the greenhouse; gaps and missing columns are allowed. Days that the model was calibrated on are left
+            out where a week is later.
         model: in force.
         without: effects that are not to be considered.
         seed: of the random flips and bootstraps.
@@ -81,7 +83,8 @@ def diagnose(
         return _data_fault(log, model)
     log.require("a diagnosis", rules.least_days)
     knowledge = knowledge_of(model, site, rules)
-    given, log = log, newest_weeks(log, knowledge, rules)
+    since, notes = since_calibration(log, model, rules)
+    log = newest_weeks(since, knowledge, rules)
     say = progress or (lambda _line: None)
     say("completing the log")
     logged, rng = log_days(log, model), np.random.default_rng(seed)
@@ -106,7 +109,7 @@ def diagnose(
             )  # fmt: skip
             told = _since(parameter, log.select(parameter.onset.time), again, rules)
             if told is not None:
-                return told
+                return replace(told, notes=tuple(dict.fromkeys((*notes, *told.notes))))
         # What the days since then alone do not bear out, or are too few to, is left to a later log.
         parameter = None
     if parameter is not None and parameter.leads:
@@ -125,8 +128,9 @@ def diagnose(
     crop = growth_since(log, days.record, moved, model.crop or built_in_crop())
     corrected = corrected_model(model, result, findings, errors, knowledge.discrepancy, (start, end), crop)
     notes = (
+        *notes,
         *((wording.NOT_CALIBRATED,) if knowledge.transferred else ()),
-        *((wording.NEWEST,) if log is not given else ()),
+        *((wording.NEWEST,) if log is not since else ()),
         *wording.thin_air(site),
         *((opened.sentence,) if opened is not None and off else ()),
     )
@@ -191,14 +195,6 @@ def remembering(model: FittedModel, change: ParameterChange | None, rules: Decis
     value, share = model.history.parameters[change.parameter], change.share
     deviation = 0.5 * (share.high - share.low) / normal_quantile(rules) * abs(value)
     return replace(model, history=history.followed(model.history, change.parameter, share.value * value, deviation))
-
-
-def newest_weeks(log: Log, knowledge: Knowledge, rules: DecisionRules) -> Log:
-    """Return the newest weeks of a long log where its greenhouse's history can be asked what has changed, else all."""
-    if knowledge.history is None or log.days <= rules.long_days:
-        return log
-    # So many local days at most, the first and the last of them cut.
-    return log.select(log.telemetry.time[-1] - np.timedelta64(round((rules.long_days - 1.0) * 86_400.0), "s"))
 
 
 def _verdict(

@@ -7,12 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from datetime import datetime
 
 import numpy as np
 
 from igrow.core.arrays import Floats, Integers
-from igrow.core.bundle import Bundle
+from igrow.core.bundle import Bundle, Manifest
 from igrow.core.effects import EFFECTS
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import SETPOINTS, WEATHER
@@ -26,6 +25,7 @@ from igrow.trainer.exporting import read_model
 from igrow.trainer.fit.actuation import setpoint_columns
 from igrow.trainer.fit.evaluation import EVERY, Errors, Evaluation, Predictor, errors_of, free_runs, summarise
 from igrow.trainer.fit.model import FittedModel
+from igrow.trainer.fit.unseen_days import unseen
 
 HORIZONS = ("1_h", "24_h", "7_d")
 ACTUATORS, BY_SETPOINTS = "by actuators", "by setpoints"
@@ -53,7 +53,7 @@ def score_bundle(
         IgrowError: the log cannot be used, or has no unseen days.
     """
     say = progress or (lambda _line: None)
-    log = unseen(log, bundle)
+    log = unseen_part(log, bundle.manifest)
     log.require("an evaluation", days=2.0)
     site = log.known_site
     if bundle.manifest.variant == "network":
@@ -85,28 +85,18 @@ def _scores(record: Record, predict: Predictor, horizons: Sequence[str], how: st
     return summarise([found])
 
 
-def calibrated_until(log: Log, bundle: Bundle) -> datetime | None:
-    """Return the end of the days that a bundle was calibrated on, UTC, where a log holds some of them, else None."""
-    span, time = bundle.manifest.training_span, log.telemetry.time
-    if span is None or bundle.manifest.calibrated_on != log.known_site.name or len(time) == 0:
-        return None
-    start, end = (np.datetime64(one.replace(tzinfo=None), "s") for one in (span.start, span.end))
-    return None if time[-1] <= start or time[0] > end else span.end
-
-
-def unseen(log: Log, bundle: Bundle) -> Log:
-    """Return the part of a log that a bundle was not calibrated on: what is later, with a note on what was left out.
+def unseen_part(log: Log, model: FittedModel | Manifest) -> Log:
+    """Return the part of a log that a model was not calibrated on, with a note on what was left out.
 
     Raises:
         IgrowError: there is none.
     """
-    until = calibrated_until(log, bundle)
+    rest, until = unseen(log, model)
     if until is None:
         return log
-    rest = log.select(np.datetime64(until.replace(tzinfo=None), "s") + np.timedelta64(1, "s"), None)
     if len(rest) == 0:
         raise IgrowError(
-            f"{log.name}: the bundle was calibrated on days up to {until:%Y-%m-%d %H:%M} UTC, all days of this log are "
+            f"{log.name}: the model was calibrated on days up to {until:%Y-%m-%d %H:%M} UTC, all days of this log are "
             "among them: give a later one"
         )
     return replace(rest, notes=(*log.notes, f"days up to {until:%Y-%m-%d %H:%M} UTC were fitted on: left out"))

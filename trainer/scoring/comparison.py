@@ -15,7 +15,7 @@ from igrow.trainer.exporting import read_model
 from igrow.trainer.fit.evaluation import CARRIED, Evaluation, errors_of, summarise
 from igrow.trainer.fit.model import FittedModel
 from igrow.trainer.given import READ, must_be
-from igrow.trainer.scoring.bundles import BY_SETPOINTS, runs_by_actuators, score_bundle, unseen
+from igrow.trainer.scoring.bundles import BY_SETPOINTS, runs_by_actuators, score_bundle, unseen_part
 
 PERSISTENCE = "persistence"
 Simulator = FittedModel | Bundle | str | Path
@@ -72,16 +72,16 @@ def compare(
 ) -> Comparison:
     """Return the errors of several simulators on a log.
 
-        compare([model, result.corrected, "bundle/"], later)
-        compare({"before": model, "after": result.corrected}, later)
+        compare([model, result.corrected, "bundle/"], newest)
+        compare({"before": model, "after": result.corrected}, newest)
 
     Args:
         simulators: models, bundles or folders of bundles, with names where they are a mapping.
-        log: of the greenhouse; those of its days that a bundle was calibrated on are left out for that bundle.
+        log: of the greenhouse; those of its days that a simulator was calibrated on are left out for that one.
         horizons: of `igrow.trainer.fit.evaluation.HORIZONS`.
 
     Raises:
-        IgrowError: a bundle cannot be read, or the log cannot be used.
+        IgrowError: a bundle cannot be read, the log cannot be used, or a simulator has seen all of it.
     """
     must_be(Log, log, READ)
     if not simulators:
@@ -104,5 +104,5 @@ def _scores(simulator: Simulator, log: Log, horizons: Sequence[str]) -> Evaluati
         bundle = simulator if isinstance(simulator, Bundle) else read_bundle(Path(simulator))
         if bundle.manifest.variant == "network":
             return score_bundle(log, bundle, horizons)[BY_SETPOINTS]
-        return _scores(read_model(bundle, log.known_site), unseen(log, bundle), horizons)
-    return summarise([errors_of(*runs_by_actuators(log, simulator), horizons)])
+        simulator = read_model(bundle, log.known_site)
+    return summarise([errors_of(*runs_by_actuators(unseen_part(log, simulator), simulator), horizons)])
