@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.diagnosis import factor_analysis
+from benchmarks.diagnosis.factor_analysis import LogLikelihood
 from benchmarks.diagnosis.greenhouses import (
     LEARNING_SEED,
     PLACES_SEED,
@@ -32,7 +35,7 @@ from igrow.trainer.diagnosis import DEFAULT, NuisanceSubspace, nuisance
 from igrow.trainer.diagnosis.design import Design, prepare
 from igrow.trainer.diagnosis.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import knowledge_of
-from igrow.trainer.diagnosis.nuisance import Direction, LogLikelihood
+from igrow.trainer.diagnosis.nuisance import Direction
 from igrow.trainer.diagnosis.rules import HOUR
 from igrow.trainer.fit import FittedModel
 
@@ -109,7 +112,7 @@ def design_of(family: Family, log: Telemetry, directions: Sequence[Direction] = 
 
 def at_home(family: Family) -> list[LogLikelihood]:
     """Return what the logs of a family say."""
-    return [nuisance.marginal(design_of(family, log)) for log in simulate(family, MONTH)]
+    return [factor_analysis.marginal(design_of(family, log)) for log in simulate(family, MONTH)]
 
 
 def transferred_logs(place: VirtualGreenhouse) -> list[tuple[Family, Telemetry]]:
@@ -131,11 +134,11 @@ def transferred_logs(place: VirtualGreenhouse) -> list[tuple[Family, Telemetry]]
 
 def transferred(place: VirtualGreenhouse) -> list[LogLikelihood]:
     """Return what logs at a place say of which only the built-in bundle is known."""
-    return [nuisance.marginal(design_of(family, log)) for family, log in transferred_logs(place)]
+    return [factor_analysis.marginal(design_of(family, log)) for family, log in transferred_logs(place)]
 
 
 def _amplitudes(directions: Sequence[Direction], family: Family) -> list[dict[str, float]]:
-    return [nuisance.usual_amplitudes(design_of(family, log, directions)) for log in simulate(family, SEASON)]
+    return [factor_analysis.usual_amplitudes(design_of(family, log, directions)) for log in simulate(family, SEASON)]
 
 
 def _directions(
@@ -148,7 +151,7 @@ def _directions(
         print(f"{what}: logs of {len(known)} of {expected}", file=sys.stderr)
     shares = ", ".join(f"{share:.0f}" for share in carried(known, count))
     print(f"{what}: log marginal likelihood of a log of greenhouses not learned from, {FOLDS} folds: {shares}")
-    return nuisance.learn_directions([log for logs in known for log in logs], count)
+    return factor_analysis.learn_directions([log for logs in known for log in logs], count)
 
 
 def carried(known: Sequence[Sequence[LogLikelihood]], count: int) -> list[float]:
@@ -162,7 +165,7 @@ def carried(known: Sequence[Sequence[LogLikelihood]], count: int) -> list[float]
     for turn in range(FOLDS):
         others = [log for number, logs in enumerate(known) if number % FOLDS != turn for log in logs]
         unseen = [log for logs in known[turn::FOLDS] for log in logs]
-        shares.append(nuisance.evidence(nuisance.learn_directions(others, count), unseen) / len(unseen))
+        shares.append(factor_analysis.evidence(factor_analysis.learn_directions(others, count), unseen) / len(unseen))
     return shares
 
 
@@ -178,7 +181,7 @@ def learn(known: Sequence[Family], processes: int) -> NuisanceSubspace:
             shown += seen
             print(f"seasons of {number} of {SEASONS_FROM} families", file=sys.stderr)
     seeds = {"home": [one.seed for one in known], "transferred": PLACES_SEED}
-    season = nuisance.root_mean_squares(shown)
+    season = factor_analysis.root_mean_squares(shown)
     return NuisanceSubspace(tuple(home), tuple(away), season, provenance(COMMAND, seeds))
 
 
@@ -186,6 +189,6 @@ def main(processes: int) -> int:
     """Write the subspace into the package."""
     found = learn(families(processes), processes)
     path = Path(str(files("igrow.trainer.diagnosis"))) / nuisance.FILE
-    nuisance.write_nuisance(path, found)
+    path.write_text(json.dumps(asdict(found)) + "\n", encoding="utf-8")
     print(f"wrote {len(found.home)} and {len(found.transferred)} directions to {path}")
     return 0

@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import sys
 from argparse import Namespace
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -30,7 +30,7 @@ from igrow.core.site import Site
 from igrow.trainer.data import prepare_log
 from igrow.trainer.data.splits import alternate_weeks
 from igrow.trainer.diagnosis import DEFAULT, omission
-from igrow.trainer.diagnosis.omission import UsualGains
+from igrow.trainer.diagnosis.omission import TERMS, USUAL_DEVIATION, UsualGains, root_gain
 from igrow.trainer.fit.climate import fit_climate, site_prior
 from igrow.trainer.fit.evaluation import evaluate
 from igrow.trainer.fit.gaussian import Gaussian
@@ -58,6 +58,8 @@ LEAST, MOST = 3.0, 8.0
 """Scores between which the bound is set."""
 FALSE_CLAIMS = 0.02
 """Of calibrations in which nothing was taken out."""
+COUNTS_AS = 3.0
+"""Greenhouses that the deviation of a root gain before any greenhouse counts as."""
 HELD = 1e-6
 """Relative standard deviation of a parameter that is held."""
 
@@ -74,6 +76,22 @@ class Told:
     gains: dict[str, float]
     rise: float
     """Of the 24 h error on held-out weeks, over that of the whole model: mean ratio of all quantities."""
+
+
+def learn(gains: Mapping[str, Sequence[Mapping[str, float]]]) -> dict[str, tuple[float, float]]:
+    """Return mean and predictive deviation of the root gain of every term.
+
+    Args:
+        gains: by greenhouse, those of its calibrations in which nothing was taken out.
+    """
+    found = {}
+    for effect in TERMS:
+        roots = np.array([np.mean([root_gain(one.get(effect, 0.0)) for one in own]) for own in gains.values()])
+        count, mean = len(roots), float(roots.mean())
+        # An inverse chi-squared prior keeps few greenhouses that happen to agree from counting as all there are.
+        variance = (COUNTS_AS * USUAL_DEVIATION**2 + float(np.sum((roots - mean) ** 2))) / (COUNTS_AS + count - 1.0)
+        found[effect] = (round(mean, 2), round(float(np.sqrt(variance * (1.0 + 1.0 / count))), 2))
+    return found
 
 
 def without(prior: Gaussian, parameter: str) -> Gaussian:
@@ -170,12 +188,12 @@ def learned(told: Sequence[Told]) -> UsualGains:
         gains.setdefault(one.greenhouse, []).append(one.gains)
     largest = []
     for greenhouse, own in gains.items():
-        rest = UsualGains(omission.learn({name: one for name, one in gains.items() if name != greenhouse}), 0.0)
+        rest = UsualGains(learn({name: one for name, one in gains.items() if name != greenhouse}), 0.0)
         largest += [max(rest.score(effect, gain) for effect, gain in one.items()) for one in own]
     print(f"largest scores, each by the gains of the others: {', '.join(f'{one:.1f}' for one in sorted(largest))}")
     least = float(np.clip(np.quantile(largest, 1.0 - FALSE_CLAIMS), LEAST, MOST))
     seeds = {name: SEEDS["tuning"] + 10_000 * place for place, name in enumerate(SEASONS)}
-    return UsualGains(omission.learn(gains), round(least, 1), provenance(COMMAND, seeds))
+    return UsualGains(learn(gains), round(least, 1), provenance(COMMAND, seeds))
 
 
 def on_real_logs(data: Path, only: str) -> int:
@@ -214,6 +232,6 @@ def main(options: Namespace) -> int:
         return 0
     usual = learned(told)
     path = Path(str(files("igrow.trainer.diagnosis"))) / omission.FILE
-    omission.write_usual_gains(path, usual)
+    path.write_text(json.dumps(asdict(usual), indent=1) + "\n", encoding="utf-8")
     print(f"least score {usual.least_score:g}; wrote {path}")
     return 0

@@ -6,14 +6,18 @@ bound is that of greenhouses which nothing was learned from. No case of a benchm
 
 from __future__ import annotations
 
+import json
 import sys
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from benchmarks.diagnosis import factor_analysis
+from benchmarks.diagnosis.factor_analysis import LogLikelihood
 from benchmarks.diagnosis.greenhouses import PLACES_SEED, VirtualGreenhouse, others
 from benchmarks.diagnosis.matched import STEP, matched_log
 from benchmarks.diagnosis.nuisance import (
@@ -31,12 +35,14 @@ from benchmarks.diagnosis.nuisance import (
 from benchmarks.jobs import Jobs
 from benchmarks.provenance import provenance
 from igrow.core.telemetry import Telemetry
-from igrow.trainer.diagnosis import DEFAULT, compare, linear, nuisance, rules, search
+from igrow.trainer.diagnosis import DEFAULT, compare, linear, search
 from igrow.trainer.diagnosis.design import Design
-from igrow.trainer.diagnosis.nuisance import Direction, LogLikelihood
+from igrow.trainer.diagnosis.nuisance import Direction
+from igrow.trainer.diagnosis.rules import FILE, DecisionRules
 from igrow.trainer.diagnosis.structure import disagreement
 
 COMMAND = "python -m benchmarks.diagnosis rules"
+RULES = Path(str(files("igrow.trainer.diagnosis"))) / FILE
 QUANTILES = {
     "least_gain_steps": 0.95,
     "least_gain": 0.875,
@@ -116,6 +122,30 @@ def bounds(own: Sequence[Gains], other: Sequence[Gains], matched: Sequence[Gains
     return {"largest_disagreement": round(float(np.sqrt(passing * failing)), 1), **fitted}
 
 
+def fitted_names() -> tuple[str, ...]:
+    """Return the names of the rules that are fitted."""
+    return tuple(one.name for one in fields(DecisionRules) if one.metadata["set"] == "fitted")
+
+
+def write_rules(path: Path, values: Mapping[str, float], provenance: Mapping[str, Any]) -> None:
+    """Write fitted rules, each with its provenance.
+
+    Raises:
+        ValueError: a fitted rule is missing, or a chosen one is among them.
+    """
+    if set(values) != set(fitted_names()):
+        raise ValueError(f"fitted rules are {', '.join(fitted_names())}; given were {', '.join(values)}")
+    meanings = {one.name: one.metadata["meaning"] for one in fields(DecisionRules)}
+    document = {name: {"value": values[name], "meaning": meanings[name], **provenance} for name in values}
+    path.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+
+
+def table(rules: DecisionRules) -> list[tuple[str, float, str, str]]:
+    """Return (name, value, chosen or fitted, meaning) of every rule."""
+    values = asdict(rules)
+    return [(one.name, values[one.name], one.metadata["set"], one.metadata["meaning"]) for one in fields(rules)]
+
+
 def _folded(
     groups: Sequence[Sequence[tuple[Family, Telemetry]]], known: Sequence[Sequence[LogLikelihood]], count: int
 ) -> list[tuple[Family, Telemetry, Sequence[Direction]]]:
@@ -123,7 +153,7 @@ def _folded(
     jobs: list[tuple[Family, Telemetry, Sequence[Direction]]] = []
     for turn in range(FOLDS):
         learned = [log for number, logs in enumerate(known) if number % FOLDS != turn for log in logs]
-        directions = nuisance.learn_directions(learned, count)
+        directions = factor_analysis.learn_directions(learned, count)
         jobs += [(family, log, directions) for group in groups[turn::FOLDS] for family, log in group]
     return jobs
 
@@ -158,21 +188,21 @@ def main(processes: int) -> int:
         other = _told("transferred", jobs.each(gains_of, away))
         matched = _told("of the simulator's structure", jobs.each(matched_gains, own_structure))
     fitted = bounds(own, other, matched)
-    for name, value in fitted.items():
-        print(f"{name:28} {getattr(DEFAULT, name):8g} -> {value:8g}   {DEFAULT.meaning(name)}")
+    for name, before, _, meaning in table(DEFAULT):
+        if name in fitted:
+            print(f"{name:28} {before:8g} -> {fitted[name]:8g}   {meaning}")
     seeds = {"home": [one.seed for one in known], "transferred": PLACES_SEED, "matched": MATCHED_SEED}
-    path = Path(str(files("igrow.trainer.diagnosis"))) / rules.FILE
-    rules.write_rules(path, fitted, provenance(COMMAND, seeds))
-    print(f"wrote {path}")
+    write_rules(RULES, fitted, provenance(COMMAND, seeds))
+    print(f"wrote {RULES}")
     return 0
 
 
 def show() -> int:
     """Print every rule with its value, whether it was chosen or fitted, and its meaning."""
-    for name, value, how, meaning in rules.table(DEFAULT):
+    for name, value, how, meaning in table(DEFAULT):
         print(f"{name:30} {value:8g}  {how:7} {meaning}")
     print()
-    for name, one in rules.read_rules().provenance.items():
+    for name, one in json.loads(RULES.read_text(encoding="utf-8")).items():
         source = one.get("source") or f"seeds {one.get('seeds')}"
         print(f"{name}: {one['command'] or 'no command'}, {one['date']}; {source}")
     return 0

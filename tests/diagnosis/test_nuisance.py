@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.stats import multivariate_normal
 
+from benchmarks.diagnosis import factor_analysis
+from benchmarks.diagnosis.factor_analysis import LogLikelihood
 from igrow.core.effects import EFFECTS
 from igrow.trainer.diagnosis import linear, nuisance
-from igrow.trainer.diagnosis.nuisance import LogLikelihood, read_nuisance, write_nuisance
+from igrow.trainer.diagnosis.nuisance import read_nuisance
 from igrow.trainer.diagnosis.rules import DEFAULT
 from tests.diagnosis.synthetic_design import Truth, make_design
 
@@ -50,7 +51,7 @@ def test_the_evidence_is_the_marginal_likelihood_of_the_rows() -> None:
     spread = table @ loadings
     whole = multivariate_normal(cov=np.eye(ROWS) + spread @ spread.T).logpdf(rows)
     none = multivariate_normal(cov=np.eye(ROWS)).logpdf(rows)
-    found = nuisance.evidence(directions_of(loadings), [log_of(table, rows)])
+    found = factor_analysis.evidence(directions_of(loadings), [log_of(table, rows)])
     assert found == pytest.approx(float(whole - none), abs=1e-8)
 
 
@@ -59,11 +60,11 @@ def test_directions_found_explain_unseen_logs_as_well_as_the_true_ones() -> None
     true = np.zeros((SIZE, 2))
     true[[2, 3, 4], 0] = (0.8, -0.5, 0.3)
     true[[0, 6], 1] = (0.4, 0.4)
-    found = nuisance.learn_directions(drawn(rng, true, 60), 2)
+    found = factor_analysis.learn_directions(drawn(rng, true, 60), 2)
     unseen = drawn(rng, true, 60)
-    best = nuisance.evidence(directions_of(true), unseen)
+    best = factor_analysis.evidence(directions_of(true), unseen)
     assert best > 100.0
-    assert nuisance.evidence(found, unseen) > 0.9 * best
+    assert factor_analysis.evidence(found, unseen) > 0.9 * best
     # What nobody sees is in no direction.
     assert all(KEYS[-1] not in one for one in found)
 
@@ -78,7 +79,7 @@ def test_logs_that_lack_a_candidate_still_tell_of_the_others() -> None:
         kept = [0, 1, 2] if number % 2 else [0, 2]
         keys = tuple(("lamp_heat", "rain_cooling", "sky_cooling")[one] for one in kept)
         logs.append(log_of(table[:, kept], rows, keys))
-    (direction,) = nuisance.learn_directions(logs, 1)
+    (direction,) = factor_analysis.learn_directions(logs, 1)
     assert direction["lamp_heat"] * direction["sky_cooling"] < 0.0
     assert abs(direction["lamp_heat"]) == pytest.approx(0.6, abs=0.2)
     assert abs(direction.get("rain_cooling", 0.0)) < 0.1
@@ -86,7 +87,7 @@ def test_logs_that_lack_a_candidate_still_tell_of_the_others() -> None:
 
 def test_what_a_log_says_is_its_likelihood_with_the_null_integrated_out() -> None:
     design = make_design(Truth({"lamp_heat": 0.2}, {}, (0.3, -0.2)), parameters=2)
-    told = nuisance.marginal(design)
+    told = factor_analysis.marginal(design)
     assert told.keys == ("lamp_heat", "rain_cooling", "heat:cold weather")
     rows = design.values.reshape(len(design.values), -1)
     base, others = rows[design.columns("parameter")], rows[[*design.columns("effect"), *design.columns("pattern")]]
@@ -109,7 +110,7 @@ def test_the_discrepancy_of_a_calibration_is_a_ridge_regression_on_all_candidate
 
 def test_the_usual_amplitude_of_what_is_there_is_its_square_less_its_variance() -> None:
     design = make_design(Truth({"lamp_heat": 0.3}, {}))
-    found = nuisance.usual_amplitudes(design)
+    found = factor_analysis.usual_amplitudes(design)
     (column,) = design.columns("effect:lamp_heat")
     joint = linear.fit(design.grams, design.null_model().with_term(linear.Term(column)))
     assert found["lamp_heat"] == pytest.approx(joint.amplitudes[0] ** 2 - joint.deviations[0] ** 2, rel=0.05)
@@ -117,16 +118,17 @@ def test_the_usual_amplitude_of_what_is_there_is_its_square_less_its_variance() 
 
 def test_the_usual_amplitude_of_many_logs_is_the_root_mean_square_over_all() -> None:
     logs = [{"lamp_heat": 0.04}, {"lamp_heat": 0.0, "rain_cooling": 4.0}, {}, {"lamp_heat": 0.04}]
-    assert nuisance.root_mean_squares(logs) == {"lamp_heat": pytest.approx(0.1414, abs=1e-3), "rain_cooling": 1.0}
+    assert factor_analysis.root_mean_squares(logs) == {
+        "lamp_heat": pytest.approx(0.1414, abs=1e-3),
+        "rain_cooling": 1.0,
+    }
 
 
-def test_a_stored_subspace_says_where_it_comes_from_and_is_read_as_written(tmp_path: Path) -> None:
+def test_the_stored_subspace_says_where_it_comes_from() -> None:
     known = read_nuisance()
     assert {"command", "seeds"} <= set(known.provenance)
     assert len(known.directions(transferred=False)) == DEFAULT.nuisance_directions
     assert len(known.directions(transferred=True)) == DEFAULT.nuisance_directions_transferred
-    write_nuisance(tmp_path / "nuisance.json", known)
-    assert read_nuisance(tmp_path / "nuisance.json") == known
 
 
 def test_only_a_long_log_is_asked_for_more_than_seasons_usually_show() -> None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.diagnosis.omission import learn
 from igrow.core.bundle import EffectRecord, Estimate, HeldOutError
 from igrow.core.language import speak
 from igrow.core.simulator.hybrid.nominal import site_record
@@ -78,7 +79,7 @@ def test_the_size_of_a_term_is_fitted_beside_the_parameters(record: Record) -> N
 
 def test_a_gain_stands_out_only_from_what_greenhouses_that_lack_nothing_show() -> None:
     gains = [{"cover_condensation": gain, "night_transpiration": 0.5} for gain in (40.0, 10.0, 25.0, 60.0)]
-    usual = UsualGains(omission.learn({str(place): [one] for place, one in enumerate(gains)}), 3.5)
+    usual = UsualGains(learn({str(place): [one] for place, one in enumerate(gains)}), 3.5)
     assert usual.outstanding({"cover_condensation": 60.0, "night_transpiration": 1.0}) is None
     named = usual.outstanding({"cover_condensation": 60.0, "night_transpiration": 60.0})
     assert named == "night_transpiration"

@@ -11,17 +11,19 @@ import pytest
 
 import benchmarks.diagnosis.nuisance
 import igrow.trainer.diagnosis
-from igrow.trainer.diagnosis import rules
-from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules, fitted_names, read_rules, write_rules
+from benchmarks.diagnosis.rules import RULES, fitted_names, table, write_rules
+from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules
 
 FOLDER = Path(igrow.trainer.diagnosis.__file__).parent
 
 
 def test_every_rule_has_a_meaning_and_is_used() -> None:
-    learned = Path(benchmarks.diagnosis.nuisance.__file__).read_text().replace("DEFAULT.", "rules.")
+    learning = Path(benchmarks.diagnosis.nuisance.__file__).parent
+    learned = "".join((learning / name).read_text() for name in ("nuisance.py", "factor_analysis.py"))
+    learned = learned.replace("DEFAULT.", "rules.")
     sources = learned + "".join(path.read_text() for path in FOLDER.glob("*.py") if path.name != "rules.py")
     own = (FOLDER / "rules.py").read_text()
-    for name, _, how, meaning in rules.table(DEFAULT):
+    for name, _, how, meaning in table(DEFAULT):
         assert len(meaning) > 5
         assert how in {"chosen", "fitted", "set on tuning greenhouses"}
         assert f"rules.{name}" in sources or f"self.{name}" in own, f"{name} is not used"
@@ -34,20 +36,20 @@ def test_rules_cannot_be_changed_but_replaced() -> None:
 
 
 def test_fitted_rules_are_stored_each_with_where_it_comes_from() -> None:
-    stored = read_rules()
-    assert stored.rules == DEFAULT
-    assert set(stored.provenance) == set(fitted_names())
-    for one in stored.provenance.values():
-        assert {"value", "command", "date"} <= set(one)
+    stored = json.loads(RULES.read_text())
+    assert set(stored) == set(fitted_names())
+    for name, one in stored.items():
+        assert one["value"] == getattr(DEFAULT, name)
+        assert {"command", "date"} <= set(one)
 
 
-def test_rules_are_read_as_they_were_written(tmp_path: Path) -> None:
+def test_rules_are_written_each_with_its_meaning(tmp_path: Path) -> None:
     values = {name: 10.0 + number for number, name in enumerate(fitted_names())}
     write_rules(tmp_path / "rules.json", values, {"command": "make them", "date": "2026-01-01", "seeds": 3})
-    stored = read_rules(tmp_path / "rules.json")
-    assert all(getattr(stored.rules, name) == value for name, value in values.items())
-    assert stored.provenance["least_gain"]["command"] == "make them"
-    assert json.loads((tmp_path / "rules.json").read_text())["least_gain"]["meaning"] == DEFAULT.meaning("least_gain")
+    stored = json.loads((tmp_path / "rules.json").read_text())
+    assert {name: one["value"] for name, one in stored.items()} == values
+    assert stored["least_gain"]["command"] == "make them"
+    assert [one["meaning"] for one in stored.values()] == [row[3] for row in table(DEFAULT) if row[0] in stored]
 
 
 def test_a_fit_that_leaves_a_rule_out_or_fits_a_chosen_one_is_refused(tmp_path: Path) -> None:

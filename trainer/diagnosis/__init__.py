@@ -20,7 +20,7 @@ from igrow.trainer.diagnosis.history import history_of
 from igrow.trainer.diagnosis.nuisance import NuisanceSubspace, discrepancy_of, read_nuisance
 from igrow.trainer.diagnosis.omission import examine
 from igrow.trainer.diagnosis.result import EXIT_CODES, Diagnosis, Finding
-from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules, read_rules
+from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules
 from igrow.trainer.diagnosis.sharing import change_since, learned_from
 
 __all__ = [
@@ -37,5 +37,4 @@ __all__ = [
     "history_of",
     "learned_from",
     "read_nuisance",
-    "read_rules",
 ]

@@ -12,9 +12,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -44,8 +43,8 @@ TERMS = tuple(effect.name for effect in EFFECTS.values() if effect.resembles)
 """Effects that can stand in for a term of the physics."""
 DAY = "24_h"
 """The horizon whose errors decide."""
-USUAL_DEVIATION, HELD = 2.0, 3.0
-"""Deviation of a root gain before any greenhouse, and greenhouses that it counts as."""
+USUAL_DEVIATION = 2.0
+"""Of a root gain before any greenhouse."""
 WIDE = 3.0
 """Prior deviation of a term's size, in typical ones."""
 
@@ -78,31 +77,10 @@ def root_gain(gain: float) -> float:
     return float(np.sqrt(2.0 * gain))
 
 
-def learn(gains: Mapping[str, Sequence[Mapping[str, float]]]) -> dict[str, tuple[float, float]]:
-    """Return mean and predictive deviation of the root gain of every term.
-
-    Args:
-        gains: by greenhouse, those of its calibrations in which nothing was taken out.
-    """
-    found = {}
-    for effect in TERMS:
-        roots = np.array([np.mean([root_gain(one.get(effect, 0.0)) for one in own]) for own in gains.values()])
-        count, mean = len(roots), float(roots.mean())
-        # An inverse chi-squared prior keeps few greenhouses that happen to agree from counting as all there are.
-        variance = (HELD * USUAL_DEVIATION**2 + float(np.sum((roots - mean) ** 2))) / (HELD + count - 1.0)
-        found[effect] = (round(mean, 2), round(float(np.sqrt(variance * (1.0 + 1.0 / count))), 2))
-    return found
-
-
 def read_usual_gains() -> UsualGains:
     """Return the gains that came with the trainer."""
     file = files("igrow.trainer.diagnosis").joinpath(FILE)
     return UsualGains(**json.loads(file.read_text(encoding="utf-8")))
-
-
-def write_usual_gains(path: Path, usual: UsualGains) -> None:
-    """Write gains with their provenance."""
-    path.write_text(json.dumps(asdict(usual), indent=1) + "\n", encoding="utf-8")
 
 
 def gains_of(

@@ -7,14 +7,10 @@ which the command that fits them writes together with where they come from.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import Field, asdict, dataclass, field, fields
+from dataclasses import dataclass, field
 from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
-COMMAND = "python -m benchmarks.diagnosis rules"
-"""Fits what is fitted."""
 FILE = "learned/rules.json"
 HOUR = 3600.0
 
@@ -153,10 +149,6 @@ class DecisionRules:
     nuisance_directions_transferred: int = _chosen(16, "directions for those calibrated on another one")
     least_fitted_gain: float = _chosen(1.0, "gain in a scan from which on an effect's usual size is fitted")
 
-    def meaning(self, name: str) -> str:
-        """Return what a rule means."""
-        return str(_rule(name).metadata["meaning"])
-
     def learns_history(self, days: float) -> bool:
         """Tell whether a calibration log of so many days is to teach what is missing in this greenhouse."""
         return self.history and days >= self.least_history_days
@@ -172,50 +164,11 @@ class DecisionRules:
         return self.pattern_gain_transferred if transferred else self.pattern_gain
 
 
-@dataclass(frozen=True)
-class StoredRules:
-    """Rules as a command wrote them."""
-
-    rules: DecisionRules
-    provenance: Mapping[str, Any]
-    """By fitted rule: the command, its date and seeds, and what it was fitted to."""
-
-
-def fitted_names() -> tuple[str, ...]:
-    """Return the names of the rules that are fitted."""
-    return tuple(one.name for one in fields(DecisionRules) if one.metadata["set"] == "fitted")
-
-
-def read_rules(path: Path | None = None) -> StoredRules:
-    """Return stored rules (None: those that came with the trainer)."""
-    file = files("igrow.trainer.diagnosis").joinpath(FILE) if path is None else path
-    document = json.loads(file.read_text(encoding="utf-8"))
+def read_rules() -> DecisionRules:
+    """Return the rules that came with the trainer."""
+    document = json.loads(files("igrow.trainer.diagnosis").joinpath(FILE).read_text(encoding="utf-8"))
     values: dict[str, Any] = {name: float(one["value"]) for name, one in document.items()}
-    return StoredRules(DecisionRules(**values), document)
+    return DecisionRules(**values)
 
 
-def write_rules(path: Path, values: Mapping[str, float], provenance: Mapping[str, Any]) -> None:
-    """Write fitted rules, each with its provenance.
-
-    Raises:
-        ValueError: a fitted rule is missing, or a chosen one is among them.
-    """
-    if set(values) != set(fitted_names()):
-        raise ValueError(f"fitted rules are {', '.join(fitted_names())}; given were {', '.join(values)}")
-    document = {
-        name: {"value": values[name], "meaning": _rule(name).metadata["meaning"], **provenance} for name in values
-    }
-    path.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
-
-
-def table(rules: DecisionRules) -> list[tuple[str, float, str, str]]:
-    """Return (name, value, chosen or fitted, meaning) of every rule."""
-    values = asdict(rules)
-    return [(one.name, values[one.name], one.metadata["set"], one.metadata["meaning"]) for one in fields(rules)]
-
-
-def _rule(name: str) -> Field[Any]:
-    return next(one for one in fields(DecisionRules) if one.name == name)
-
-
-DEFAULT = read_rules().rules
+DEFAULT = read_rules()
