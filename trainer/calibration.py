@@ -10,7 +10,6 @@ out, on these weeks.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -33,8 +32,7 @@ from igrow.trainer.fit.model import FittedModel, training_envelope, united
 from igrow.trainer.fit.omission import Omission
 from igrow.trainer.fit.population import Population
 from igrow.trainer.given import READ, must_be
-
-Report = Callable[[str], None]
+from igrow.trainer.progress import Progress, silent
 
 
 def calibrate(
@@ -43,7 +41,7 @@ def calibrate(
     prior_model: FittedModel | None = None,
     population: Population | None = None,
     complete: bool = False,
-    progress: Report | None = None,
+    progress: Progress = silent,
 ) -> FittedModel:
     """Return the simulator of a greenhouse fitted to its log.
 
@@ -62,7 +60,7 @@ def calibrate(
     """
     must_be(Log, log, READ)
     log.require("a calibration")
-    site, say = log.known_site, progress or (lambda _line: None)
+    site = log.known_site
     before = prior_model or FittedModel.described(site)
     if population is not None:
         before = replace(before, posterior=population.prior(site))
@@ -71,12 +69,12 @@ def calibrate(
     posterior = fit_climate([(record, None)], before.posterior, progress=progress)
     setpoints, inferred = setpoint_columns(log.telemetry, record)
     rules = fit_actuation([(record, setpoints, by_its_own_rules(log.telemetry, record))], posterior.values)
-    say("rules of the climate computer fitted")
+    progress("rules of the climate computer fitted")
     stages = before.crop or built_in_crop()
     crop, growth = growth_of_log(log, record, posterior.values, stages)
     counted = growth_notes(site, stages, growth)
     for note in counted:
-        say(note)
+        progress(note)
     model = replace(
         before,
         site=site,
@@ -99,21 +97,21 @@ def calibrate(
             before.training_range,
             read_bundle(default_bundle_folder()).manifest.training_range,
         ),
-        errors=_held_out_errors(record, before.posterior, say),
+        errors=_held_out_errors(record, before.posterior, progress),
         notes=(*_notes(record, inferred), *counted, *thin_air(site)),
     )
-    model = replace(model, omission=_omission(record, model, say))
-    return _with_discrepancy(model.completed() if complete else model, record, log.days, population, say)
+    model = replace(model, omission=_omission(record, model, progress))
+    return _with_discrepancy(model.completed() if complete else model, record, log.days, population, progress)
 
 
-def _held_out_errors(record: Record, prior: Gaussian, say: Report) -> tuple[HeldOutError, ...]:
+def _held_out_errors(record: Record, prior: Gaussian, progress: Progress) -> tuple[HeldOutError, ...]:
     """Return the errors of the prior and of a fit that leaves every fourth week out, on these weeks.
 
     Empty where the log has no fourth week, or nothing complete in it.
     """
     held_out = alternate_weeks(record.time).held_out
     if not held_out.any():
-        say("the log is too short to hold a week back: no errors on unseen days; four weeks are needed")
+        progress("the log is too short to hold a week back: no errors on unseen days; four weeks are needed")
         return ()
     try:
         fitted = fit_climate([(record, ~held_out)], prior)
@@ -122,24 +120,24 @@ def _held_out_errors(record: Record, prior: Gaussian, say: Report) -> tuple[Held
     return held_out_errors(record, held_out, (prior.values, {}), (fitted.values, {}))
 
 
-def _omission(record: Record, model: FittedModel, say: Report) -> Omission | None:
+def _omission(record: Record, model: FittedModel, progress: Progress) -> Omission | None:
     """Return the term that a model lacks by its own log; None, and why, where that cannot be told."""
     if not alternate_weeks(record.time).held_out.any():
-        say("the log is too short to tell what the model lacks: four weeks are needed")
+        progress("the log is too short to tell what the model lacks: four weeks are needed")
         return None
-    say("asking the log what the model lacks")
+    progress("asking the log what the model lacks")
     try:
         return examine(record, model.site, model.posterior, DEFAULT)
     except (IgrowError, np.linalg.LinAlgError) as error:
-        say(f"what the model lacks could not be asked of its own log: {error}")
+        progress(f"what the model lacks could not be asked of its own log: {error}")
         return None
 
 
 def _with_discrepancy(
-    model: FittedModel, record: Record, days: float, population: Population | None, say: Report
+    model: FittedModel, record: Record, days: float, population: Population | None, progress: Progress
 ) -> FittedModel:
     """Return the model with what it misses on its own log, and without it where that cannot be told."""
-    say("learning what the model misses on its own log")
+    progress("learning what the model misses on its own log")
     try:
         known = history_of(record, model, DEFAULT, population) if DEFAULT.learns_history(days) else None
         return replace(model, discrepancy=discrepancy_of(record, model, DEFAULT), history=known)

@@ -8,7 +8,6 @@ learned, and the range that planning may use.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 
@@ -27,6 +26,7 @@ from igrow.trainer.data import prepare_log
 from igrow.trainer.exporting.plan import RANGED
 from igrow.trainer.fit.actuation import fit_actuation, setpoint_columns
 from igrow.trainer.fit.model import FittedModel, training_envelope
+from igrow.trainer.progress import Progress, silent
 from igrow.trainer.training.crop import fit_net_growth, train_networks
 
 START = np.datetime64("2020-01-20T00:00:00")
@@ -35,8 +35,6 @@ CREATED = datetime(2020, 6, 1, tzinfo=UTC)
 GREENHOUSES, DAYS = 10, 56
 SPREAD = 0.08
 """How far one greenhouse of this kind lies from the next, relative."""
-
-Report = Callable[[str], None]
 
 
 def virtual_seasons(site: Site, count: int, days: int, seed: int) -> list[Season]:
@@ -85,24 +83,24 @@ def varied_recipe(start: np.datetime64, end: np.datetime64, random: np.random.Ge
     return Telemetry(hours, {name: rows[:, column] for column, name in enumerate(SETPOINTS)})
 
 
-def default_model(site: Site, *, seed: int = 0, report: Report = print) -> FittedModel:
+def default_model(site: Site, *, seed: int = 0, progress: Progress = silent) -> FittedModel:
     """Build the simulator of an unmeasured site from virtual seasons.
 
     Args:
         site: describes the greenhouse.
         seed: of the virtual seasons and the training.
-        report: is told of the progress in lines.
+        progress: is told what is being done, in lines.
     """
-    report(f"simulating {GREENHOUSES} virtual greenhouses for {DAYS} days")
+    progress(f"simulating {GREENHOUSES} virtual greenhouses for {DAYS} days")
     seasons = virtual_seasons(site, GREENHOUSES, DAYS, seed)
     logs = [prepare_log(season.measured, site) for season in seasons]
-    model = calibrate(logs[0], progress=report)
+    model = calibrate(logs[0], progress=progress)
     physical, alignment = model.posterior.values, model.alignment or 0.0
     parts = [(record := log.record(alignment), setpoint_columns(log.telemetry, record)[0], None) for log in logs]
-    growth, harvest = train_networks([season.true for season in seasons], seed=seed, report=report)
+    growth, harvest = train_networks([season.true for season in seasons], seed=seed, progress=progress)
     records = [site_record(season.true, site, 300.0) for season in seasons]
     conversion, maintenance = fit_net_growth(records, physical, [season.true for season in seasons])
-    report(
+    progress(
         f"growth: {conversion:.3f} kg of dry matter per kg of CO2, {24e3 * maintenance:.2f} g m-2 a day for maintenance"
     )
     columns = {name: np.concatenate([log.telemetry[name] for log in logs]) for name in (*RANGED, *SETPOINTS)}

@@ -32,8 +32,7 @@ from igrow.core.quantities import WEATHER
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry, to_grid
-
-Report = Callable[[str], None]
+from igrow.trainer.progress import Progress, silent
 
 KNOTS = 6
 """Dates at which the strategy says its numbers."""
@@ -56,7 +55,7 @@ def plan_season(
     weather: Telemetry | None = None,
     generations: int = GENERATIONS,
     partial: Path | None = None,
-    progress: Report | None = None,
+    progress: Progress = silent,
 ) -> SeasonPlan:
     """Return the season of a site's crop by a bundle's simulator.
 
@@ -72,8 +71,7 @@ def plan_season(
     Raises:
         IgrowError: the crop has no end date, or too few days until then.
     """
-    say = progress or (lambda _line: None)
-    season = season_of(site, bundle, begins or site.crop.planting_date, weather, say)
+    season = season_of(site, bundle, begins or site.crop.planting_date, weather, progress)
     age = (begins or site.crop.planting_date) - site.crop.planting_date
     crop = first_crop(season.plant, age.days >= BEARING)
     rule, strategy = Strategy(season.days, 1, ends=True), Strategy(season.days, KNOTS)
@@ -81,11 +79,11 @@ def plan_season(
     third = generations // 3
     found = _Partial(partial, f"{season.start} {season.days} {generations}")
     short = found.get("rule", lambda: genetic(worth_of(season, rule, crop), rule.genes, third, 1)[0])
-    say(f"the best rule for the {season.days} days is found")
+    progress(f"the best rule for the {season.days} days is found")
     first = strategy.of_rule(rule, short)
     value = worth_of(season, strategy, crop)
     genes = found.get("season", lambda: genetic(value, strategy.genes, generations - third, 1, first)[0])
-    say("the best strategy is found; its marginal values follow")
+    progress("the best strategy is found; its marginal values follow")
     plan = valued(season, strategy, genes, crop)
     found.clear()
     return plan
@@ -125,7 +123,9 @@ class _Partial:
             self._path.unlink(missing_ok=True)
 
 
-def season_of(site: Site, bundle: Bundle, begins: datetime.date, weather: Telemetry | None, say: Report) -> Season:
+def season_of(
+    site: Site, bundle: Bundle, begins: datetime.date, weather: Telemetry | None, progress: Progress
+) -> Season:
     """Return the season to be planned; arguments and errors as `plan_season`'s."""
     if site.crop.end_date is None:
         raise IgrowError(f"{site.name}: crop.end_date is not set: a season that has no end cannot be planned")
@@ -135,12 +135,12 @@ def season_of(site: Site, bundle: Bundle, begins: datetime.date, weather: Teleme
     midnight = datetime.datetime.combine(begins, datetime.time(), ZoneInfo(site.time_zone))
     start = np.datetime64(midnight.astimezone(datetime.UTC).replace(tzinfo=None), "s")
     simulator = BundleSimulator(bundle, site.greenhouse, members=1)
-    typical = _typical(site, start, days, weather, say)
+    typical = _typical(site, start, days, weather, progress)
     recipe = recipe_by_hour(start, 24, site.longitude)
     return Season(site, simulator, parameters_of(site), start, days, typical, STRETCH // 2, recipe)
 
 
-def _typical(site: Site, start: np.datetime64, days: int, log: Telemetry | None, say: Report) -> Floats:
+def _typical(site: Site, start: np.datetime64, days: int, log: Telemetry | None, progress: Progress) -> Floats:
     """Return the typical days of all stretches, (2 S, 24, 6)."""
     stretches = range(0, days, STRETCH)
     climate = WeatherClimate(latitude=site.latitude, longitude=site.longitude)
@@ -157,7 +157,7 @@ def _typical(site: Site, start: np.datetime64, days: int, log: Telemetry | None,
             some = np.concatenate([_days(year, begin)[1] for year in years])
         chosen.append(typical_days(some))
     if made:
-        say(f"{made} of {len(stretches)} stretches have a generator's weather: none of those dates was given")
+        progress(f"{made} of {len(stretches)} stretches have a generator's weather: none of those dates was given")
     return np.concatenate(chosen)
 
 

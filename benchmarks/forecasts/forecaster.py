@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,6 +36,7 @@ from igrow.trainer.fit.climate import fit_climate
 from igrow.trainer.fit.evaluation import Predictor, errors_of, starts_within, summarise
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.scales import ERROR_SCALES
+from igrow.trainer.progress import Progress, silent
 
 _PENALTIES = (0.03, 0.1, 0.3, 1.0)
 _WIDENING = 1.5
@@ -106,7 +107,7 @@ def fit_forecaster(
     effects: ActiveEffects,
     *,
     actuation: bool = True,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress = silent,
 ) -> Forecaster:
     """Fit all stages to logs of one kind of greenhouse.
 
@@ -118,12 +119,11 @@ def fit_forecaster(
         actuation: fit the rules too.
         progress: is told what is being done.
     """
-    say = progress or (lambda _line: None)
     posterior = fit_climate([_working(record, fit) for record, _, fit, _ in parts], prior, effects, progress=progress)
     values = posterior.values
     lacking = [(record, fit, missing_fluxes(record, values, effects)) for record, _, fit, _ in parts]
     residual_model = _choose_residual_model(parts, lacking, posterior, effects)
-    say(
+    progress(
         "residual model on weather and clock: "
         + ("kept" if residual_model is not None else "of no use on selection weeks")
     )
@@ -138,12 +138,12 @@ def fit_forecaster(
         lambda channels: _selection_errors(parts, posterior, effects, known, disturbance.restricted(channels))
     )
     disturbance = disturbance.restricted(chosen)
-    say(f"observed disturbance goes on in: {', '.join(one for one in CHANNELS if one in chosen) or 'nothing'}")
+    progress(f"observed disturbance goes on in: {', '.join(one for one in CHANNELS if one in chosen) or 'nothing'}")
     rules: dict[str, float] = {}
     if actuation:
         rules = fit_actuation([(record, setpoints, fit) for record, setpoints, fit, _ in parts], values)
         rules = _refined(parts[0], values, rules, residual_model, disturbance)
-        say("actuation stage fitted in closed loop")
+        progress("actuation stage fitted in closed loop")
     model = Forecaster(posterior, effects, residual_model, disturbance, rules, {}, {}, {}, {}, {})
     model = replace(model, growth=growth_of_runs([(part[0], part[3], model.predictor(part[0])) for part in parts]))
     if not actuation:

@@ -105,7 +105,7 @@ def test_the_default_bundle_gives_the_posterior_of_the_function(
     monkeypatch.setattr(default_bundle, "train_networks", lambda *_, **__: stages)
     monkeypatch.setattr(default_bundle, "fit_net_growth", lambda *_: (0.5, 1e-4))
     monkeypatch.setattr(default_bundle, "RANGED", ("air_temperature",))
-    built = default_bundle.default_model(SITE, report=lambda _: None)
+    built = default_bundle.default_model(SITE)
     assert_same_posterior(built, calibrate(prepare_log(short, SITE)))
     assert built.calibrated_on == BUILT_IN
     assert built.alignment is None

@@ -25,7 +25,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Build the bundle."""
     site = load_site(arguments.site) if arguments.site else Site(name=BUILT_IN, latitude=52.0, longitude=4.5)
     with progress("building") as say:
-        model = default_model(site, seed=arguments.seed, report=say)
+        model = default_model(site, seed=arguments.seed, progress=say)
         say("writing the bundle")
         bundle = replace_bundle(arguments.out, model, created=CREATED, seed=arguments.seed)
     print(f"wrote {arguments.out} ({bundle.label})")

@@ -9,12 +9,13 @@ from contextlib import contextmanager
 import numpy as np
 from tqdm import tqdm
 
-Say = Callable[[str], None]
+from igrow.trainer.progress import Progress
+
 _SECOND = 1.0
 
 
 @contextmanager
-def progress(title: str) -> Iterator[Say]:
+def progress(title: str) -> Iterator[Progress]:
     """Yield what is told of each step of a work; the line shows the step and the time since the work began."""
     # `disable=None` is tqdm's own way to be quiet where standard error is no terminal.
     with tqdm(desc=title, bar_format="{desc} [{elapsed}]", leave=False, disable=None) as line:

@@ -36,7 +36,7 @@ def run(arguments: argparse.Namespace) -> int:
     model = read_model(arguments.bundle or default_bundle_folder(), site)
     seasons = [read_log(path, site).telemetry for path in arguments.seasons]
     with progress("training") as say:
-        growth, harvest = train_networks(seasons, seed=arguments.seed, report=say)
+        growth, harvest = train_networks(seasons, seed=arguments.seed, progress=say)
         say("fitting the net growth")
         records = [site_record(season, site, max(300.0, season.step)) for season in seasons]
         conversion, maintenance = fit_net_growth(records, model.posterior.values, seasons)

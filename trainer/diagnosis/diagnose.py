@@ -39,8 +39,7 @@ from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.fit.growth import built_in_crop, growth_since
 from igrow.trainer.fit.model import FittedModel
 from igrow.trainer.given import MADE, READ, must_be
-
-Report = Callable[[str], None]
+from igrow.trainer.progress import Progress, silent
 
 
 def diagnose(
@@ -52,7 +51,7 @@ def diagnose(
     rules: DecisionRules = DEFAULT,
     nuisance: NuisanceSubspace | None = None,
     drift: Drift | None = None,
-    progress: Report | None = None,
+    progress: Progress = silent,
     changed: str = "",
 ) -> Diagnosis:
     """Return the diagnosis of a log.
@@ -85,15 +84,14 @@ def diagnose(
     knowledge = knowledge_of(model, site, rules)
     since, notes = since_calibration(log, model, rules)
     log = newest_weeks(since, knowledge, rules)
-    say = progress or (lambda _line: None)
-    say("completing the log")
+    progress("completing the log")
     logged, rng = log_days(log, model), np.random.default_rng(seed)
     completed = complete(log, logged, model, knowledge, rules)
     days, opened = completed.days, under_open_vents(logged.record, rules)
     off = opened is not None and opened.is_offset(rules)
     hidden = frozenset(without) | (frozenset({"co2_drift"}) if off else frozenset())
     search = search_of(days, site, knowledge, hidden, rules, nuisance, drift)
-    say("searching for causes")
+    progress("searching for causes")
     first, last, found = search.run(rng)
     rivals = hidden_by_missing_weather(first.design.line)
     found = [replace(one, confounded=(*one.confounded, *rivals)) for one in found]
@@ -114,13 +112,13 @@ def diagnose(
         parameter = None
     if parameter is not None and parameter.leads:
         found, patterns = [], ()
-    say("correcting the model")
+    progress("correcting the model")
     result = correct(days, knowledge, found, patterns, site.longitude, rules)
     if parameter is not None and not patterns:
         result = with_parameter(days, knowledge, result, parameter, rules)
     verdict, findings = _verdict(completed, result, patterns, rules)
     stages = _stages(result, completed, logged)
-    say("predicting unseen days")
+    progress("predicting unseen days")
     runs = _runs(stages)
     errors = _errors(runs)
     start, end = log.telemetry.time[0], log.telemetry.time[-1]

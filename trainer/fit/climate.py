@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,6 +22,7 @@ from igrow.trainer.fit.evaluation import starts_within
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.scales import CORRELATION_TIME, ERROR_SCALES, ROBUST
 from igrow.trainer.fit.solver import DivergenceError, by_differences, covariance, solve
+from igrow.trainer.progress import Progress, silent
 
 RUN_HOURS, EVERY_HOURS = 24.0, 8.0
 """Length of the free runs, and hours between their starts."""
@@ -63,7 +64,7 @@ def fit_climate(
     prior: Gaussian,
     effects: ActiveEffects | None = None,
     *,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress = silent,
 ) -> Gaussian:
     """Return the posterior of the parameters.
 
@@ -91,12 +92,11 @@ def fit_climate(
         return np.concatenate([found[name].reshape(len(points), -1) / ERROR_SCALES[name] for name in shapes], axis=1)
 
     def tell(step: int, errors: Floats) -> None:
-        if progress is not None:
-            sizes = (
-                f"{name} {ERROR_SCALES[name] * float(np.nanmean(np.abs(part))):.3g}"
-                for name, part in _split(errors, shapes).items()
-            )
-            progress(f"calibration step {step}: mean error of {RUN_HOURS:g} h runs: {', '.join(sizes)}")
+        sizes = (
+            f"{name} {ERROR_SCALES[name] * float(np.nanmean(np.abs(part))):.3g}"
+            for name, part in _split(errors, shapes).items()
+        )
+        progress(f"calibration step {step}: mean error of {RUN_HOURS:g} h runs: {', '.join(sizes)}")
 
     residuals, jacobian = by_differences(batch, prior, high)
     counted = np.concatenate([np.isfinite(values).ravel() for values in measured.values()]).astype(np.float64)

@@ -25,8 +25,6 @@ Jacobian = Callable[[Floats], Floats]
 """Point (p,) -> d(errors)/d(point), (n, p)."""
 Batch = Callable[[Floats], Floats]
 """Points (m, p) -> errors in units of their scale, (m, n)."""
-Progress = Callable[[int, Floats], None]
-"""Is told the number of each step, and the errors there, (n,)."""
 
 DIFFERENCE = 0.05
 """Finite difference of a parameter, in standard deviations of its prior."""
@@ -71,7 +69,7 @@ def solve(
     robust: float = np.inf,
     start: Floats | None = None,
     evaluations: int = 60,
-    progress: Progress | None = None,
+    progress: Callable[[int, Floats], None] | None = None,
 ) -> Solution:
     """Return the minimum.
 
@@ -85,7 +83,7 @@ def solve(
         robust: size of an error from which on it counts linearly.
         start: where the search begins, (p,); None: at the prior's mean.
         evaluations: points to try, at most.
-        progress: is told of each step.
+        progress: is told the number of each step, and the errors there, (n,).
 
     Raises:
         DivergenceError: the model has no finite error where the search begins.

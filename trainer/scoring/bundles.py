@@ -5,7 +5,7 @@ Persistence is what any of them must beat: as at the start an hour ahead, as one
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,18 +26,18 @@ from igrow.trainer.fit.actuation import setpoint_columns
 from igrow.trainer.fit.evaluation import EVERY, Errors, Evaluation, Predictor, errors_of, free_runs, summarise
 from igrow.trainer.fit.model import FittedModel
 from igrow.trainer.fit.unseen_days import unseen
+from igrow.trainer.progress import Progress, silent
 
 HORIZONS = ("1_h", "24_h", "7_d")
 ACTUATORS, BY_SETPOINTS = "by actuators", "by setpoints"
 """How a simulator is driven."""
-Report = Callable[[str], None]
 _DAY = 24
 _WEEKS_EVERY = 3 * EVERY
 """Seconds between the starts of runs of a week, which overlap for days as it is."""
 
 
 def score_bundle(
-    log: Log, bundle: Bundle, horizons: Sequence[str] = HORIZONS, progress: Report | None = None
+    log: Log, bundle: Bundle, horizons: Sequence[str] = HORIZONS, progress: Progress = silent
 ) -> dict[str, Evaluation]:
     """Return the errors by the way of driving: `ACTUATORS` (hybrid bundles only) and `BY_SETPOINTS`.
 
@@ -52,7 +52,6 @@ def score_bundle(
     Raises:
         IgrowError: the log cannot be used, or has no unseen days.
     """
-    say = progress or (lambda _line: None)
     log = unseen_part(log, bundle.manifest)
     log.require("an evaluation", days=2.0)
     site = log.known_site
@@ -61,12 +60,12 @@ def score_bundle(
 
         record = log.record()
         by_setpoints = climate_runs(bundle.folder, record, setpoint_columns(log.telemetry, record)[0])
-        return {BY_SETPOINTS: _scores(record, by_setpoints, horizons, BY_SETPOINTS, say)}
+        return {BY_SETPOINTS: _scores(record, by_setpoints, horizons, BY_SETPOINTS, progress)}
     record, by_actuators = runs_by_actuators(log, read_model(bundle, site))
-    found = {ACTUATORS: _scores(record, by_actuators, horizons, ACTUATORS, say)}
+    found = {ACTUATORS: _scores(record, by_actuators, horizons, ACTUATORS, progress)}
     setpoints, _ = setpoint_columns(log.telemetry, record)
     planned = planned_runs(bundle, site, record, setpoints)
-    return found | {BY_SETPOINTS: _scores(record, planned, horizons, BY_SETPOINTS, say)}
+    return found | {BY_SETPOINTS: _scores(record, planned, horizons, BY_SETPOINTS, progress)}
 
 
 def runs_by_actuators(log: Log, model: FittedModel) -> tuple[Record, Predictor]:
@@ -77,10 +76,10 @@ def runs_by_actuators(log: Log, model: FittedModel) -> tuple[Record, Predictor]:
     return record, free_runs(record, model.posterior.values, activate(record, terms))
 
 
-def _scores(record: Record, predict: Predictor, horizons: Sequence[str], how: str, say: Report) -> Evaluation:
+def _scores(record: Record, predict: Predictor, horizons: Sequence[str], how: str, progress: Progress) -> Evaluation:
     found: dict[tuple[str, str], Errors] = {}
     for horizon in horizons:
-        say(f"running {horizon.replace('_', ' ')} ahead {how}")
+        progress(f"running {horizon.replace('_', ' ')} ahead {how}")
         found |= errors_of(record, predict, (horizon,), every=_WEEKS_EVERY if horizon == "7_d" else EVERY)
     return summarise([found])
 

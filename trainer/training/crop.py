@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy.optimize import nnls
@@ -16,6 +16,7 @@ from igrow.core.simulator.hybrid import climate
 from igrow.core.simulator.hybrid.record import Record, observe
 from igrow.core.simulator.network import Stage
 from igrow.core.telemetry import Telemetry, to_grid
+from igrow.trainer.progress import Progress, silent
 from igrow.trainer.training.stage import StageData, StageLayout, TrainingPlan, train_stage, untrained
 
 GROWTH_PLAN = TrainingPlan(updates=((8, 600), (24, 500), (96, 250)), batch=128, learning_rate=3e-3)
@@ -23,15 +24,13 @@ HARVEST_PLAN = TrainingPlan(updates=((4, 500), (14, 400)), batch=64, learning_ra
 _HIDDEN = (32, 32)
 
 
-def train_networks(
-    seasons: Sequence[Telemetry], *, seed: int = 0, report: Callable[[str], None] | None = None
-) -> tuple[Stage, Stage]:
+def train_networks(seasons: Sequence[Telemetry], *, seed: int = 0, progress: Progress = silent) -> tuple[Stage, Stage]:
     """Train the networks of growth and harvest on seasons of equal length that start at one time.
 
     Args:
         seasons: logs with climate, growth and yield (of the mechanistic greenhouse, say).
         seed: of weights and windows.
-        report: is told of the progress in lines.
+        progress: is told what is being done, in lines.
 
     Raises:
         IgrowError: a season lacks a quantity, or the seasons differ in length.
@@ -60,7 +59,7 @@ def train_networks(
     )
     first = untrained(_layout("growth", GROWTH, GROWTH_DRIVERS, (False, False, True)), growth, seed)
     second = untrained(_layout("harvest", YIELD, HARVEST_DRIVERS, (True,)), harvest, seed)
-    return train_stage(first, growth, GROWTH_PLAN, report), train_stage(second, harvest, HARVEST_PLAN, report)
+    return train_stage(first, growth, GROWTH_PLAN, progress), train_stage(second, harvest, HARVEST_PLAN, progress)
 
 
 def fit_net_growth(

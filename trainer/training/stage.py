@@ -7,7 +7,6 @@ the first layer for a whole window at once; only the rest is run step by step.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,8 +15,7 @@ from scipy.signal import lfilter
 
 from igrow.core.arrays import Floats, Integers, Mask
 from igrow.core.simulator.network import HOURS, Stage, Weights, hour_features
-
-Report = Callable[[str], None]
+from igrow.trainer.progress import Progress, silent
 
 
 @dataclass(frozen=True)
@@ -175,7 +173,7 @@ class StageModule(torch.nn.Module):
         )
 
 
-def train_stage(stage: Stage, data: StageData, plan: TrainingPlan, report: Report | None = None) -> Stage:
+def train_stage(stage: Stage, data: StageData, plan: TrainingPlan, progress: Progress = silent) -> Stage:
     """Train a stage further on runs of data and return it; the one given is not changed.
 
     Windows are drawn at random from all runs. Targets that are NaN or not valid do not count; a window starts
@@ -225,8 +223,7 @@ def train_stage(stage: Stage, data: StageData, plan: TrainingPlan, report: Repor
             optimizer.step()
             losses.append(loss.item())
             done += 1
-        if report is not None:
-            report(f"{stage.name}: {done} of {total} updates, windows of {window}, loss {np.mean(losses[-50:]):.3g}")
+        progress(f"{stage.name}: {done} of {total} updates, windows of {window}, loss {np.mean(losses[-50:]):.3g}")
     return module.trained_stage()
 
 

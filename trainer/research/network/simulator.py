@@ -15,9 +15,10 @@ from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator.network import HOURS, LightFormula, NetworkSimulator, Stage
 from igrow.core.simulator.network_run import daily_drivers, day_ends
 from igrow.trainer.fleet.calls import call_each
+from igrow.trainer.progress import Progress, silent
 from igrow.trainer.research.network.ensemble import merge
 from igrow.trainer.research.network.leaf_picking import fit_picking, followed, picked_area
-from igrow.trainer.training.stage import Report, StageData, StageLayout, TrainingPlan, train_stage, untrained
+from igrow.trainer.training.stage import StageData, StageLayout, TrainingPlan, train_stage, untrained
 
 CLIMATE_DRIVERS = (
     "global_radiation", "outdoor_temperature", "outdoor_humidity", "wind_speed", "sky_temperature",
@@ -143,7 +144,7 @@ def train_simulator(
     valid: Mask,
     layouts: Layouts | None = None,
     seed: int = 0,
-    report: Report | None = None,
+    progress: Progress = silent,
     workers: int = 1,
 ) -> NetworkSimulator:
     """Train the three stages on seasons of equal length.
@@ -154,7 +155,7 @@ def train_simulator(
         valid: (hours,) or (runs, hours); the others are not learned from.
         layouts: of the stages; None: `Layouts`.
         seed: of weights and windows.
-        report: is told of the progress in lines.
+        progress: is told what is being done, in lines.
         workers: processes that train members side by side; the result does not depend on it.
     """
     chosen = layouts or Layouts()
@@ -178,10 +179,9 @@ def train_simulator(
         with tempfile.TemporaryDirectory() as folder:
             for stage in call_each(_train_alone, tasks, Path(folder), workers=workers):
                 trained.append(stage)
-                if report is not None:
-                    report(f"{len(trained)} of {len(tasks)} networks trained")
+                progress(f"{len(trained)} of {len(tasks)} networks trained")
     else:
-        trained = [train_stage(*task, report) for task in tasks]
+        trained = [train_stage(*task, progress) for task in tasks]
     climate, growth, harvest = (
         merge(trained[first : first + chosen.members]) for first in range(0, len(tasks), chosen.members)
     )

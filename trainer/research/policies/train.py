@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -24,6 +23,7 @@ from igrow.core.simulator.outcome import Simulator
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Site, load_site
 from igrow.trainer.exporting.wiring import finished_model
+from igrow.trainer.progress import Progress, silent
 from igrow.trainer.research.policies.policy import ACTIONS, OBSERVATIONS
 
 EXAMPLE = "igrow-trainer policy --site config/site.yaml --out policy.onnx"
@@ -70,7 +70,7 @@ def train(
     *,
     days: int = 10_000_000,
     seed: int = 0,
-    progress: Callable[[str], None] = lambda _: None,
+    progress: Progress = silent,
     settings: dict[str, Any] | None = None,
 ) -> Training:
     """Return a policy that learnt in a simulator for so many seconds of the processor, or days of the simulator.
