@@ -13,7 +13,7 @@ import pytest
 
 from igrow.core.bundle import BundleError
 from igrow.edge.updates import Shelf, SignedSource, UpdateError
-from igrow.trainer.publishing import Lifetimes, PublishingError, create_keys, initialise, publish_in, refresh
+from igrow.trainer.publishing import PublishingError, create_keys, initialise, publish_in, refresh
 from tests.tiny_bundle import write_tiny_bundle
 
 
@@ -136,7 +136,7 @@ def test_rollback_to_older_metadata_is_refused(world: World, tmp_path: Path) -> 
 
 def test_freeze_by_holding_back_newer_metadata_is_noticed_at_expiry(world: World) -> None:
     past = datetime.now(UTC) - timedelta(days=90)
-    world.publish(now=past, lifetimes=Lifetimes(timestamp=timedelta(days=60)))
+    world.publish(now=past)
     with pytest.raises(UpdateError, match="expired"):
         world.source.fetch("demo", ())
     refresh(world.repository, world.keys)

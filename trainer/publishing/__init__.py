@@ -8,11 +8,10 @@ refresh(repository, keys)                  at least every few weeks, so that gat
 
 from igrow.trainer.publishing.keys import ROLES, PublishingError, create_keys
 from igrow.trainer.publishing.publish import publish, repository_of
-from igrow.trainer.publishing.repository import Lifetimes, initialise, publish_in, refresh
+from igrow.trainer.publishing.repository import initialise, publish_in, refresh
 
 __all__ = [
     "ROLES",
-    "Lifetimes",
     "PublishingError",
     "create_keys",
     "initialise",

@@ -133,7 +133,7 @@ def take_offline(folder: Path, target: Path) -> list[Path]:
 def status(folder: Path) -> tuple[list[RoleStatus], datetime, int]:
     """Return the roles, when the root metadata expires, and its version; raises PublishingError."""
     root = load_root(folder).signed
-    mine = {load_signer_file(path).public_key.keyid for path in sorted(folder.glob("*.pem"))}
+    mine = {load_signer(path).public_key.keyid for path in sorted(folder.glob("*.pem"))}
     roles = [
         RoleStatus(
             name, root.roles[name].threshold, len(root.roles[name].keyids), len(mine & {*root.roles[name].keyids})
@@ -161,13 +161,8 @@ def root_versions(folder: Path) -> dict[int, Path]:
     return {int(match[1]): path for path, match in found.items() if match}
 
 
-def load_signer(folder: Path, role: str) -> CryptoSigner:
-    """Return the signer of one role (not root); raises PublishingError where its key cannot be read."""
-    return load_signer_file(folder / f"{role}.pem")
-
-
-def load_signer_file(path: Path) -> CryptoSigner:
-    """Return the signer of one file; raises PublishingError."""
+def load_signer(path: Path) -> CryptoSigner:
+    """Return the signer of one key; raises PublishingError."""
     try:
         key = load_pem_private_key(path.read_bytes(), password=None)
     except OSError as error:
@@ -195,7 +190,7 @@ def _sign_root(root: Root, before: Metadata[Root] | None, folders: Sequence[Path
     signed = 0
     for folder in folders:
         for path in _root_files(folder):
-            signer = load_signer_file(path)
+            signer = load_signer(path)
             if signer.public_key.keyid in allowed and signer.public_key.keyid not in metadata.signatures:
                 metadata.sign(signer, append=True)
                 signed += 1

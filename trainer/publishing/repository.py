@@ -14,7 +14,6 @@ from __future__ import annotations
 import io
 import tarfile
 from contextlib import suppress
-from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -39,41 +38,23 @@ from igrow.trainer.publishing.keys import PublishingError, load_root, load_signe
 
 KEPT_VERSIONS = 8
 """Old versions of targets and snapshot that stay for gateways that are reading them."""
+LIFETIMES = {"targets": timedelta(days=365), "snapshot": timedelta(days=60), "timestamp": timedelta(days=60)}
+"""How long signed metadata holds; a gateway that sees no newer ones then stops to accept updates."""
 _SERIALIZER = JSONSerializer(compact=False)
 
 
-@dataclass(frozen=True)
-class Lifetimes:
-    """How long signed metadata holds; a gateway that sees no newer ones then stops to accept updates."""
-
-    targets: timedelta = timedelta(days=365)
-    snapshot: timedelta = timedelta(days=60)
-    timestamp: timedelta = timedelta(days=60)
-
-
-def initialise(
-    repository: Place | Path, keys: Path, *, now: datetime | None = None, lifetimes: Lifetimes | None = None
-) -> None:
+def initialise(repository: Place | Path, keys: Path, *, now: datetime | None = None) -> None:
     """Create an empty signed repository. Raises PublishingError where there is one already."""
     place = _place(repository)
     if place.get("metadata/timestamp.json", LARGEST_DOCUMENT) is not None:
         raise PublishingError(f"{repository}: the repository exists already")
-    now, lifetimes = now or datetime.now(UTC), lifetimes or Lifetimes()
+    now = now or datetime.now(UTC)
     _write_roots(place, keys)
-    _sign_and_write(
-        Metadata(Targets(expires=_expiry(now, lifetimes.targets))), place, keys, "targets", "1.targets.json"
-    )
-    _write_chain(place, keys, 1, now, lifetimes)
+    _sign_and_write(Metadata(Targets(expires=_expiry(now, "targets"))), place, keys, "targets", "1.targets.json")
+    _write_chain(place, keys, 1, now)
 
 
-def publish_in(
-    bundle: Path,
-    repository: Place | Path,
-    keys: Path,
-    *,
-    now: datetime | None = None,
-    lifetimes: Lifetimes | None = None,
-) -> Bundle:
+def publish_in(bundle: Path, repository: Place | Path, keys: Path, *, now: datetime | None = None) -> Bundle:
     """Test, pack, sign and publish a bundle for the site that its manifest names; a missing repository is made.
 
     Raises BundleError where the bundle fails its self-test and PublishingError where the repository cannot be
@@ -82,9 +63,9 @@ def publish_in(
     read = read_bundle(bundle)
     self_test(read)
     place = _place(repository)
-    now, lifetimes = now or datetime.now(UTC), lifetimes or Lifetimes()
+    now = now or datetime.now(UTC)
     if place.get("metadata/timestamp.json", LARGEST_DOCUMENT) is None:
-        initialise(place, keys, now=now, lifetimes=lifetimes)
+        initialise(place, keys, now=now)
     _write_roots(place, keys)
     content = _pack(read)
     name = f"{read.manifest.site}.tar"
@@ -94,24 +75,22 @@ def publish_in(
     place.put(f"targets/{target.hashes['sha256']}.{name}", content)
     # Nothing of the targets before goes into these but their number: whoever wrote them, we sign what we publish.
     version = _newest_version(place, "targets") + 1
-    targets = Targets(version, expires=_expiry(now, lifetimes.targets), targets={name: target})
+    targets = Targets(version, expires=_expiry(now, "targets"), targets={name: target})
     _sign_and_write(Metadata(targets), place, keys, "targets", f"{version}.targets.json")
-    _write_chain(place, keys, version, now, lifetimes)
+    _write_chain(place, keys, version, now)
     _forget_old(place, {f"{target.hashes['sha256']}.{name}", *before})
     return read
 
 
-def refresh(
-    repository: Place | Path, keys: Path, *, now: datetime | None = None, lifetimes: Lifetimes | None = None
-) -> None:
+def refresh(repository: Place | Path, keys: Path, *, now: datetime | None = None) -> None:
     """Sign snapshot and timestamp again with a new expiry; needs these two keys only.
 
     Raises PublishingError where the present key did not sign the newest bundle: it must be published again.
     """
     place = _place(repository)
-    now, lifetimes = now or datetime.now(UTC), lifetimes or Lifetimes()
+    now = now or datetime.now(UTC)
     _write_roots(place, keys)
-    _write_chain(place, keys, _load_targets(place, keys).version, now, lifetimes)
+    _write_chain(place, keys, _load_targets(place, keys).version, now)
 
 
 def _write_roots(place: Place, keys: Path) -> None:
@@ -135,13 +114,13 @@ def _write_roots(place: Place, keys: Path) -> None:
         raise PublishingError(f"{place}/{name}: is newer than {keys}, whose keys were replaced: take the newest copy")
 
 
-def _write_chain(place: Place, keys: Path, targets: int, now: datetime, lifetimes: Lifetimes) -> None:
+def _write_chain(place: Place, keys: Path, targets: int, now: datetime) -> None:
     """Write a snapshot that names this version of targets, then a timestamp that names the snapshot."""
     version = _newest_version(place, "snapshot") + 1
     meta = {"targets.json": MetaFile(targets)}
-    snapshot = Snapshot(version, expires=_expiry(now, lifetimes.snapshot), meta=meta)
+    snapshot = Snapshot(version, expires=_expiry(now, "snapshot"), meta=meta)
     _sign_and_write(Metadata(snapshot), place, keys, "snapshot", f"{version}.snapshot.json")
-    timestamp = Timestamp(version, expires=_expiry(now, lifetimes.timestamp), snapshot_meta=MetaFile(version))
+    timestamp = Timestamp(version, expires=_expiry(now, "timestamp"), snapshot_meta=MetaFile(version))
     _sign_and_write(Metadata(timestamp), place, keys, "timestamp", "timestamp.json")
 
 
@@ -189,7 +168,7 @@ def _named(place: Place, keys: Path) -> set[str]:
 
 
 def _sign_and_write(metadata: Metadata[Any], place: Place, keys: Path, role: str, name: str) -> None:
-    metadata.sign(load_signer(keys, role))
+    metadata.sign(load_signer(keys / f"{role}.pem"))
     place.put(f"metadata/{name}", metadata.to_bytes(_SERIALIZER))
 
 
@@ -227,5 +206,5 @@ def _pack(bundle: Bundle) -> bytes:
     return stream.getvalue()
 
 
-def _expiry(now: datetime, lifetime: timedelta) -> datetime:
-    return (now + lifetime).astimezone(UTC).replace(microsecond=0)
+def _expiry(now: datetime, role: str) -> datetime:
+    return (now + LIFETIMES[role]).astimezone(UTC).replace(microsecond=0)
