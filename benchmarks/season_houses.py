@@ -26,10 +26,10 @@ from igrow.core.greenhouse.plant import Plant
 from igrow.core.greenhouse.sensors import EXACT
 from igrow.core.greenhouse.weather_table import WeatherTable
 from igrow.core.local_time import hour_of_day
+from igrow.core.planner.evolution import Genes
 from igrow.core.planner.recent_use import SCALED, factors
 from igrow.core.planner.season import Strategy
 from igrow.core.planner.season.course import RADIATION, asked
-from igrow.core.planner.season.search import Genes
 from igrow.core.planner.template import Template, for_site
 from igrow.core.simulator.outcome import Outcome, Simulator
 from igrow.core.site import Site

@@ -37,10 +37,11 @@ from igrow.core.arrays import Floats
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.greenhouse import generate_weather, hourly_weather, recipe_by_hour, tomato
 from igrow.core.greenhouse.described import parameters_of
+from igrow.core.planner.evolution import Genes
 from igrow.core.planner.recent_use import Corrected
 from igrow.core.planner.season import Season, Strategy, run_season
 from igrow.core.planner.season.course import STRETCH, typical_days
-from igrow.core.planner.season.search import GENERATIONS, SETTINGS, Genes, Search, genetic, rule_and_strategy
+from igrow.core.planner.season.search import GENERATIONS, SETTINGS, Search, genetic, rule_and_strategy
 from igrow.core.simulator.outcome import Simulator
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Site, load_site

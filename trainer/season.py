@@ -24,10 +24,11 @@ from igrow.core.errors import IgrowError
 from igrow.core.greenhouse import generate_weather, recipe_by_hour
 from igrow.core.greenhouse.described import parameters_of
 from igrow.core.greenhouse.weather import WeatherClimate
+from igrow.core.planner.evolution import Genes
 from igrow.core.planner.season import Season, SeasonPlan, Strategy, valued
 from igrow.core.planner.season.course import DAY, STRETCH, typical_days
 from igrow.core.planner.season.plan import first_crop
-from igrow.core.planner.season.search import GENERATIONS, Genes, genetic, worth_of
+from igrow.core.planner.season.search import GENERATIONS, genetic, worth_of
 from igrow.core.quantities import WEATHER
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Site

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from igrow.core.arrays import Floats
 from igrow.core.bundle import Bundle, BundleError
@@ -20,13 +19,12 @@ from igrow.core.greenhouse import tomato
 from igrow.core.greenhouse.described import parameters_of
 from igrow.core.greenhouse.parameters import GreenhouseParameters
 from igrow.core.greenhouse.tomato import STAGES, Crop
+from igrow.core.planner.evolution import Genes
 from igrow.core.planner.season.course import DAY, Season, run_season
 from igrow.core.planner.season.strategy import Strategy
 from igrow.core.planner.season.worth import CropWorth, MarginalValues, marginal_values
 from igrow.core.planner.template import Setpoints, Template
 from igrow.core.site import Site
-
-Genes = NDArray[np.float32]
 
 SEASON_FILE = "season.json"
 FORMAT = 1

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from igrow.core.arrays import Floats
 from igrow.core.greenhouse.tomato import Crop
-from igrow.core.planner.evolution import WORST, EvolutionSettings, NumpyGeneration, draw
+from igrow.core.planner.evolution import WORST, EvolutionSettings, Genes, NumpyGeneration, draw
 from igrow.core.planner.season.course import Season, run_season
 from igrow.core.planner.season.strategy import Strategy
 
-Genes = NDArray[np.float32]
 SETTINGS = EvolutionSettings(parents=24, offspring=48)
 GENERATIONS = 36
 """Of 48 simulated seasons each; in twice as many the best strategy gained less than one percent."""
