@@ -82,7 +82,7 @@ class World:
     def archived(self) -> dict[int, float]:
         """Return what the trainer holds, row by row as any program reads it; a repeated row is an error."""
         rows: dict[int, float] = {}
-        for path in sorted(self.archive.telemetry_folder(self.site).rglob("*.parquet")):
+        for path in sorted((self.archive.root / "telemetry" / f"site={self.site}").rglob("*.parquet")):
             table = pq.ParquetFile(path).read()
             for time, value in zip(
                 table["time"].to_numpy().astype("datetime64[s]").astype(int).tolist(),

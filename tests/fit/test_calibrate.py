@@ -146,7 +146,6 @@ def test_a_model_tells_what_it_is(model: FittedModel) -> None:
     assert "transmissivity" in text
     assert "90 % interval" in text
     assert "persistence" in text
-    assert model.to_json()["parameters"].keys() == model.posterior.values.keys()
 
 
 @pytest.mark.usefixtures("quick")

@@ -159,7 +159,7 @@ def test_a_history_that_was_cut_short_is_read_and_gone_on_with(tmp_path: Path, a
 def test_a_damaged_day_of_the_archive_is_named_and_the_others_are_used(
     tmp_path: Path, archive: Archive, diagnosed: list[str]
 ) -> None:
-    path = archive.telemetry_folder("house") / "month=2020-02" / "2020-02-21.parquet"
+    path = archive.root / "telemetry" / "site=house" / "month=2020-02" / "2020-02-21.parquet"
     path.write_bytes(path.read_bytes()[:500])
     turn = recalibrate(SITE, archive, tmp_path / "state", lambda _: None, now=NOON)
     assert turn.verdict == "named"

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -146,8 +145,11 @@ class FittedModel:
                 interval = f"{one.low:.4g} to {one.high:.4g}"
                 lines.append(f"{effect.name + ' ' + name:28}{one.value:12.4g}{interval:>26}  {one.unit}")
         if self.crop is not None:
-            for name, value, low, high, unit in self.growth_intervals():
-                lines.append(f"{name:28}{value:12.4g}{f'{low:.4g} to {high:.4g}':>26}  {unit}")
+            rates = (("conversion", "kg kg-1"), ("maintenance", "kg m-2 h-1"))
+            for (name, unit), deviation in zip(rates, np.sqrt(np.diag(prior_of(self.crop))).tolist(), strict=True):
+                value, reach = getattr(self.crop, name), 1.645 * deviation
+                interval = f"{max(value - reach, 0.0):.4g} to {value + reach:.4g}"
+                lines.append(f"{f'growth {name}':28}{value:12.4g}{interval:>26}  {unit}")
         if self.errors:
             columns = ("horizon", "persistence", "before", "after")
             lines += ["", f"{'mean absolute error, unseen':28}" + "".join(f"{name:>12}" for name in columns)]
@@ -156,46 +158,6 @@ class FittedModel:
                 cells = (error.horizon, naive, f"{error.before:.3g}", f"{error.after:.3g}")
                 lines.append(f"{error.quantity:28}" + "".join(f"{cell:>12}" for cell in cells) + f"  {error.unit}")
         return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
-
-    def growth_intervals(self) -> list[tuple[str, float, float, float, str]]:
-        """Return name, value, 90 % interval and unit of what growth is computed with; empty for a built-in crop."""
-        if self.crop is None:
-            return []
-        deviations = np.sqrt(np.diag(prior_of(self.crop)))
-        values = (("conversion", self.crop.conversion, "kg kg-1"), ("maintenance", self.crop.maintenance, "kg m-2 h-1"))
-        return [
-            (f"growth {name}", value, max(value - 1.645 * one, 0.0), value + 1.645 * one, unit)
-            for (name, value, unit), one in zip(values, deviations.tolist(), strict=True)
-        ]
-
-    def to_json(self) -> dict[str, Any]:
-        """Return what is known of the model as plain values that `json` writes."""
-        return {
-            "site": self.site.name,
-            "calibrated_on": self.calibrated_on,
-            "alignment": self.alignment,
-            "parameters": {
-                name: {
-                    "mean": mean,
-                    "standard_deviation": self.posterior.deviations[name],
-                    "unit": PARAMETERS[name].unit,
-                }
-                for name, mean in self.posterior.values.items()
-            },
-            "covariance": self.posterior.covariance.tolist(),
-            "discrepancy": dict(self.discrepancy),
-            "effects": {name: dict(values) for name, values in self.active_effects.items()},
-            "omission": [asdict(effect) for effect in self.omission.effects] if self.omission else [],
-            "actuation": dict(self.actuation),
-            "holding": dict(self.holding),
-            "training_range": {name: list(ends) for name, ends in self.training_range.items()},
-            "errors": [asdict(one) for one in self.errors],
-            "growth": {
-                name.removeprefix("growth "): {"mean": value, "low": low, "high": high, "unit": unit}
-                for name, value, low, high, unit in self.growth_intervals()
-            },
-            "notes": list(self.notes),
-        }
 
 
 def united(*ranges: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:

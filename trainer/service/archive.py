@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from datetime import date, timedelta
 from pathlib import Path
@@ -67,10 +67,6 @@ class Archive:
         """Return the names of the sites of which telemetry was collected."""
         return sorted(path.name.removeprefix("site=") for path in (self.root / "telemetry").glob("site=*"))
 
-    def telemetry_folder(self, site: str) -> Path:
-        """Return the folder with the Parquet files of one site."""
-        return self.root / "telemetry" / f"site={site}"
-
     def changed(self, site: str, day: date) -> int | None:
         """Return a stamp of a day's rows that changes with them, None where there are none."""
         try:
@@ -104,7 +100,8 @@ class Archive:
         for day, rows in by_day.items():
             path = self._day("events", site, day)
             before = _read_events(path) if path.exists() else []
-            merged = sorted({*before, *rows}, key=_event_order)
+            # By sequence number; of one number, what has no time first.
+            merged = sorted({*before, *rows}, key=lambda row: (row[1], row[0] is not None, row[0] or 0, *row[2:]))
             if merged != before:
                 columns = list(zip(*merged, strict=True))
                 arrays = [pa.array(column, field.type) for column, field in zip(columns, _EVENTS, strict=True)]
@@ -136,7 +133,10 @@ class Archive:
             path = self._day("events", site, np.datetime64(day))
             if path.exists():
                 try:
-                    events += [_event(row) for row in _read_events(path)]
+                    events += [
+                        {"sequence": sequence, "category": category, **json.loads(body)}
+                        for _, sequence, category, body in _read_events(path)
+                    ]
                 except IgrowError as error:
                     notes.append(str(error))
         missing = [
@@ -231,14 +231,6 @@ def _event_row(event: Mapping[str, Any]) -> tuple[int | None, int, str, str]:
         raise IgrowError(f"record {sequence}: time {time!r} is no time since 1970")
     body = {key: value for key, value in event.items() if key not in ("sequence", "category")}
     return None if time is None else round(1000 * time), sequence, category, json.dumps(body, sort_keys=True)
-
-
-def _event(row: Sequence[Any]) -> Mapping[str, Any]:
-    return {"sequence": row[1], "category": row[2], **json.loads(row[3])}
-
-
-def _event_order(row: Sequence[Any]) -> tuple[Any, ...]:
-    return (row[1], row[0] is not None, row[0] or 0, row[2], row[3])
 
 
 def _conflicts(before: Telemetry, rows: Telemetry) -> int:
