@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from benchmarks.onnx_policy import OnnxPolicy
 from benchmarks.season_houses import DAY, HOUR, START, Houses, Led, Morning, Recipe, Way, lead
 from benchmarks.seasons import described, season_of, ways_of
 from benchmarks.simulated_houses import SimulatedHouses
@@ -18,14 +19,15 @@ from igrow.core.arrays import Floats
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.gaps import held
 from igrow.core.greenhouse import tomato
-from igrow.core.planner.season.search import GENERATIONS, Genes, rule_and_strategy
+from igrow.core.planner.evolution import Genes
+from igrow.core.planner.season.search import GENERATIONS, rule_and_strategy
 from igrow.core.quantities import SETPOINTS
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Site
 from igrow.core.telemetry import to_grid
 from igrow.trainer.data.public import agc2019
 from igrow.trainer.research.paper.compartments import read_2019
-from igrow.trainer.research.policies.policy import OnnxPolicy, chosen, observe, to_setpoints
+from igrow.trainer.research.policies.policy import chosen, observe, to_setpoints
 from igrow.trainer.research.policies.train import export, train
 
 DAYS = 119
@@ -120,7 +122,8 @@ def prepare(minutes: float) -> Tuning | Learning:
         return Tuning({name: genes for name, (genes, _) in found.items()}, time.process_time() - began)
     torch.set_num_threads(1)
     learnt = train(site, simulator_of(site), 60.0 * minutes)
-    return Learning(export(learnt.actor).SerializeToString(), learnt.days, learnt.course(6), learnt.seconds)
+    course = [float(part.mean()) for part in np.array_split(np.array(learnt.gains), 6) if part.size]
+    return Learning(export(learnt.actor).SerializeToString(), learnt.days, course, learnt.seconds)
 
 
 @dataclass(frozen=True)

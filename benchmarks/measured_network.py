@@ -13,8 +13,7 @@ import numpy as np
 from igrow.core.arrays import Floats, Integers, Mask
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.fit.evaluation import Predictor
-from igrow.trainer.research.network.simulator import layout
-from igrow.trainer.training.stage import StageData, TrainingPlan, run_windows, train_stage, untrained
+from igrow.trainer.training.stage import StageData, TrainingPlan, layout, run_windows, train_stage, untrained
 
 PLAN = TrainingPlan(updates=((4, 1500), (24, 500)), decay=10.0)
 """Chosen on weeks 7 and 8 of the AGC 2019 Reference compartment after training on weeks 1 to 6."""

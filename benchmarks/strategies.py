@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.led_greenhouses import DAY, SITE, Greenhouses, Scenario
+from benchmarks.onnx_policy import OnnxPolicy
 from igrow.core.agronomy import Memory
 from igrow.core.arrays import Floats
 from igrow.core.bundle import default_bundle_folder, read_bundle
@@ -50,7 +51,6 @@ from igrow.core.telemetry import Telemetry
 from igrow.edge.planning.forecast import persistence
 from igrow.edge.planning.make_plan import RECENT_DAYS
 from igrow.trainer.research.policies.policy import HOURS as POLICY_HOURS
-from igrow.trainer.research.policies.policy import OnnxPolicy
 
 STARTS = ("2020-01-19T23:00:00", "2020-03-09T23:00:00", "2020-04-19T22:00:00")
 """Local midnights at which the weeks begin: winter, early spring, spring."""

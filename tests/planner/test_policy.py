@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.onnx_policy import OnnxPolicy
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import SETPOINTS
-from igrow.trainer.research.policies.policy import ACTIONS, OBSERVATIONS, OnnxPolicy, chosen, observe, to_setpoints
+from igrow.trainer.research.policies.policy import ACTIONS, OBSERVATIONS, chosen, observe, to_setpoints
 from tests.planner.toy_greenhouse import START
 
 

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.onnx_policy import OnnxPolicy
 from igrow.core.errors import IgrowError
 from igrow.core.site import Site
-from igrow.trainer.research.policies.policy import ACTIONS, HOURS, OBSERVATIONS, OnnxPolicy
+from igrow.trainer.research.policies.policy import ACTIONS, HOURS, OBSERVATIONS
 from igrow.trainer.research.policies.train import SETTINGS, export, train
 from tests import needs
 from tests.planner.toy_greenhouse import ToySimulator

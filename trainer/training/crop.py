@@ -10,14 +10,14 @@ from scipy.optimize import nnls
 from igrow.core import gaps
 from igrow.core.arrays import Floats
 from igrow.core.errors import IgrowError
-from igrow.core.quantities import GROWTH, QUANTITIES, YIELD
+from igrow.core.quantities import GROWTH, YIELD
 from igrow.core.simulator.crop import GROWTH_DRIVERS, HARVEST_DRIVERS
 from igrow.core.simulator.hybrid import climate
 from igrow.core.simulator.hybrid.record import Record, observe
 from igrow.core.simulator.network import Stage
 from igrow.core.telemetry import Telemetry, to_grid
 from igrow.trainer.progress import Progress, silent
-from igrow.trainer.training.stage import StageData, StageLayout, TrainingPlan, train_stage, untrained
+from igrow.trainer.training.stage import StageData, TrainingPlan, layout, train_stage, untrained
 
 GROWTH_PLAN = TrainingPlan(updates=((8, 600), (24, 500), (96, 250)), batch=128, learning_rate=3e-3)
 HARVEST_PLAN = TrainingPlan(updates=((4, 500), (14, 400)), batch=64, learning_rate=3e-3)
@@ -57,8 +57,8 @@ def train_networks(seasons: Sequence[Telemetry], *, seed: int = 0, progress: Pro
         hour=np.zeros(days - 1),
         valid=np.ones((len(hourly), days - 1), dtype=bool),
     )
-    first = untrained(_layout("growth", GROWTH, GROWTH_DRIVERS, (False, False, True)), growth, seed)
-    second = untrained(_layout("harvest", YIELD, HARVEST_DRIVERS, (True,)), harvest, seed)
+    first = untrained(layout("growth", GROWTH, GROWTH_DRIVERS, (), _HIDDEN, cumulative=("net_growth",)), growth, seed)
+    second = untrained(layout("harvest", YIELD, HARVEST_DRIVERS, (), _HIDDEN, step=24.0), harvest, seed)
     return train_stage(first, growth, GROWTH_PLAN, progress), train_stage(second, harvest, HARVEST_PLAN, progress)
 
 
@@ -93,21 +93,6 @@ def fit_net_growth(
     fine = np.isfinite(table).all(axis=1) & np.isfinite(target)
     conversion, maintenance = nnls(table[fine], target[fine])[0]
     return float(conversion), float(maintenance)
-
-
-def _layout(name: str, states: tuple[str, ...], drivers: tuple[str, ...], cumulative: tuple[bool, ...]) -> StageLayout:
-    return StageLayout(
-        name=name,
-        states=states,
-        drivers=drivers,
-        time_constants=(),
-        clock=False,
-        step=1.0 if name == "growth" else 24.0,
-        low=tuple(QUANTITIES[state].low for state in states),
-        high=tuple(QUANTITIES[state].high for state in states),
-        cumulative=cumulative,
-        hidden=_HIDDEN,
-    )
 
 
 def _stacked(tables: Sequence[Telemetry], names: Sequence[str]) -> Floats:

@@ -14,6 +14,7 @@ import torch
 from scipy.signal import lfilter
 
 from igrow.core.arrays import Floats, Integers, Mask
+from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator.network import HOURS, Stage, Weights, hour_features
 from igrow.trainer.progress import Progress, silent
 
@@ -32,6 +33,24 @@ class StageLayout:
     high: tuple[float, ...]
     cumulative: tuple[bool, ...]
     hidden: tuple[int, ...]
+
+
+def layout(
+    name: str,
+    states: tuple[str, ...],
+    drivers: tuple[str, ...],
+    time_constants: tuple[float, ...],
+    hidden: tuple[int, ...],
+    *,
+    clock: bool = False,
+    step: float = 1.0,
+    cumulative: tuple[str, ...] = ("fruit_fresh_weight",),
+) -> StageLayout:
+    """Return a layout whose bounds are those of the registry, and whose `cumulative` states can but grow."""
+    grows = tuple(state in cumulative for state in states)
+    low = tuple(QUANTITIES[state].low for state in states)
+    high = tuple(QUANTITIES[state].high for state in states)
+    return StageLayout(name, states, drivers, time_constants, clock, step, low, high, grows, hidden)
 
 
 @dataclass(frozen=True)

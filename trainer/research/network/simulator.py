@@ -11,14 +11,13 @@ import numpy as np
 import torch
 
 from igrow.core.arrays import Floats, Mask
-from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator.network import HOURS, LightFormula, NetworkSimulator, Stage
 from igrow.core.simulator.network_run import daily_drivers, day_ends
 from igrow.trainer.fleet.calls import call_each
 from igrow.trainer.progress import Progress, silent
 from igrow.trainer.research.network.ensemble import merge
 from igrow.trainer.research.network.leaf_picking import fit_picking, followed, picked_area
-from igrow.trainer.training.stage import StageData, StageLayout, TrainingPlan, train_stage, untrained
+from igrow.trainer.training.stage import StageData, StageLayout, TrainingPlan, layout, train_stage, untrained
 
 CLIMATE_DRIVERS = (
     "global_radiation", "outdoor_temperature", "outdoor_humidity", "wind_speed", "sky_temperature",
@@ -30,26 +29,6 @@ HARVEST_DRIVERS = (
 )  # fmt: skip
 
 
-def layout(
-    name: str,
-    states: tuple[str, ...],
-    drivers: tuple[str, ...],
-    time_constants: tuple[float, ...],
-    hidden: tuple[int, ...],
-    *,
-    clock: bool = False,
-    step: float = 1.0,
-) -> StageLayout:
-    """Return a layout whose bounds are those of the registry; only the harvest can but grow.
-
-    Net growth falls in dark hours, when the crop respires more than it assimilates.
-    """
-    cumulative = tuple(state == "fruit_fresh_weight" for state in states)
-    low = tuple(QUANTITIES[state].low for state in states)
-    high = tuple(QUANTITIES[state].high for state in states)
-    return StageLayout(name, states, drivers, time_constants, clock, step, low, high, cumulative, hidden)
-
-
 CLIMATE = layout(
     "climate",
     ("air_temperature", "air_humidity", "air_co2"),
@@ -58,6 +37,7 @@ CLIMATE = layout(
     (128, 128),
     clock=True,
 )
+# Net growth falls in dark hours, when the crop respires more than it assimilates: it is not cumulative here.
 GROWTH = layout(
     "growth", ("leaf_area_index", "plant_load", "net_growth"), GROWTH_DRIVERS, (24.0, 240.0, 720.0), (64, 64)
 )

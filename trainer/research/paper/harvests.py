@@ -27,9 +27,8 @@ from igrow.core.greenhouse.tomato import (
     rates,
     young_crop,
 )
-from igrow.trainer.research.network.simulator import layout
 from igrow.trainer.research.paper.compartments import Compartment, read_2018, read_2019
-from igrow.trainer.training.stage import StageData, TrainingPlan, run_stage, train_stage, untrained
+from igrow.trainer.training.stage import StageData, TrainingPlan, layout, run_stage, train_stage, untrained
 
 Predictor = Callable[[Sequence[Compartment], Compartment], Floats]
 

@@ -24,12 +24,12 @@ from igrow.core.arrays import Floats, Integers
 from igrow.core.errors import IgrowError
 from igrow.core.local_time import to_local
 from igrow.core.simulator.network import NetworkSimulator, Stage
-from igrow.core.simulator.network_run import free_growth
+from igrow.core.simulator.network_run import free_growth, free_run
 from igrow.core.telemetry import Telemetry, to_grid
 from igrow.trainer.data.public import agc2019
 from igrow.trainer.research.network.simulator import Layouts, derived, hourly_data, train_simulator
 from igrow.trainer.research.paper.scores import SCORED, score
-from igrow.trainer.research.paper.table1 import run_freely, split_seasons
+from igrow.trainer.research.paper.table1 import split_seasons
 from igrow.trainer.research.paper.wur2020 import Seasons, read_seasons
 from igrow.trainer.training.stage import StageData, TrainingPlan, run_windows, train_stage, untrained
 
@@ -98,7 +98,8 @@ def only_weeks(data: StageData, first: int, last: int) -> StageData:
 def joined(virtual: StageData, real: StageData, share: float) -> StageData:
     """Return both, windows drawn from the real run with probability `share`."""
     count = virtual.states.shape[0]
-    weight = np.concatenate([np.ones(count), _weight_of_real(virtual, real, share)])
+    ratio = virtual.valid.sum() / max(int(real.valid.sum()), 1) * share / (1.0 - share)
+    weight = np.concatenate([np.ones(count), np.full(real.states.shape[0], float(ratio))])
     return StageData(
         np.concatenate([virtual.drivers, real.drivers]),
         np.concatenate([virtual.states, real.states]),
@@ -106,11 +107,6 @@ def joined(virtual: StageData, real: StageData, share: float) -> StageData:
         np.concatenate([virtual.valid, real.valid]),
         weight,
     )
-
-
-def _weight_of_real(virtual: StageData, real: StageData, share: float) -> Floats:
-    ratio = virtual.valid.sum() / max(int(real.valid.sum()), 1) * share / (1.0 - share)
-    return np.full(real.states.shape[0], float(ratio))
 
 
 def day_starts(data: StageData) -> Integers:
@@ -182,7 +178,7 @@ def run(
     held_out = only_weeks(real.data, last, real.weeks)
 
     def scored(name: str, simulator: NetworkSimulator) -> Step:
-        virtual = score(test.columns, run_freely(simulator, test), seasons.valid)
+        virtual = score(test.columns, free_run(simulator, test.columns, test.hour), seasons.valid)
         errors, persistence = day_errors(simulator.climate, held_out)
         report(f"{name}: 24 h errors {np.round(errors, 2)}, persistence {np.round(persistence, 2)}")
         return Step(

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from igrow.core.simulator.network_run import free_run
 from igrow.trainer.research.network.checkpoint import load_simulator
 from igrow.trainer.research.paper.scores import PUBLISHED_BASELINE, PUBLISHED_INCREMENTAL, SCORED, Score, score
-from igrow.trainer.research.paper.table1 import run_freely
 from igrow.trainer.research.paper.wur2020 import read_seasons
 
 
@@ -26,7 +26,7 @@ def evaluate(
     `out` where given.
     """
     simulator, seasons = load_simulator(bundle), read_seasons(data)
-    predicted = run_freely(simulator, seasons)
+    predicted = free_run(simulator, seasons.columns, seasons.hour)
     scores = score(seasons.columns, predicted, seasons.valid)
     every_hour = score(seasons.columns, predicted, np.ones_like(seasons.valid))
     report(f"{len(seasons.names)} seasons of {seasons.time.size} hours, free runs from the first hour, R2")

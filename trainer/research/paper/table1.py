@@ -21,7 +21,6 @@ import numpy as np
 
 from igrow.core.arrays import Floats, Integers
 from igrow.core.errors import IgrowError
-from igrow.core.simulator.network import NetworkSimulator
 from igrow.core.simulator.network_run import free_run
 from igrow.trainer.research.network.checkpoint import BUNDLE_FOLDER
 from igrow.trainer.research.network.export import write_network_bundle
@@ -66,11 +65,6 @@ def split_seasons(count: int, seed: int) -> Split:
     return Split(order[:first], order[first:second], order[second:])
 
 
-def run_freely(simulator: NetworkSimulator, seasons: Seasons) -> dict[str, Floats]:
-    """Run all seasons from their first hour; see `free_run`."""
-    return free_run(simulator, seasons.columns, seasons.hour)
-
-
 def run(
     folder: Path,
     out: Path,
@@ -103,7 +97,7 @@ def run(
         created=datetime.now(UTC),
         training_range={name: (float(values.min()), float(values.max())) for name, values in learned.columns.items()},
     )
-    predicted = run_freely(simulator, held_out)
+    predicted = free_run(simulator, held_out.columns, held_out.hour)
     mean = {name: values.mean(axis=0, keepdims=True) for name, values in learned.columns.items()}
     table = Table(
         scores=score(held_out.columns, predicted, seasons.valid),

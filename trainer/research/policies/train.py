@@ -54,10 +54,6 @@ class Training:
     seconds: float = 0.0
     """Of the processor."""
 
-    def course(self, parts: int) -> list[float]:
-        """Return the gains as means over so many parts of the training."""
-        return [float(part.mean()) for part in np.array_split(np.array(self.gains), parts) if part.size]
-
 
 REPORTED = 500
 """Days between two reports."""
