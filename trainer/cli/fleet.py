@@ -160,8 +160,7 @@ def remember(registry: Registry, action: str, outcome: TaskOutcome, now: datetim
     if outcome.ending is Ending.DONE:
         return
     command = "recalibrate" if action == "diagnose" else action
-    line = {"time": now.strftime("%Y-%m-%dT%H:%M:%SZ"), "command": command, "site": outcome.name,
-            "verdict": "error", "note": outcome.note}  # fmt: skip
+    line = history.Turn(command, outcome.name, now, "error", False, outcome.note).to_json()
     folder = site_folder(registry.state, outcome.name)
     try:
         history.append(folder, line)

@@ -33,7 +33,7 @@ from igrow.trainer.diagnosis.estimate import normal_quantile
 from igrow.trainer.diagnosis.linear import LinearModel, Term
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.fit.climate import fit_climate
-from igrow.trainer.fit.evaluation import Simulator, held_out_errors
+from igrow.trainer.fit.evaluation import Model, held_out_errors
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.omission import Omission
 from igrow.trainer.fit.solver import DivergenceError
@@ -155,12 +155,12 @@ def examine(
     prior, found = history.physical_prior(site, posterior), None
     terms: tuple[Effect, ...] = ()
     try:
-        without: Simulator = (fit_climate([(record, ~held_out)], prior).values, {})
+        without: Model = (fit_climate([(record, ~held_out)], prior).values, {})
         last = without
         while named is not None and len(terms) < rules.most_causes:
             terms = (*terms, EFFECTS[named])
             fitted = _fit(record, ~held_out, prior, terms)
-            simulator: Simulator = (fitted.marginal(prior.names).values, _active(fitted, terms))
+            simulator: Model = (fitted.marginal(prior.names).values, _active(fitted, terms))
             if not _better(held_out_errors(record, held_out, last, simulator), rules):
                 break
             last, fitted = simulator, _fit(record, None, prior, terms)

@@ -78,7 +78,6 @@ def export(model: FittedModel, folder: Path | str, *, created: datetime | None =
     for name, inputs in golden_inputs(planning, values, settings, random).items():
         session = open_model(graphs[name])
         golden[name] = Golden(inputs, run_graph(session, inputs))
-    lamps = model.site.greenhouse.lamps
     drawn = model.posterior.sample(random, MEMBERS, *bounds(model.posterior.names))
     manifest = Manifest(
         site=model.site.name,
@@ -104,8 +103,7 @@ def export(model: FittedModel, folder: Path | str, *, created: datetime | None =
         simulator={
             "latitude": model.site.latitude,
             "longitude": model.site.longitude,
-            "mean_height": model.site.greenhouse.mean_height,
-            "lamp_efficacy": lamps.efficacy if lamps else 0.0,
+            **_constants(model.site),
             "leaf_area_index": 3.0,
             "conversion": crop.conversion,
             "maintenance": crop.maintenance,
@@ -185,13 +183,15 @@ def _history_of(bundle: Bundle) -> Discrepancy | None:
         raise BundleError(f"{path}: not readable: {error.strerror}") from None
 
 
+def _constants(site: Site) -> dict[str, float]:
+    """Return what the climate stage knows of a greenhouse beside its parameters."""
+    lamps = site.greenhouse.lamps
+    return {"mean_height": site.greenhouse.mean_height, "lamp_efficacy": lamps.efficacy if lamps else 0.0}
+
+
 def _parameter_values(model: FittedModel, reference: datetime) -> dict[str, float]:
     """Return the value of each row of the graphs' input `parameters`."""
-    lamps = model.site.greenhouse.lamps
-    values = {
-        "mean_height": model.site.greenhouse.mean_height,
-        "lamp_efficacy": lamps.efficacy if lamps else 0.0,
-    }
+    values = _constants(model.site)
     values |= {f"parameter:{name}": value for name, value in model.posterior.values.items()}
     values |= {f"actuation:{name}": float(value) for name, value in model.actuation.items()}
     values |= {f"holding:{name}": float(value) for name, value in model.holding.items()}

@@ -26,8 +26,7 @@ EVERY = 11_100.0
 Predictor = Callable[[Integers, int], Mapping[str, Floats]]
 """`predict(starts, steps)`: what is predicted for the rows after each start, by quantity, (steps, s)."""
 
-
-Simulator = tuple[Mapping[str, float], ActiveEffects]
+Model = tuple[Mapping[str, float], ActiveEffects]
 """Parameters of the climate stage, and active effects."""
 
 
@@ -66,9 +65,9 @@ def evaluate(
 
 
 def held_out_errors(
-    record: Record, rows: Mask, before: Simulator, after: Simulator, horizons: Sequence[str] = CARRIED
+    record: Record, rows: Mask, before: Model, after: Model, horizons: Sequence[str] = CARRIED
 ) -> tuple[HeldOutError, ...]:
-    """Return the errors of one simulator beside those of another, on rows that no fit saw, (n,)."""
+    """Return the errors of one model beside those of another, on rows that no fit saw, (n,)."""
     old, new = (evaluate(record, *one, horizons, rows) for one in (before, after))
     return tuple(
         HeldOutError(

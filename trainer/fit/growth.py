@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from igrow.core.arrays import Floats, Integers
 from igrow.core.bundle import Bundle, BundleError, default_bundle_folder, read_bundle
 from igrow.core.local_time import to_local
 from igrow.core.simulator.crop import CropStages
@@ -24,7 +24,6 @@ from igrow.trainer.data import Log
 from igrow.trainer.data.source import DailyTable
 from igrow.trainer.training.stage_file import stages_from_bytes
 
-Values = NDArray[np.float64]
 CROP_FILE = "crop.npz"
 COUNTING = 0.15
 """Standard deviation of a count over what is usual in as many days: plants are a sample, no picking is on time."""
@@ -127,7 +126,7 @@ def growth_days(record: Record, parameters: Mapping[str, float], time_zone: str)
     known = record.usable & np.isfinite(drivers["assimilation"]) & np.isfinite(states["air_temperature"])
     measured = np.bincount(number, known)
 
-    def total(values: Values) -> Values:
+    def total(values: Floats) -> Floats:
         summed = np.bincount(number, np.where(known, values, 0.0))
         # What was not measured of a day is taken as the rest of it.
         whole = 24.0 / np.maximum(measured, 1.0)
@@ -159,7 +158,7 @@ def counts_of(
     return _between((harvests.day - first).astype(np.int64) + 1, np.cumsum(picked), "picked", days)
 
 
-def _between(at: NDArray[np.int64], running: Values, kind: str, days: int) -> list[Count]:
+def _between(at: Integers, running: Floats, kind: str, days: int) -> list[Count]:
     """Return the counts between days at which a running total is known, as far as they lie within `days`."""
     chosen = [0]
     for row in range(1, len(at)):

@@ -128,10 +128,7 @@ def read_population(path: Path) -> Population:
     Raises:
         IgrowError: the file cannot be read, or is none; in one line.
     """
-    try:
-        document = parse_object(path.read_bytes(), str(path))
-    except OSError as error:
-        raise IgrowError(f"{path}: {error.strerror}; `igrow-trainer fleet learn` writes it") from None
+    document = _document(path)
     sites = document.get("sites")
     if not isinstance(sites, int):
         raise IgrowError(f"{path}: no file of `igrow-trainer fleet learn`")
@@ -144,11 +141,15 @@ def read_learned(path: Path) -> Learned:
     Raises:
         IgrowError: the file cannot be read, or is none; in one line.
     """
-    try:
-        document = parse_object(path.read_bytes(), str(path))
-    except OSError as error:
-        raise IgrowError(f"{path}: {error.strerror}") from None
+    document = _document(path)
     return Learned(_numbers(document, "shift", path), _numbers(document, "variance", path))
+
+
+def _document(path: Path) -> dict[str, Any]:
+    try:
+        return parse_object(path.read_bytes(), str(path))
+    except OSError as error:
+        raise IgrowError(f"{path}: {error.strerror}; `igrow-trainer fleet learn` writes it") from None
 
 
 def _numbers(document: Mapping[str, Any], key: str, path: Path) -> dict[str, float]:

@@ -18,7 +18,8 @@ from igrow.trainer.given import READ, must_be
 from igrow.trainer.scoring.bundles import BY_SETPOINTS, runs_by_actuators, score_bundle, unseen_part
 
 PERSISTENCE = "persistence"
-Simulator = FittedModel | Bundle | str | Path
+Judged = FittedModel | Bundle | str | Path
+"""A model, a bundle, or the folder of one."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -68,7 +69,7 @@ class Comparison:
 
 
 def compare(
-    simulators: Mapping[str, Simulator] | Sequence[Simulator], log: Log, horizons: Sequence[str] = CARRIED
+    simulators: Mapping[str, Judged] | Sequence[Judged], log: Log, horizons: Sequence[str] = CARRIED
 ) -> Comparison:
     """Return the errors of several simulators on a log.
 
@@ -90,7 +91,7 @@ def compare(
     return Comparison(log.name, {name: _scores(one, log, horizons) for name, one in given})
 
 
-def _named(simulators: Sequence[Simulator]) -> Iterable[tuple[str, Simulator]]:
+def _named(simulators: Sequence[Judged]) -> Iterable[tuple[str, Judged]]:
     for number, one in enumerate(simulators, 1):
         if isinstance(one, FittedModel):
             yield f"{number} {one.calibrated_on or 'described'}", one
@@ -98,7 +99,7 @@ def _named(simulators: Sequence[Simulator]) -> Iterable[tuple[str, Simulator]]:
             yield f"{number} {one.label if isinstance(one, Bundle) else Path(one).name}", one
 
 
-def _scores(simulator: Simulator, log: Log, horizons: Sequence[str]) -> Evaluation:
+def _scores(simulator: Judged, log: Log, horizons: Sequence[str]) -> Evaluation:
     """Return the errors driven by what the actuators did; of the network variant, by the setpoints that it knows."""
     if not isinstance(simulator, FittedModel):
         bundle = simulator if isinstance(simulator, Bundle) else read_bundle(Path(simulator))
