@@ -9,9 +9,9 @@ import pytest
 
 from igrow.core.errors import IgrowError
 from igrow.core.telemetry import Telemetry
-from igrow.core.yaml_schema import SchemaError, parse
+from igrow.core.yaml_schema import SchemaError, load, parse
 from igrow.trainer.data.export import read
-from igrow.trainer.data.mapping import ExportMapping, load
+from igrow.trainer.data.mapping import ExportMapping
 
 DUTCH = """
 delimiter: ";"
@@ -75,7 +75,7 @@ def test_a_mapping_that_means_nothing_is_refused_with_its_place(tmp_path: Path, 
     path = tmp_path / "mapping.yaml"
     path.write_text(text)
     with pytest.raises(SchemaError, match=message):
-        load(path)
+        load(path, ExportMapping)
 
 
 def test_quoted_decimal_commas_between_commas_are_read(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.shared_changes import evidence
 from igrow.core.arrays import Floats
 from igrow.core.errors import IgrowError
 from igrow.trainer.diagnosis import drift
@@ -44,7 +45,7 @@ def test_what_was_learned_makes_its_logs_likelier() -> None:
     logs = pairs(true, 40)
     found = drift.learn(logs, 42.0)
     learned = np.array([found.rates[key] for key in KEYS])
-    told = [sum(drift.evidence(one, rates * one.unit) for one in logs) for rates in (learned, np.full(4, 0.02))]
+    told = [sum(evidence(one, rates * one.unit) for one in logs) for rates in (learned, np.full(4, 0.02))]
     assert told[0] > told[1]
 
 

@@ -7,7 +7,6 @@ import sys
 from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import Any
 
 from igrow.core.errors import IgrowError
 from igrow.trainer.cli.common import utc_now
@@ -25,17 +24,6 @@ EXAMPLE = (
     "  igrow-trainer fleet recalibrate /srv/fleet             # those that are due; --site NAME for one\n"
     "  igrow-trainer fleet status /srv/fleet --page /var/www/greenhouses"
 )
-
-
-FUNCTIONS = {
-    "collect": "collect_site",
-    "diagnose": "recalibrate_site",
-    "recalibrate": "recalibrate_site",
-    "calibrate": "calibrate_site",
-    "learn": "learn_from_site",
-    "publish": "publish_site",
-}
-"""Of `work.py`, by action."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -103,21 +91,21 @@ def make_task(arguments: argparse.Namespace, registry: Registry, entry: Entry, n
     site, file, keys = entry.site.name, str(entry.file.resolve()), str(registry.keys.resolve())
     asked = vars(arguments)
     days, drift = asked.get("days"), shared(entry, registry.drift)
-    own: dict[str, Any] = {
-        "collect": {"site": site, "forward_to": registry.file.forward, "take_over": asked.get("take_over")},
-        "publish": {"site": site, "keys": keys, "again": asked.get("again")},
-        "diagnose": {"file": file, "keys": keys, "publish": False, "force": True, "days": days, "drift": drift},
-        "recalibrate": {
-            "file": file, "keys": keys, "publish": True, "force": asked.get("force"), "days": days, "drift": drift,
-        },
-        "learn": {"file": file, "days": days},
-        "calibrate": {"file": file, "keys": keys, "days": days, "population": shared(entry, registry.population)},
-    }  # fmt: skip
+    again = {"file": file, "keys": keys, "days": days, "drift": drift}
+    population, forward = shared(entry, registry.population), registry.file.forward
+    function, own = {
+        "collect": ("collect_site", {"site": site, "forward_to": forward, "take_over": asked.get("take_over")}),
+        "publish": ("publish_site", {"site": site, "keys": keys, "again": asked.get("again")}),
+        "diagnose": ("recalibrate_site", {**again, "publish": False, "force": True}),
+        "recalibrate": ("recalibrate_site", {**again, "publish": True, "force": asked.get("force")}),
+        "learn": ("learn_from_site", {"file": file, "days": days}),
+        "calibrate": ("calibrate_site", {"file": file, "keys": keys, "days": days, "population": population}),
+    }[arguments.action]
     limits = registry.file.limits
     return Task(
         entry.site.name,
-        f"igrow.trainer.fleet.work:{FUNCTIONS[arguments.action]}",
-        {**common, **own[arguments.action]},
+        f"igrow.trainer.fleet.work:{function}",
+        {**common, **own},
         seconds=limits.time.total_seconds(),
         megabytes=limits.memory,
         retries=limits.retries,

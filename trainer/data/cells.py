@@ -41,11 +41,6 @@ class Cells:
     sheet: str = ""
     """Its name, where the file is a workbook and it was asked for by name."""
 
-    @property
-    def width(self) -> int:
-        """Cells of the longest row."""
-        return max((len(row) for row in self.rows), default=0)
-
 
 _MARKS = (b"\xff\xfe", b"\xfe\xff")
 """Of texts in UTF-16, which are full of zeros."""

@@ -18,10 +18,8 @@ from __future__ import annotations
 # ruff: noqa: RUF009 - `setting` makes a dataclass field
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
-from igrow.core import yaml_schema
 from igrow.core.errors import IgrowError
 from igrow.core.local_time import zone
 from igrow.core.quantities import QUANTITIES
@@ -118,8 +116,3 @@ class ExportMapping:
         else:
             read = [name for rule in self.columns.values() for name in (rule.column, *rule.add)]
         return {self.time.column, *filter(None, [self.time.time_of_day]), *read, *self.only}
-
-
-def load(path: Path) -> ExportMapping:
-    """Read a mapping file; raises SchemaError with file, line and column."""
-    return yaml_schema.load(path, ExportMapping)

@@ -12,8 +12,10 @@ import numpy as np
 from igrow.core import telemetry as core
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import QUANTITIES
-from igrow.trainer.data import export, mapping
+from igrow.core.yaml_schema import load
+from igrow.trainer.data import export
 from igrow.trainer.data.cells import ARCHIVE, ENDINGS, EXCEL, may_be_table, read_frame
+from igrow.trainer.data.mapping import ExportMapping
 from igrow.trainer.data.rows import Merged, joined, merge
 from igrow.trainer.data.source import Source
 
@@ -52,7 +54,7 @@ def unpacked(path: Path) -> Path:
 def read_file(path: Path, translation: Path | None = None) -> Merged:
     """Return one file: an export by its mapping, or telemetry in CSV (gzip or not) or Parquet; raises IgrowError."""
     if translation is not None:
-        return export.read(path, mapping.load(translation))
+        return export.read(path, load(translation, ExportMapping))
     if path.name.lower().endswith(EXCEL):
         raise IgrowError(f"{path}: a workbook needs a mapping")
     return read_parquet(path) if path.suffix.lower() == ".parquet" else merge(*core.read_rows(path))

@@ -23,12 +23,12 @@ from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.data.log import Log
 from igrow.trainer.diagnosis import freerun, linear, sensitivity
 from igrow.trainer.diagnosis.estimate import normal_quantile
-from igrow.trainer.diagnosis.freerun import LogDays, Stage
+from igrow.trainer.diagnosis.freerun import SCALES, LogDays, Stage
 from igrow.trainer.diagnosis.knowledge import Knowledge, activate
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.fit.actuation import setpoint_columns
 from igrow.trainer.fit.model import FittedModel
-from igrow.trainer.fit.scales import CORRELATION_TIME, ERROR_SCALES
+from igrow.trainer.fit.scales import CORRELATION_TIME
 from igrow.trainer.fit.solver import DivergenceError
 
 REPLACEABLE = (*actuation.POSITIONS, "lamp_power")
@@ -80,7 +80,8 @@ class Completed:
 
 def complete(log: Log, days: LogDays, model: FittedModel, knowledge: Knowledge, rules: DecisionRules) -> Completed:
     """Return a log with the courses of those actuators that it lacks and that explain its errors, the best first."""
-    tried = {name: course for name, course in courses(log, days.record, model).items() if _moves(course)}
+    known = courses(log, days.record, model)
+    tried = {name: course for name, course in known.items() if np.isfinite(course).all() and np.ptp(course) > 0.0}
     plain: Stage | None = None
     found: list[Replaced] = []
     current = days
@@ -133,10 +134,6 @@ def courses(log: Log, seen: Record, model: FittedModel) -> dict[str, Floats]:
     return done
 
 
-def _moves(course: Floats) -> bool:
-    return bool(np.isfinite(course).all() and np.ptp(course) > 0.0)
-
-
 def with_inputs(days: LogDays, inputs: Mapping[str, Floats]) -> LogDays:
     """Return the log with actuators, (n,) each, in the place of those that it lacks."""
     seen = days.record
@@ -150,8 +147,7 @@ def _errors(days: LogDays, values: Mapping[str, float], knowledge: Knowledge) ->
         line = sensitivity.linearise(days.record, days.runs, values, activate(days.record, knowledge.terms))
     except DivergenceError:
         return np.full(days.runs.weight.shape, np.inf)
-    scale = np.array([ERROR_SCALES[name] for name in measurement.PREDICTED])[:, None, None]
-    counted: Floats = np.where(days.split.fit[days.runs.day][None, :, None], line.errors / scale, 0.0)
+    counted: Floats = np.where(days.split.fit[days.runs.day][None, :, None], line.errors / SCALES, 0.0)
     return counted
 
 
@@ -172,7 +168,6 @@ def share_of_course(days: LogDays, trial: LogDays, knowledge: Knowledge, rules: 
         DivergenceError: the model runs out of all bounds on one of the two.
     """
     prior, values = knowledge.prior, knowledge.posterior.values
-    scale = np.array([ERROR_SCALES[name] for name in measurement.PREDICTED])[:, None, None]
     counted = days.runs.weight & trial.runs.weight
     bare, dressed = (
         sensitivity.linearise(one.record, one.runs, values, activate(one.record, knowledge.terms))
@@ -180,7 +175,7 @@ def share_of_course(days: LogDays, trial: LogDays, knowledge: Knowledge, rules: 
     )
     slopes = sensitivity.parameter_sensitivities(dressed, prior.names, prior.standard_deviation)
     columns = np.concatenate([bare.errors[None], slopes, (dressed.errors - bare.errors)[None]])
-    weighted = np.where(counted, columns / scale, 0.0) * np.sqrt(days.record.step / CORRELATION_TIME)
+    weighted = np.where(counted, columns / SCALES, 0.0) * np.sqrt(days.record.step / CORRELATION_TIME)
     grams = linear.DailyGrams(linear.daily_products(weighted, days.runs.day, days.split.days), days.split.fit)
     moved = prior.mean - np.array([values[name] for name in prior.names])
     base = tuple(range(1, len(slopes) + 1))

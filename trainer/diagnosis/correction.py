@@ -86,16 +86,12 @@ def correct(
 
 def stands(one: Estimated, kept: Sequence[Estimated], rules: DecisionRules) -> bool:
     """Tell whether a cause is large enough, and holds on unseen days; one beside others must do more."""
-    if one.effect_to_noise < rules.least_effect_to_noise or not same_in_all_regimes(one.regimes, rules):
+    if not _is_large(one, rules):
         return False
-    if not kept:
-        likelier = one.bootstrap_p <= rules.largest_bootstrap_p
-        return one.skill >= rules.clear_skill or (one.skill >= rules.least_skill and likelier)
-    return (
-        one.skill >= rules.further_skill
-        and one.bootstrap_p <= rules.further_bootstrap_p
-        and one.gain >= rules.further_gain_share * sum(other.gain for other in kept)
-    )
+    if kept:
+        return one.skill >= rules.further_skill and _adds_to(one, kept, rules)
+    likelier = one.bootstrap_p <= rules.largest_bootstrap_p
+    return one.skill >= rules.clear_skill or (one.skill >= rules.least_skill and likelier)
 
 
 def is_proven_change(one: Estimated, kept: Sequence[Estimated], rules: DecisionRules) -> bool:
@@ -106,16 +102,21 @@ def is_proven_change(one: Estimated, kept: Sequence[Estimated], rules: DecisionR
     """
     if stands(one, kept, rules):
         return True
-    large = one.effect_to_noise >= rules.least_effect_to_noise and same_in_all_regimes(one.regimes, rules)
-    if not kept:
-        # A few held-out days are no second test of a gain that all others bear out: they must not
-        # clearly speak against it.
-        return large and one.skill >= rules.least_change_skill and one.bootstrap_p <= rules.largest_bootstrap_p
-    return (
-        large
-        and one.bootstrap_p <= rules.further_bootstrap_p
-        and one.gain >= rules.further_gain_share * sum(other.gain for other in kept)
-    )
+    if kept:
+        return _is_large(one, rules) and _adds_to(one, kept, rules)
+    # A few held-out days are no second test of a gain that all others bear out: they must not clearly speak against it.
+    likelier = one.bootstrap_p <= rules.largest_bootstrap_p
+    return _is_large(one, rules) and one.skill >= rules.least_change_skill and likelier
+
+
+def _is_large(one: Estimated, rules: DecisionRules) -> bool:
+    return one.effect_to_noise >= rules.least_effect_to_noise and same_in_all_regimes(one.regimes, rules)
+
+
+def _adds_to(one: Estimated, kept: Sequence[Estimated], rules: DecisionRules) -> bool:
+    """Tell whether a further cause makes unseen days likelier, and gains a share of what those before it did."""
+    gained = sum(other.gain for other in kept)
+    return one.bootstrap_p <= rules.further_bootstrap_p and one.gain >= rules.further_gain_share * gained
 
 
 def same_in_all_regimes(regimes: Mapping[str, Estimate], rules: DecisionRules) -> bool:

@@ -189,26 +189,13 @@ def learn(pairs: Sequence[Pair], days: float, known: Drift | None = None) -> Dri
 def expected_squares(pair: Pair, change: Floats) -> Floats:
     """Return the expected square of each change given the log, (k,), at changes of standard deviation `change`."""
     variance = change**2
-    prior = _inverse(pair.known + np.diag(variance))
-    posterior = _inverse(pair.information + prior)
+    prior = inverse_of(pair.known + np.diag(variance))
+    posterior = inverse_of(pair.information + prior)
     to_change = variance[:, None] * prior
     mean = to_change @ (posterior @ pair.score)
     spread = variance - variance * np.diag(prior) * variance + np.sum((to_change @ posterior) * to_change, axis=1)
     squares: Floats = np.asarray(mean**2 + spread, dtype=np.float64)
     return squares
-
-
-def evidence(pair: Pair, change: Floats) -> float:
-    """Return the log marginal likelihood of a later log over that of no change and full knowledge.
-
-    Args:
-        pair: what the log says.
-        change: standard deviation of every change, (k,).
-    """
-    prior = pair.known + np.diag(change**2)
-    posterior = _inverse(pair.information + _inverse(prior))
-    scaled = np.eye(len(prior)) + pair.information @ prior
-    return float(0.5 * pair.score @ posterior @ pair.score - 0.5 * np.linalg.slogdet(scaled)[1])
 
 
 def _usual(squares: Mapping[str, Sequence[float]]) -> dict[str, float]:
@@ -219,7 +206,7 @@ def _usual(squares: Mapping[str, Sequence[float]]) -> dict[str, float]:
     return {group: math.exp(sum(logs) / len(logs)) for group, logs in groups.items()}
 
 
-def _inverse(matrix: Floats) -> Floats:
+def inverse_of(matrix: Floats) -> Floats:
     """Return the inverse of a covariance whose entries differ by many orders of magnitude."""
     scale = 1.0 / np.sqrt(np.diag(matrix))
     inverse: Floats = np.linalg.inv(matrix * scale[:, None] * scale) * scale[:, None] * scale

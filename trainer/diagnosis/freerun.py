@@ -29,6 +29,8 @@ from igrow.trainer.fit.scales import CORRELATION_TIME, ERROR_SCALES, ROBUST
 
 HORIZONS: Mapping[str, float] = {"1_step": 1500.0, "24_h": 10_800.0, "7_d": 86_400.0}
 """Of `igrow.trainer.fit.evaluation.HORIZONS`; seconds between the starts of their runs."""
+SCALES = np.array([ERROR_SCALES[name] for name in measurement.PREDICTED])[:, None, None]
+"""Of errors by balance, (3, 1, 1)."""
 EVALUATIONS = 20
 """Points that a fit may try."""
 
@@ -85,7 +87,6 @@ class LogDays:
             DivergenceError: the model runs out of all bounds where the fit begins.
         """
         record, runs, effects = self.record, self.runs, activate(self.record, terms)
-        scale = np.array([ERROR_SCALES[name] for name in measurement.PREDICTED])[:, None, None]
         counted = (runs.weight & self.split.fit[runs.day][None, :, None]).ravel()
         low, high = bounds(prior.names)
         begin = np.array([(start or prior.values)[name] for name in prior.names])
@@ -94,12 +95,12 @@ class LogDays:
             return sensitivity.linearise(record, runs, clipped(prior.names, point), effects, added)
 
         def residuals(point: Floats) -> Floats:
-            flat: Floats = (line(point).errors / scale).ravel()[counted]
+            flat: Floats = (line(point).errors / SCALES).ravel()[counted]
             return flat
 
         def jacobian(point: Floats) -> Floats:
             slopes = sensitivity.parameter_sensitivities(line(point), prior.names, prior.standard_deviation)
-            flat: Floats = (slopes / scale).reshape(len(slopes), -1)[:, counted].T
+            flat: Floats = (slopes / SCALES).reshape(len(slopes), -1)[:, counted].T
             return flat
 
         weight = record.step / CORRELATION_TIME

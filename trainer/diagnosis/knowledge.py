@@ -73,7 +73,7 @@ def knowledge_of(model: FittedModel, site: Site, rules: DecisionRules) -> Knowle
     if not at_home:
         posterior = posterior.widened(drift(posterior.values, rules.transferred_drift, rules))
     # Fits to free runs may move further than a greenhouse changes: a parameter also stands in for what has no name.
-    prior = posterior.widened(general_drift(posterior.values, rules))
+    prior = posterior.widened(drift(posterior.values, rules.parameter_drift, rules))
     history = model.history if at_home and rules.history else None
     low, high = bounds(prior.names)
     shift = np.array([discrepancy.get(PARAMETER_PREFIX + name, 0.0) for name in prior.names])
@@ -96,11 +96,6 @@ def drift(mean: Mapping[str, float], share: float, rules: DecisionRules) -> Floa
     return np.array(
         [share * max(abs(value), rules.least_drift_share * abs(PARAMETERS[name].value)) for name, value in mean.items()]
     )
-
-
-def general_drift(mean: Mapping[str, float], rules: DecisionRules) -> Floats:
-    """Return the change to expect of every parameter where little is known of the greenhouse, (p,)."""
-    return drift(mean, rules.parameter_drift, rules)
 
 
 def home_drift(mean: Mapping[str, float], rules: DecisionRules) -> Floats:

@@ -64,11 +64,9 @@ def evaluate(
     return summarise([errors_of(record, free_runs(record, parameters, effects), horizons, rows)])
 
 
-def held_out_errors(
-    record: Record, rows: Mask, before: Model, after: Model, horizons: Sequence[str] = CARRIED
-) -> tuple[HeldOutError, ...]:
+def held_out_errors(record: Record, rows: Mask, before: Model, after: Model) -> tuple[HeldOutError, ...]:
     """Return the errors of one model beside those of another, on rows that no fit saw, (n,)."""
-    old, new = (evaluate(record, *one, horizons, rows) for one in (before, after))
+    old, new = (evaluate(record, *one, CARRIED, rows) for one in (before, after))
     return tuple(
         HeldOutError(
             quantity,

@@ -14,7 +14,7 @@ from igrow.core.quantities import difference_with_unit, with_unit
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data.fault import DataFault, Remedy
-from igrow.trainer.data.plausibility.units import FAHRENHEIT, LEAST_VALUES, PIPES, RELATIVE_IN_PER_CENT, changed
+from igrow.trainer.data.plausibility.units import FAHRENHEIT, LEAST_VALUES, PIPES, RELATIVE_IN_PER_CENT, in_another_unit
 
 LAG_DAYS = 30
 """By which the seasons of the air follow the sun."""
@@ -73,7 +73,7 @@ def _outdoor_temperature(telemetry: Telemetry, site: Site | None) -> DataFault |
         f"{name} has a median of {middle:.4g}, where these weeks at {site.latitude:g} deg of latitude never "
         f"have more than {limit}, so it is in degF"
     )
-    return DataFault("fahrenheit", name, seen, changed(name, FAHRENHEIT), FAHRENHEIT)
+    return in_another_unit("fahrenheit", name, seen, FAHRENHEIT)
 
 
 def _sky(telemetry: Telemetry) -> DataFault | None:
@@ -88,7 +88,7 @@ def _sky(telemetry: Telemetry) -> DataFault | None:
         return None
     warmer = difference_with_unit(name, sky - air, ".3g")
     seen = f"{name} is {warmer} warmer than the air outside, so it is in degF"
-    return DataFault("fahrenheit", name, seen, changed(name, FAHRENHEIT), FAHRENHEIT)
+    return in_another_unit("fahrenheit", name, seen, FAHRENHEIT)
 
 
 def _pipe(telemetry: Telemetry, name: str) -> DataFault | None:
@@ -109,7 +109,7 @@ def _pipe(telemetry: Telemetry, name: str) -> DataFault | None:
         return None
     warmer = difference_with_unit(name, above, ".3g")
     seen = f"{name} at rest is {warmer} warmer than the air, so it is in degF"
-    return DataFault("fahrenheit", name, seen, changed(name, FAHRENHEIT), FAHRENHEIT)
+    return in_another_unit("fahrenheit", name, seen, FAHRENHEIT)
 
 
 def _outdoor_humidity(telemetry: Telemetry) -> DataFault | None:
@@ -138,7 +138,7 @@ def _carbon_outside(telemetry: Telemetry) -> DataFault | None:
     if not CARBON_OUTSIDE[0] <= middle * _MILLIGRAMS.scale <= CARBON_OUTSIDE[1]:
         return None
     seen = f"{name} has a median of {middle:.4g}, so it is in mg m-3"
-    return DataFault("milligrams", name, seen, changed(name, _MILLIGRAMS), _MILLIGRAMS)
+    return in_another_unit("milligrams", name, seen, _MILLIGRAMS)
 
 
 def _readings(telemetry: Telemetry, name: str) -> Floats:

@@ -224,25 +224,23 @@ def _unit(telemetry: Telemetry, site: Site) -> DataFault | None:
         "kJ m-2 an hour": Remedy(1.0 / 3.6),
         "lux": Remedy(1.0 / 115.0),
     }
-    possible = {
-        name: remedy
-        for name, remedy in (smaller if clearness < DARKEST else larger).items()
-        if 0.55 * CLEAR <= clearness * remedy.scale / (step if remedy.amount == "interval" else 1.0) <= 1.5 * CLEAR
-    }
+
+    def within(least: float, most: float) -> dict[str, Remedy]:
+        """Return the units in which the clearest moments lie within these bounds."""
+        return {
+            name: remedy
+            for name, remedy in (smaller if clearness < DARKEST else larger).items()
+            if least <= clearness * remedy.scale / (step if remedy.amount == "interval" else 1.0) <= most
+        }
+
     part = "never more than" if clearness < DARKEST else "up to"
     seen = f"global_radiation is {part} {clearness:.2g} of what comes from the sun, where a clear sky lets 0.8 through"
     # In dull weeks no sky was clear: then a unit may make less of it than that, and W m-2 may have been so little.
     dull = clearness < DARKEST and len(np.unique(telemetry.time.astype("datetime64[D]"))) < DULL_DAYS
+    possible = within(0.55 * CLEAR, 1.5 * CLEAR) or within(DULLEST, 0.55 * CLEAR)
     if not possible:
-        possible = {
-            name: remedy
-            for name, remedy in (smaller if clearness < DARKEST else larger).items()
-            if DULLEST <= clearness * remedy.scale / (step if remedy.amount == "interval" else 1.0) <= 0.55 * CLEAR
-        }
-    if not possible:
-        return DataFault(
-            "radiation_unit", "global_radiation", seen, "it is not in W m-2: give its scale in the mapping"
-        )
+        mend = "it is not in W m-2: give its scale in the mapping"
+        return DataFault("radiation_unit", "global_radiation", seen, mend)
     mend = " or ".join(
         f"in {name}, then {{amount: {remedy.amount}, scale: {remedy.scale:.6g}}}" for name, remedy in possible.items()
     )

@@ -55,18 +55,23 @@ def changed(name: str, remedy: Remedy) -> str:
     return f"in the mapping: {name}: {{column: ..., scale: {remedy.scale:.7g}, offset: {remedy.offset:.7g}}}"
 
 
+def in_another_unit(kind: str, name: str, seen: str, remedy: Remedy) -> DataFault:
+    """Return the fault of a column of which scale and offset alone are wrong, for certain."""
+    return DataFault(kind, name, seen, changed(name, remedy), remedy)
+
+
 def _temperature(name: str, values: Floats) -> DataFault | None:
     low, middle, high = (float(one) for one in np.quantile(values, (0.05, 0.5, 0.95)))
     seen = f"{name} has a median of {middle:.4g}"
     if low > 233.0 and high < 333.0 and high - low < 70.0:
-        return DataFault("kelvin", name, f"{seen}, so it is in kelvin", changed(name, _KELVIN), _KELVIN)
+        return in_another_unit("kelvin", name, f"{seen}, so it is in kelvin", _KELVIN)
     if middle <= HOTTEST_MEDIAN:
         return None
     if high < 140.0:
-        return DataFault("fahrenheit", name, f"{seen}, so it is in degF", changed(name, FAHRENHEIT), FAHRENHEIT)
+        return in_another_unit("fahrenheit", name, f"{seen}, so it is in degF", FAHRENHEIT)
     if high < 600.0:
         tenths = Remedy(0.1)
-        return DataFault("tenths", name, f"{seen}, so it is in tenths of degC", changed(name, tenths), tenths)
+        return in_another_unit("tenths", name, f"{seen}, so it is in tenths of degC", tenths)
     return DataFault("no_temperature", name, f"{seen} and is no temperature", "name its column anew (--column)")
 
 
@@ -76,13 +81,11 @@ def _pipe(name: str, values: Floats) -> DataFault | None:
         return None
     low, high = (float(one) for one in np.quantile(warm, (0.02, 0.98)))
     if low > 270.0 and high < 383.0:
-        return DataFault(
-            "kelvin", name, f"{name} lies above {low:.0f}, so it is in kelvin", changed(name, _KELVIN), _KELVIN
-        )
+        return in_another_unit("kelvin", name, f"{name} lies above {low:.0f}, so it is in kelvin", _KELVIN)
     # A pipe at rest is as warm as its greenhouse: never below 50 in degF, hardly above 40 in degC.
     if low > 48.0 and 100.0 < high < 240.0:
         seen = f"{name} lies between {low:.0f} and {high:.0f}, so it is in degF"
-        return DataFault("fahrenheit", name, seen, changed(name, FAHRENHEIT), FAHRENHEIT)
+        return in_another_unit("fahrenheit", name, seen, FAHRENHEIT)
     return None
 
 
@@ -91,7 +94,7 @@ def _humidity(name: str, values: Floats) -> DataFault | None:
     if high <= 1.05 and middle > 0.1:
         percent = Remedy(100.0)
         seen = f"{name} lies between 0 and 1 (median {middle:.2f}), so it is a fraction"
-        return DataFault("fraction", name, seen, changed(name, percent), percent)
+        return in_another_unit("fraction", name, seen, percent)
     if name == "air_humidity" and middle < 25.0 and high < 45.0:
         seen = f"{name} has a median of {middle:.3g} and hardly exceeds {high:.3g}: no greenhouse is so dry"
         return DataFault("absolute_humidity", name, seen, RELATIVE_IN_PER_CENT)
@@ -105,7 +108,7 @@ def _position(name: str, values: Floats) -> DataFault | None:
     if 0.3 < top <= 1.001 and (len(between) >= 15 or (values > 0.9).mean() > 0.05):
         percent = Remedy(100.0)
         seen = f"{name} never exceeds {top:.2g}, so it is a fraction"
-        return DataFault("fraction", name, seen, changed(name, percent), percent)
+        return in_another_unit("fraction", name, seen, percent)
     return None
 
 
@@ -113,9 +116,7 @@ def _carbon_dioxide(name: str, values: Floats) -> DataFault | None:
     middle = float(np.median(values))
     if 0.02 < middle < 0.6:
         parts = Remedy(10_000.0)
-        return DataFault(
-            "percent", name, f"{name} has a median of {middle:.3g}, so it is in %", changed(name, parts), parts
-        )
+        return in_another_unit("percent", name, f"{name} has a median of {middle:.3g}, so it is in %", parts)
     return None
 
 
@@ -162,5 +163,5 @@ def _switch(name: str, values: Floats) -> DataFault | None:
     top = float(values.max())
     if 1.5 < top <= 100.5 and (values > 1.5).mean() > 0.01:
         share = Remedy(0.01)
-        return DataFault("percent", name, f"{name} reaches {top:.3g}, so it is in %", changed(name, share), share)
+        return in_another_unit("percent", name, f"{name} reaches {top:.3g}, so it is in %", share)
     return None

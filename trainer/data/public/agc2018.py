@@ -64,10 +64,9 @@ def _setpoints(folder: Path, local: Times, columns: dict[str, Floats]) -> list[s
     time = excel_tables.excel_times(table["time"].to_numpy(dtype=np.float64), path)
     row = np.minimum(np.searchsorted(time, local), len(time) - 1)
     there = time[row] == local
-    for ours, theirs in {"heating_setpoint": "HeatTemp_Vip", "co2_setpoint": "CO2_Vip"}.items():
-        values = excel_tables.column(table, theirs)
-        if values is not None:
-            columns[ours] = np.where(there, values[row], np.nan)
+    names = {"heating_setpoint": "HeatTemp_Vip", "co2_setpoint": "CO2_Vip"}
+    for ours, values in excel_tables.columns(table, names).items():
+        columns[ours] = np.where(there, values[row], np.nan)
     return []
 
 

@@ -100,11 +100,7 @@ def _rate(since_midnight: Floats, local: Times) -> Floats:
 
 def _setpoints(table: Any) -> dict[str, Floats]:
     """Return the realised setpoints, which exist in all rows, unlike the requested ones."""
-    columns: dict[str, Floats] = {}
-    for ours, theirs in {"heating_setpoint": "t_heat_vip", "co2_setpoint": "co2_vip"}.items():
-        values = excel_tables.column(table, theirs)
-        if values is not None:
-            columns[ours] = values
+    columns = excel_tables.columns(table, {"heating_setpoint": "t_heat_vip", "co2_setpoint": "co2_vip"})
     lamp = excel_tables.column(table, "assim_vip")
     if lamp is not None:
         columns["lamp_on"] = np.clip(0.01 * lamp, 0.0, 1.0)

@@ -53,7 +53,6 @@ def choose(folder: Path, compartment: str | None, *stems: str) -> str:
 
 def weather(frame: Any) -> dict[str, Floats]:
     """Return the weather columns of a challenge's weather table by our names."""
-    columns: dict[str, Floats] = {}
     names = {
         "outdoor_temperature": "Tout",
         "outdoor_humidity": "Rhout",
@@ -61,10 +60,7 @@ def weather(frame: Any) -> dict[str, Floats]:
         "wind_speed": "Windsp",
         "rain": "Rain",
     }
-    for ours, theirs in names.items():
-        values = excel_tables.column(frame, theirs)
-        if values is not None:
-            columns[ours] = traps.without_spikes(ours, values)
+    columns = {ours: traps.without_spikes(ours, values) for ours, values in excel_tables.columns(frame, names).items()}
     net = excel_tables.column(frame, "Pyrgeo")
     if net is not None and "outdoor_temperature" in columns:
         # A pyrgeometer shows the sky's radiation minus its own, which is that of a body at outdoor temperature.
@@ -80,27 +76,23 @@ def weather(frame: Any) -> dict[str, Floats]:
 
 def climate(frame: Any) -> dict[str, Floats]:
     """Return measured climate and actuators of a challenge's climate table by our names, without lamps and CO2."""
-    columns: dict[str, Floats] = {}
-    names = {"air_temperature": "Tair", "air_humidity": "RHair", "air_co2": "CO2air"}
-    for ours, theirs in names.items():
-        values = excel_tables.column(frame, theirs)
-        if values is None:
+    sensors = {"air_temperature": "Tair", "air_humidity": "RHair", "air_co2": "CO2air"}
+    measured = excel_tables.columns(frame, sensors)
+    for ours, theirs in sensors.items():
+        if ours not in measured:
             raise IgrowError(f"the climate table has no column {theirs}")
-        columns[ours] = traps.without_spikes(ours, values)
-    names = {
+    columns = {ours: traps.without_spikes(ours, values) for ours, values in measured.items()}
+    positions = {
         "vent_lee": "VentLee",
         "vent_wind": "VentWind",
         "energy_screen": "EnScr",
         "blackout_screen": "BlackScr",
     }
-    for ours, theirs in names.items():
-        values = excel_tables.column(frame, theirs)
-        if values is not None:
-            columns[ours] = np.clip(values, 0.0, 100.0)
-    for ours, theirs in {"rail_pipe_temperature": "PipeLow", "grow_pipe_temperature": "PipeGrow"}.items():
-        values = excel_tables.column(frame, theirs)
-        if values is not None:
-            columns[ours] = traps.cooling_pipe(values, columns["air_temperature"], STEP)
+    for ours, values in excel_tables.columns(frame, positions).items():
+        columns[ours] = np.clip(values, 0.0, 100.0)
+    pipes = {"rail_pipe_temperature": "PipeLow", "grow_pipe_temperature": "PipeGrow"}
+    for ours, values in excel_tables.columns(frame, pipes).items():
+        columns[ours] = traps.cooling_pipe(values, columns["air_temperature"], STEP)
     return columns
 
 
@@ -120,8 +112,5 @@ def daily(path: Path | None, columns: Mapping[str, str]) -> DailyTable | None:
     if serial is None:
         raise IgrowError(f"{path}: no column time")
     known = np.isfinite(serial)
-    found = {ours: excel_tables.column(frame, theirs) for ours, theirs in columns.items()}
-    return DailyTable(
-        excel_tables.excel_days(serial[known]),
-        {ours: values[known] for ours, values in found.items() if values is not None},
-    )
+    found = excel_tables.columns(frame, columns)
+    return DailyTable(excel_tables.excel_days(serial[known]), {ours: values[known] for ours, values in found.items()})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -51,15 +52,21 @@ def read(path: Path) -> Any:
     return frame.apply(pd.to_numeric, errors="coerce")
 
 
-def column(frame: Any, *names: str) -> Floats | None:
-    """Return the first of these columns that is there and not empty, as float64, else None."""
+def column(frame: Any, name: str) -> Floats | None:
+    """Return a column that is there and not empty, as float64, else None."""
+    found = columns(frame, {name: name})
+    return found.get(name)
+
+
+def columns(frame: Any, names: Mapping[str, str]) -> dict[str, Floats]:
+    """Return those columns that are there and not empty, as float64: our names -> the file's, whatever their case."""
     by_name = {str(name).lower(): name for name in frame.columns}
-    for name in names:
-        if name.lower() in by_name:
-            values: Floats = frame[by_name[name.lower()]].to_numpy(dtype=np.float64)
-            if np.isfinite(values).any():
-                return values
-    return None
+    found = {
+        ours: frame[by_name[theirs.lower()]].to_numpy(dtype=np.float64)
+        for ours, theirs in names.items()
+        if theirs.lower() in by_name
+    }
+    return {ours: values for ours, values in found.items() if np.isfinite(values).any()}
 
 
 def excel_times(serial: Floats, path: Path) -> Times:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -68,17 +68,17 @@ def distances(folder: Path, books: Path) -> tuple[Champion, dict[str, Floats]]:
     return measured, curves
 
 
-def run(folder: Path, books: Path, out: Path, report: Callable[[str], None] = print) -> dict[str, float]:
+def run(folder: Path, books: Path, out: Path) -> dict[str, float]:
     """Print the distances; write figure3.json and figure3.svg to `out`. Returns the distance of each predictor."""
     measured, curves = distances(folder, books)
     result = {name: float(np.abs(curve - measured.measured).sum()) for name, curve in curves.items()}
-    report("| predictor | sum of absolute daily differences, EUR m-2 | net profit at the end, EUR m-2 |")
-    report("|---|---|---|")
+    print("| predictor | sum of absolute daily differences, EUR m-2 | net profit at the end, EUR m-2 |")
+    print("|---|---|---|")
     for name, curve in curves.items():
-        report(f"| {name} | {result[name]:.0f} | {curve[-1]:.2f} |")
-    report(f"| measured | | {measured.measured[-1]:.2f} |")
+        print(f"| {name} | {result[name]:.0f} | {curve[-1]:.2f} |")
+    print(f"| measured | | {measured.measured[-1]:.2f} |")
     for name, distance in PUBLISHED.items():
-        report(f"| as published: {name} | {distance:.0f} | |")
+        print(f"| as published: {name} | {distance:.0f} | |")
     out.mkdir(parents=True, exist_ok=True)
     (out / "figure3.json").write_text(json.dumps(result, indent=1))
     plot(out / "figure3.svg", measured, curves)

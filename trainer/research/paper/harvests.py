@@ -193,7 +193,9 @@ def as_text(title: str, errors: Sequence[HarvestError]) -> str:
 
 
 def run(
-    folder_2019: Path | None, folder_2018: Path | None, out: Path, report: Callable[[str], None] = print
+    folder_2019: Path | None,
+    folder_2018: Path | None,
+    out: Path,
 ) -> dict[str, list[HarvestError]]:
     """Print both tables and write harvests.json to `out`."""
     results: dict[str, list[HarvestError]] = {}
@@ -202,7 +204,7 @@ def run(
     if folder_2018 is not None:
         results["agc2018, cucumber"] = leave_one_out(read_2018(folder_2018))
     for title, errors in results.items():
-        report(as_text(title, errors))
+        print(as_text(title, errors))
     out.mkdir(parents=True, exist_ok=True)
     content = {title: [asdict(error) for error in errors] for title, errors in results.items()}
     (out / "harvests.json").write_text(json.dumps(content, indent=1))

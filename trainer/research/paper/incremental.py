@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import json
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -162,14 +161,13 @@ def run(
     out: Path,
     seed: int = 7,
     layouts: Layouts | None = None,
-    report: Callable[[str], None] = print,
 ) -> list[Step]:
     """Run the three steps, print the table and write incremental.json to `out`."""
     chosen = layouts or Layouts()
     seasons = read_seasons(virtual_folder)
     split = split_seasons(len(seasons.names), seed)
     training, test = seasons.select(split.training), seasons.select(split.test)
-    base = train_simulator(training.columns, seasons.hour, seasons.valid, chosen, seed, report)
+    base = train_simulator(training.columns, seasons.hour, seasons.valid, chosen, seed, print)
     real = hourly_run(agc2019.read(real_folder, compartment).telemetry, seasons, base)
     virtual_data = hourly_data(base.climate, derived(training.columns), seasons.hour, seasons.valid)
     last = real.weeks - TEST_WEEKS
@@ -180,7 +178,7 @@ def run(
     def scored(name: str, simulator: NetworkSimulator) -> Step:
         virtual = score(test.columns, free_run(simulator, test.columns, test.hour), seasons.valid)
         errors, persistence = day_errors(simulator.climate, held_out)
-        report(f"{name}: 24 h errors {np.round(errors, 2)}, persistence {np.round(persistence, 2)}")
+        print(f"{name}: 24 h errors {np.round(errors, 2)}, persistence {np.round(persistence, 2)}")
         return Step(
             name,
             {key: value.mean for key, value in virtual.items()},
@@ -190,12 +188,12 @@ def run(
     steps = [scored("virtual seasons only", base)]
     mixed_data = joined(virtual_data, only_weeks(real.data, 0, FIRST_WEEKS), REAL_SHARE)
     start = untrained(chosen.climate, mixed_data, seed)
-    mixed = replace(base, climate=train_stage(start, mixed_data, replace(MIXED, seed=seed), report))
+    mixed = replace(base, climate=train_stage(start, mixed_data, replace(MIXED, seed=seed), print))
     steps.append(scored(f"real weeks 1 to {FIRST_WEEKS} replace virtual ones", mixed))
     for name, share in (("stream, virtual seasons rehearsed", REAL_SHARE), ("stream, nothing rehearsed", 1.0)):
         tuned = stream(mixed.climate, virtual_data, real.data, range(FIRST_WEEKS, last), share, seed)
         steps.append(scored(name, replace(mixed, climate=tuned)))
-    report(as_text(steps))
+    print(as_text(steps))
     out.mkdir(parents=True, exist_ok=True)
     content = [{"name": step.name, "virtual": step.virtual, "real": step.real} for step in steps]
     (out / "incremental.json").write_text(json.dumps(content, indent=1))

@@ -91,22 +91,22 @@ def _line(unit: str, area: float, value: Callable[[str], float]) -> Line:
     )
 
 
-def run(folder: Path, out: Path, report: Callable[[str], None] = print) -> dict[str, Line]:
+def run(folder: Path, out: Path) -> dict[str, Line]:
     """Print the table beside the published one; write pilot.json, figure5.svg and figureS4.svg to figureS13.svg."""
     pilot = read(folder)
     lines = table(pilot)
-    report("| per greenhouse | growers (2) | iGrow (5) | change | p one-sample | p Student | p Welch |")
-    report("|---|---|---|---|---|---|---|")
+    print("| per greenhouse | growers (2) | iGrow (5) | change | p one-sample | p Student | p Welch |")
+    print("|---|---|---|---|---|---|---|")
     for name, one in lines.items():
         digits = 2 if one.control < 10.0 else 0
         cells = (f"{one.control:.{digits}f} ± {one.control_spread:.{digits}f}",
                  f"{one.experiment:.{digits}f} ± {one.experiment_spread:.{digits}f}", f"{one.change:+.2f} %",
                  f"{one.p_one_sample:.2g}", f"{one.p_student:.2g}", f"{one.p_welch:.2g}")  # fmt: skip
-        report(f"| {name}, {one.unit} | {' | '.join(cells)} |")
+        print(f"| {name}, {one.unit} | {' | '.join(cells)} |")
         if name in PUBLISHED:
             told = ", ".join(f"{what.replace('_', ' ')} {value:g}" for what, value in PUBLISHED[name].items())
-            report(f"| as published: {told} | | | | | | |")
-    report(f"{price_share(lines['yield'], lines['income']):.0f} % of the extra income is price, the rest harvest")
+            print(f"| as published: {told} | | | | | | |")
+    print(f"{price_share(lines['yield'], lines['income']):.0f} % of the extra income is price, the rest harvest")
     out.mkdir(parents=True, exist_ok=True)
     content = {"computed": {name: asdict(one) for name, one in lines.items()}, "published": PUBLISHED}
     (out / "pilot.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
@@ -114,7 +114,7 @@ def run(folder: Path, out: Path, report: Callable[[str], None] = print) -> dict[
     pairs = [(experiment, control) for experiment in range(3, 8) for control in (1, 2)]
     for number, (experiment, control) in enumerate(pairs, _FIRST_PAIR):
         climate_pair(folder, experiment, control, out / f"figureS{number}.svg")
-    report(f"figures 5 and S{_FIRST_PAIR} to S{_FIRST_PAIR + len(pairs) - 1} in {out}")
+    print(f"figures 5 and S{_FIRST_PAIR} to S{_FIRST_PAIR + len(pairs) - 1} in {out}")
     return lines
 
 

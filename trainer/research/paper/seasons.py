@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 
@@ -17,7 +16,9 @@ from igrow.trainer.research.paper.wur2020 import read_seasons
 
 
 def evaluate(
-    bundle: Path, data: Path, out: Path | None = None, report: Callable[[str], None] = print
+    bundle: Path,
+    data: Path,
+    out: Path | None = None,
 ) -> dict[str, Score]:
     """Run every season of `data` (a file in the format of trajectories.parquet) with the networks of `bundle`.
 
@@ -29,12 +30,12 @@ def evaluate(
     predicted = free_run(simulator, seasons.columns, seasons.hour)
     scores = score(seasons.columns, predicted, seasons.valid)
     every_hour = score(seasons.columns, predicted, np.ones_like(seasons.valid))
-    report(f"{len(seasons.names)} seasons of {seasons.time.size} hours, free runs from the first hour, R2")
-    report("| quantity | mean | worst season | every hour | published | published, incremental |")
-    report("|---|---|---|---|---|---|")
+    print(f"{len(seasons.names)} seasons of {seasons.time.size} hours, free runs from the first hour, R2")
+    print("| quantity | mean | worst season | every hour | published | published, incremental |")
+    print("|---|---|---|---|---|---|")
     for name in SCORED:
         mine = scores[name]
-        report(
+        print(
             f"| {name} | {mine.mean:.4f} | {mine.low:.4f} | {every_hour[name].mean:.4f} |"
             f" {PUBLISHED_BASELINE[name]:.3f} | {PUBLISHED_INCREMENTAL[name]:.3f} |"
         )

@@ -12,7 +12,6 @@ from __future__ import annotations
 import json
 import time
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -73,7 +72,6 @@ def run(
     *,
     choose: bool = False,
     workers: int = 1,
-    report: Callable[[str], None] = print,
 ) -> Table:
     """Train, run the held-out seasons and write table1.json, table1.png and the folder `bundle` to `out`.
 
@@ -89,7 +87,7 @@ def run(
     split = split_seasons(len(seasons.names), seed)
     rows = split.training if choose else np.concatenate([split.training, split.selection])
     learned, held_out = seasons.select(rows), seasons.select(split.selection if choose else split.test)
-    simulator = train_simulator(learned.columns, seasons.hour, seasons.valid, layouts, seed, report, workers)
+    simulator = train_simulator(learned.columns, seasons.hour, seasons.valid, layouts, seed, print, workers)
     write_network_bundle(
         out / BUNDLE_FOLDER,
         simulator,
@@ -109,7 +107,7 @@ def run(
     )
     (out / "table1.json").write_text(json.dumps(asdict(table), indent=1))
     plot(out / "table1.png", held_out, predicted)
-    report(as_text(table))
+    print(as_text(table))
     return table
 
 
