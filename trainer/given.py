@@ -1,8 +1,10 @@
-"""What a caller gave, for the functions that people type: of another kind, it is said in one line what is right."""
+"""What a caller gave, and what his machine has: where it is not right, one line says what would be."""
 
 from __future__ import annotations
 
 import datetime
+from importlib import import_module
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +14,14 @@ Moment = np.datetime64 | datetime.date | str
 """A time in UTC, or with a zone of its own; a date is its midnight."""
 READ = "read_log(path, site) makes one"
 MADE = "calibrate(log) or read_model(folder, site) makes one"
+
+
+def installed(package: str, extra: str, needed: str) -> Any:
+    """Return a package that not everybody has; raises IgrowError that names the extra of igrow that brings it."""
+    try:
+        return import_module(package)
+    except ImportError:
+        raise IgrowError(f"{needed} needs the package {package}: install igrow[{extra}]") from None
 
 
 def must_be(kind: type, value: object, right: str) -> None:

@@ -6,7 +6,6 @@ is killed costs a retry of its task, a run that is killed costs the tasks that h
 
 from __future__ import annotations
 
-import importlib
 import socket
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -18,6 +17,7 @@ from igrow.core.errors import IgrowError
 from igrow.trainer.fleet.registry import Backend
 from igrow.trainer.fleet.tasks import Task, TaskOutcome
 from igrow.trainer.fleet.worker import close_all, run_limited
+from igrow.trainer.given import installed
 
 ANSWERS_SECONDS = 20.0
 """Within which the head of a cluster takes a connection."""
@@ -48,7 +48,7 @@ def run_tasks(
 
 
 def _on_ray(tasks: Sequence[Task], workers: int, address: str | None) -> Iterator[TaskOutcome]:
-    ray = _ray()
+    ray = installed("ray", "ray", "`backend: ray`")
     began = not ray.is_initialized()
     if began:
         _connect(ray, workers, address)
@@ -87,10 +87,3 @@ def _connect(ray: Any, workers: int, address: str | None) -> None:
 
 def _first_line(error: Exception) -> str:
     return (str(error).strip().splitlines() or [type(error).__name__])[0]
-
-
-def _ray() -> Any:
-    try:
-        return importlib.import_module("ray")
-    except ImportError:
-        raise IgrowError("`backend: ray` needs the package ray: install igrow[ray]") from None

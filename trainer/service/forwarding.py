@@ -14,7 +14,6 @@ and have not changed since are left out.
 from __future__ import annotations
 
 import http.client
-import importlib
 import json
 import math
 import os
@@ -33,6 +32,7 @@ from igrow.core.errors import IgrowError
 from igrow.core.exchange.documents import parse_object
 from igrow.core.telemetry import Telemetry
 from igrow.core.whole_files import write_whole
+from igrow.trainer.given import installed
 from igrow.trainer.service.archive import Archive
 
 MEASUREMENT = "greenhouse"
@@ -139,7 +139,7 @@ def _post(url: str, body: bytes) -> None:
 
 
 def _insert(target: str, site: str, rows: Telemetry) -> None:
-    psycopg = _psycopg()
+    psycopg = installed("psycopg", "postgresql", "postgresql://")
     try:
         with psycopg.connect(target, connect_timeout=20) as connection, connection.cursor() as cursor:
             cursor.execute(CREATE_TABLE)
@@ -176,10 +176,3 @@ def _marks(path: Path) -> dict[str, Any]:
         return parse_object(path.read_bytes(), path.name)
     except (IgrowError, OSError):
         return {}
-
-
-def _psycopg() -> Any:
-    try:
-        return importlib.import_module("psycopg")
-    except ImportError:
-        raise IgrowError("postgresql:// needs the package psycopg: install igrow[postgresql]") from None

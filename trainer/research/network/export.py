@@ -26,7 +26,7 @@ from igrow.core.simulator.network_run import Carried, begin, known_inputs, run_h
 from igrow.trainer.exporting.blocks import OPSET, Block, Shape, open_model, trace_shaped, traceable
 from igrow.trainer.exporting.optimizer import export_optimizer, optimizer_inputs, optimizer_signature
 from igrow.trainer.exporting.wiring import Wiring, finished_model
-from igrow.trainer.research.network.checkpoint import FILE_NAME, simulator_to_bytes
+from igrow.trainer.research.network.checkpoint import FILE_NAME, STAGES, simulator_to_bytes
 
 CARRIED = tuple(field.name for field in fields(Carried))
 UNITS = {
@@ -49,7 +49,7 @@ def hourly_outputs(simulator: NetworkSimulator) -> tuple[str, ...]:
 def carried_widths(simulator: NetworkSimulator) -> dict[str, int]:
     """Return the last axis of each carried tensor."""
     widths = dict.fromkeys(CARRIED, 1)
-    for name in ("climate", "growth", "harvest"):
+    for name in STAGES:
         stage = getattr(simulator, name)
         widths |= {name: len(stage.states), f"{name}_memory": stage.memory_size}
     return widths
