@@ -12,7 +12,7 @@ import time
 from datetime import timedelta
 from typing import Protocol
 
-from igrow.core.yaml_schema import duration
+from igrow.core.yaml_scalars import duration
 from igrow.edge.bus.plc import Reading, RegisterPlc
 from igrow.edge.configuration import Configuration
 from igrow.edge.guard import GuardedWriter, GuardRules, GuardState, Request, guard

@@ -19,7 +19,8 @@ from igrow.core.exchange.address import Address, parse_address
 from igrow.core.local_time import zone
 from igrow.core.quantities import SETPOINTS
 from igrow.core.site import Site, load_site
-from igrow.core.yaml_schema import SchemaError, duration, load, place
+from igrow.core.yaml_scalars import duration
+from igrow.core.yaml_schema import SchemaError, load, place
 from igrow.edge.daemon_file import BUILT_IN_BUNDLE, ClockSource, CycleSettings, DaemonFile
 from igrow.edge.guard import DEFAULT_INTERLOCKS, GuardRules
 from igrow.edge.guard.heartbeat import HEARTBEAT

@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 
 from igrow.core.quantities import ACTUATORS, QUANTITIES, SETPOINTS
 from igrow.core.site import SetpointLimits
-from igrow.core.yaml_schema import SettingError, read_number, setting
+from igrow.core.yaml_scalars import read_number
+from igrow.core.yaml_schema import SettingError, setting
 from igrow.edge.guard import Bound, Interlock
 from igrow.edge.guard.interlocks import SAFE, InterlockError
 from igrow.edge.registers.model import SYSTEM_POINTS

@@ -1,17 +1,11 @@
 """Strict YAML: a file is read into a dataclass, and every error says `file:line:column: what, and what would be right`.
 
 A schema is a frozen dataclass whose fields are typed and made by `setting`. The file's own types are not used,
-since YAML 1.1 reads 12:30 as 750, NO as false, 0123 as 83 and 1e3 as text; a scalar is read by the field's type:
+since YAML 1.1 reads 12:30 as 750, NO as false, 0123 as 83 and 1e3 as text; a scalar is read by the field's type
+(`igrow.core.yaml_scalars`). Beside scalars:
 
 | field type | reads |
 |---|---|
-| `float`, `int` | 1200, 1.2e3, -5; `int` also 0x1f; no quotes, no leading zero, no infinity |
-| `bool` | true or false |
-| `str` | the text as written, on and 12:30 too |
-| an `Enum`, `Literal[...]` | one of its values |
-| `datetime.time` | 12:30 or 12:30:15 |
-| `datetime.date`, `datetime.datetime` | 2020-01-31; 2020-01-31T12:30:00Z |
-| `datetime.timedelta` | a number and a unit: 30 s, 5 min, 1 h, 2 days, 1 week |
 | `X | None` | null, or X |
 | `tuple[X, ...]`, `Mapping[str, X]`, a dataclass | a list, a mapping, the keys of the dataclass |
 | `A | B` of dataclasses | the one whose `Literal` field (such as `kind: Literal["tcp"]`) has the file's value |
@@ -25,31 +19,18 @@ from __future__ import annotations
 
 import dataclasses
 import datetime
-import difflib
 import os
-import re
 import types
 from collections.abc import Iterable, Mapping
-from enum import Enum
 from pathlib import Path
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import yaml
 
 from igrow.core.errors import IgrowError
+from igrow.core.yaml_scalars import convert, listed, nearest, wanted
 
 T = TypeVar("T")
-
-_NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?")
-_LEADING_ZERO = re.compile(r"[-+]?0\d")
-_DURATION = re.compile(r"(\d+(?:\.\d+)?)\s*([a-z]+)")
-_SECONDS = {
-    **dict.fromkeys(("s", "second", "seconds"), 1.0),
-    **dict.fromkeys(("min", "minute", "minutes"), 60.0),
-    **dict.fromkeys(("h", "hour", "hours"), 3600.0),
-    **dict.fromkeys(("day", "days"), 86_400.0),
-    **dict.fromkeys(("week", "weeks"), 604_800.0),
-}
 
 
 _NONE = ("none", "no", "false", "off", "nothing", "n/a", "-")
@@ -131,19 +112,6 @@ def place(path: str | os.PathLike[str], *keys: str | int) -> str:
     return f"{path}:{mark.line + 1}:{mark.column + 1}"
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
-    """Return `did you mean X?` for a misspelt name, or the list of what is known."""
-    choices = list(known)
-    found = difflib.get_close_matches(name, choices, n=1)
-    return f"did you mean {found[0]}?" if found else f"known here: {', '.join(choices)}"
-
-
-def read_number(text: str) -> float:
-    """Return a number written as in these files; for a key that is a number or a word. Raises ValueError."""
-    number: float = _convert(text, float)
-    return number
-
-
 class _Reader:
     """Reads nodes by type; knows the file's name for its errors."""
 
@@ -178,7 +146,7 @@ class _Reader:
             }
         if not isinstance(node, yaml.ScalarNode):
             found = "a list" if isinstance(node, yaml.SequenceNode) else "a mapping"
-            raise self.error(node, f"{where or 'the file'} is {found}: {_wanted(kind, limits)} is needed")
+            raise self.error(node, f"{where or 'the file'} is {found}: {wanted(kind, limits)} is needed")
         return self._scalar(node, kind, where, limits)
 
     def _pairs(self, node: yaml.Node, where: str) -> dict[str, tuple[yaml.Node, yaml.Node]]:
@@ -218,7 +186,7 @@ class _Reader:
                 values[name] = default
             else:
                 needed = f"{_join(where, name)} is missing: add `{name}:` with"
-                raise self.error(node, f"{needed} {_wanted(hints[name], field.metadata)}{_meaning(field)}")
+                raise self.error(node, f"{needed} {wanted(hints[name], field.metadata)}{_meaning(field)}")
         try:
             return schema(**values)
         except SettingError as error:
@@ -238,7 +206,7 @@ class _Reader:
         key = next(iter(tags))[0]
         if key not in pairs:
             raise self.error(
-                node, f"{_join(where, key)} is missing: add `{key}:` with one of {_listed(t[1] for t in tags)}"
+                node, f"{_join(where, key)} is missing: add `{key}:` with one of {listed(t[1] for t in tags)}"
             )
         value = pairs[key][1].value
         if (key, value) not in tags:
@@ -249,17 +217,17 @@ class _Reader:
     def _scalar(self, node: yaml.ScalarNode, kind: Any, where: str, limits: Mapping[str, Any]) -> Any:
         text: str = node.value
         if text == "" and node.style is None:
-            raise self.error(node, f"{where} is empty: {_wanted(kind, limits)} is needed")
+            raise self.error(node, f"{where} is empty: {wanted(kind, limits)} is needed")
         if node.style is not None and kind in (float, int, bool):
             raise self.error(node, f"{where} is the text {text!r}: write it without quotes")
         try:
-            value = _convert(text, kind)
+            value = convert(text, kind)
         except ValueError as error:
-            hint = str(error) or f"{_wanted(kind, limits)} is needed"
+            hint = str(error) or f"{wanted(kind, limits)} is needed"
             raise self.error(node, f"{where} is {text!r}: {hint}") from None
         low, high = limits.get("low"), limits.get("high")
         if isinstance(value, (int, float, datetime.timedelta)) and not isinstance(value, bool):
-            self._bounds(node, value, low, high, f"{where} is {text}: {_wanted(kind, limits)} is needed")
+            self._bounds(node, value, low, high, f"{where} is {text}: {wanted(kind, limits)} is needed")
         return value
 
     def _bounds(self, node: yaml.Node, value: Any, low: Any, high: Any, what: str) -> None:
@@ -271,69 +239,6 @@ def _names_in(kind: Any) -> set[str]:
     """Return the keys of a dataclass of a schema, also where it may be left out; none of anything else."""
     schemas = [one for one in (kind, *get_args(kind)) if dataclasses.is_dataclass(one)]
     return {field.name for schema in schemas for field in dataclasses.fields(schema) if field.init}
-
-
-def _convert(text: str, kind: Any) -> Any:
-    """Return the scalar `text` as `kind`; raises ValueError, with a hint where there is a better one than the type."""
-    if kind is str:
-        return text
-    if kind is bool:
-        if text not in ("true", "false"):
-            raise ValueError("true or false is needed")
-        return text == "true"
-    if kind is int and re.fullmatch(r"0x[0-9a-fA-F]+", text):
-        return int(text, 16)
-    if kind in (int, float):
-        if _LEADING_ZERO.match(text):
-            raise ValueError("a number does not begin with 0; write it without")
-        if not _NUMBER.fullmatch(text):
-            raise ValueError
-        number = float(text)
-        if number in (float("inf"), float("-inf")):
-            raise ValueError("the number is too large")
-        if kind is int:
-            if number != int(number):
-                raise ValueError("a whole number is needed")
-            return int(number) if "." in text or "e" in text.lower() else int(text)
-        return number
-    if get_origin(kind) is Literal:
-        return _choice(text, {str(value): value for value in get_args(kind)})
-    if isinstance(kind, type) and issubclass(kind, Enum):
-        return _choice(text, {str(member.value): member for member in kind})
-    if kind is datetime.time:
-        if not re.fullmatch(r"\d\d?:\d\d(:\d\d)?", text):
-            raise ValueError
-        hour, minute, second = (int(part) for part in (text + ":0").split(":")[:3])
-        try:
-            return datetime.time(hour, minute, second)
-        except ValueError:
-            raise ValueError("a time of day from 00:00 to 23:59 is needed") from None
-    if kind is datetime.timedelta:
-        match = _DURATION.fullmatch(text)
-        if not match or match[2] not in _SECONDS:
-            raise ValueError
-        try:
-            return datetime.timedelta(seconds=float(match[1]) * _SECONDS[match[2]])
-        except OverflowError:
-            raise ValueError("the duration is too long") from None
-    if kind is datetime.date:
-        if not re.fullmatch(r"\d{4}-\d\d-\d\d", text):
-            raise ValueError
-        try:
-            return datetime.date.fromisoformat(text)
-        except ValueError:
-            raise ValueError("there is no such day") from None
-    if kind is datetime.datetime:
-        if not re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d(:\d\d)?Z", text):
-            raise ValueError
-        return datetime.datetime.fromisoformat(text)
-    raise TypeError(f"a schema cannot have a field of type {kind}")
-
-
-def _choice(text: str, choices: Mapping[str, Any]) -> Any:
-    if text not in choices:
-        raise ValueError(nearest(text, choices))
-    return choices[text]
 
 
 def _tag(kind: Any) -> tuple[str, str]:
@@ -357,50 +262,6 @@ def _find(node: yaml.Node, path: tuple[str | int, ...]) -> yaml.Node:
     return node
 
 
-def _wanted(kind: Any, limits: Mapping[str, Any]) -> str:
-    """Say in words what a field of this type and these limits takes."""
-    arguments = [argument for argument in get_args(kind) if argument is not type(None)]
-    if get_origin(kind) in (Union, types.UnionType) and len(arguments) == 1:
-        return _wanted(arguments[0], limits)
-    words = {
-        float: "a number",
-        int: "a whole number",
-        bool: "true or false",
-        str: "a text",
-        datetime.time: "a time of day such as 07:30",
-        datetime.date: "a date such as 2020-01-31",
-        datetime.datetime: "a time in UTC such as 2020-01-31T12:30:00Z",
-        datetime.timedelta: "a duration such as 30 s, 5 min, 1 h or 2 days",
-    }
-    if kind in words:
-        unit, low, high = limits.get("unit"), limits.get("low"), limits.get("high")
-        text = words[kind] + (f" in {unit}" if unit and unit != "1" else "")
-        if low is not None and high is not None:
-            return f"{text} from {_plain(low)} to {_plain(high)}"
-        if low is not None:
-            return f"{text} of at least {_plain(low)}"
-        return f"{text} of at most {_plain(high)}" if high is not None else text
-    if get_origin(kind) is Literal:
-        return f"one of {_listed(str(value) for value in arguments)}"
-    if isinstance(kind, type) and issubclass(kind, Enum):
-        return f"one of {_listed(str(member.value) for member in kind)}"
-    return "a list" if get_origin(kind) is tuple else "its keys below it"
-
-
-def duration(value: datetime.timedelta) -> str:
-    """Return a duration as a file has it: `5 min`, `1 h`, `2 days`."""
-    seconds = value.total_seconds()
-    for size, name in ((86_400, "day"), (3600, "h"), (60, "min")):
-        count = seconds / size
-        if seconds >= size and count == int(count):
-            return f"{count:.0f} {name}{'s' if name == 'day' and count > 1 else ''}"
-    return f"{seconds!r} s" if seconds % 1 else f"{seconds:.0f} s"
-
-
-def _plain(value: float | datetime.timedelta) -> str:
-    return duration(value) if isinstance(value, datetime.timedelta) else f"{value:g}"
-
-
 def _default(field: dataclasses.Field[Any]) -> Any:
     return field.default if field.default_factory is dataclasses.MISSING else field.default_factory()
 
@@ -409,15 +270,11 @@ def _required(schema: type[Any]) -> str:
     names = [
         field.name for field in dataclasses.fields(schema) if field.init and _default(field) is dataclasses.MISSING
     ]
-    return _listed(names)
+    return listed(names)
 
 
 def _meaning(field: dataclasses.Field[Any]) -> str:
     return f" ({field.metadata['help']})" if field.metadata.get("help") else ""
-
-
-def _listed(names: Iterable[str]) -> str:
-    return ", ".join(names)
 
 
 def _join(where: str, key: str) -> str:

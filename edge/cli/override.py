@@ -7,7 +7,7 @@ import getpass
 from datetime import timedelta
 from pathlib import Path
 
-from igrow.core.yaml_schema import duration
+from igrow.core.yaml_scalars import duration
 from igrow.edge.cli.common import configuration_of, parse_duration, parse_setpoint
 from igrow.edge.overriding import override
 from igrow.edge.sources.override import RECIPE

@@ -8,7 +8,7 @@ from datetime import timedelta
 from pathlib import Path
 
 from igrow.core.separating_tests import SEPARATING_TESTS
-from igrow.core.yaml_schema import duration
+from igrow.core.yaml_scalars import duration
 from igrow.edge.cli.common import configuration_of
 from igrow.edge.configuration import Configuration
 from igrow.edge.separating_tests import approval_file, approve, obstacles, read_approval, withdraw

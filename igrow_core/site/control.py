@@ -7,9 +7,9 @@ from __future__ import annotations
 import datetime
 from dataclasses import dataclass, fields
 
-from igrow.core import yaml_schema
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import QUANTITIES, SETPOINTS
+from igrow.core.yaml_scalars import nearest
 from igrow.core.yaml_schema import SettingError, setting
 
 
@@ -66,7 +66,7 @@ class Limits:
     def __getitem__(self, name: str) -> SetpointLimits:
         """Return the limits of a setpoint by its name."""
         if name not in SETPOINTS:
-            raise IgrowError(f"{name} is no setpoint: {yaml_schema.nearest(name, SETPOINTS)}")
+            raise IgrowError(f"{name} is no setpoint: {nearest(name, SETPOINTS)}")
         limits: SetpointLimits = getattr(self, name)
         return limits
 
@@ -107,4 +107,4 @@ class Planning:
     def __post_init__(self) -> None:
         for position, name in enumerate(self.optimise):
             if name not in SETPOINTS:
-                raise SettingError(f"optimise has {name}: {yaml_schema.nearest(name, SETPOINTS)}", "optimise", position)
+                raise SettingError(f"optimise has {name}: {nearest(name, SETPOINTS)}", "optimise", position)

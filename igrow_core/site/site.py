@@ -9,7 +9,6 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from igrow.core import yaml_schema
 from igrow.core.errors import IgrowError
 from igrow.core.language.units import Units
 from igrow.core.local_time import zone
@@ -18,7 +17,8 @@ from igrow.core.site.control import Limits, Planning
 from igrow.core.site.crop import Crop
 from igrow.core.site.equipment import Greenhouse, Sensor, default_sensors
 from igrow.core.site.prices import Prices
-from igrow.core.yaml_schema import SettingError, setting
+from igrow.core.yaml_scalars import nearest
+from igrow.core.yaml_schema import SettingError, load, setting
 
 
 @dataclass(frozen=True, repr=False)
@@ -59,7 +59,7 @@ class Site:
         for key, known in (("actuators", ACTUATORS), ("setpoints", SETPOINTS)):
             for position, name in enumerate(getattr(self, key)):
                 if name not in known:
-                    raise SettingError(f"{key} has {name}: {yaml_schema.nearest(name, known)}", key, position)
+                    raise SettingError(f"{key} has {name}: {nearest(name, known)}", key, position)
 
     def _check_agronomy(self) -> None:
         """Raise SettingError where the limits of the heating setpoint leave nothing of what the crop needs."""
@@ -82,4 +82,4 @@ class Site:
 
 def load_site(path: str | os.PathLike[str]) -> Site:
     """Read a site from its YAML file; raises SchemaError with file, line and column."""
-    return yaml_schema.load(path, Site)
+    return load(path, Site)

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from enum import Enum
 from typing import Any
 
-from igrow.core.yaml_schema import duration
+from igrow.core.yaml_scalars import duration
 
 _PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9_./+-]*( [A-Za-z0-9_./+-]+)*")
 _COMMENT_COLUMN = 44

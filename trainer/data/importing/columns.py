@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import QUANTITIES
-from igrow.core.yaml_schema import nearest
+from igrow.core.yaml_scalars import nearest
 from igrow.trainer.data import vocabulary
 from igrow.trainer.data.vocabulary import Unit
 
