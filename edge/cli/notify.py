@@ -9,8 +9,8 @@ from igrow.core.errors import IgrowError
 from igrow.edge.alarm_levels import Level
 from igrow.edge.cli.common import add_configuration, configuration_of
 from igrow.edge.notifications.acknowledged import ACKNOWLEDGED_FILE
+from igrow.edge.notifications.message import Message
 from igrow.edge.notifications.notifier import Notifier, send_to_all
-from igrow.edge.notifications.outbox import Message
 from igrow.edge.notifications.services import open_services
 from igrow.edge.status.client import fetch
 

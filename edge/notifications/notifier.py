@@ -12,7 +12,8 @@ from igrow.core.errors import IgrowError
 from igrow.edge.alarm_levels import Level
 from igrow.edge.daemon_file import NotificationSettings
 from igrow.edge.notifications.acknowledged import read_acknowledged
-from igrow.edge.notifications.outbox import Alarm, Message, Outbox, Told
+from igrow.edge.notifications.message import Message
+from igrow.edge.notifications.outbox import Alarm, Outbox, Told
 from igrow.edge.notifications.sending import SEND_SECONDS
 from igrow.edge.state_file import read_state, write_state
 

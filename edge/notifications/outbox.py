@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from igrow.edge.alarm_levels import Level
 from igrow.edge.daemon_file import NotificationSettings
+from igrow.edge.notifications.message import Message
 
 HOUR = 3600.0
 
@@ -27,15 +28,6 @@ class Told:
     level: Level
     at: float
     """When last, seconds since 1970 UTC."""
-
-
-@dataclass(frozen=True)
-class Message:
-    """What is sent, once, to every service."""
-
-    title: str
-    body: str
-    level: Level
 
 
 @dataclass(frozen=True)

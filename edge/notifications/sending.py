@@ -12,7 +12,7 @@ import subprocess
 import sys
 
 from igrow.edge.alarm_levels import Level
-from igrow.edge.notifications.outbox import Message
+from igrow.edge.notifications.message import Message
 
 MOST_BYTES = 128 * 2**20
 """Data of the process. With Apprise it has less than a third of that; no service has as much to say."""

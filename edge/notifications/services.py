@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from igrow.core.errors import IgrowError
+from igrow.edge.notifications.message import Message
 from igrow.edge.notifications.notifier import Service
-from igrow.edge.notifications.outbox import Message
 from igrow.edge.notifications.sending import send_aside
 
 

@@ -17,8 +17,8 @@ from igrow.edge.daemon_file import NotificationSettings
 from igrow.edge.notifications import notifier as module
 from igrow.edge.notifications import sending
 from igrow.edge.notifications.acknowledged import acknowledge, read_acknowledged
+from igrow.edge.notifications.message import Message
 from igrow.edge.notifications.notifier import Notifier, send_to_all
-from igrow.edge.notifications.outbox import Message
 from igrow.edge.notifications.sending import MOST_BYTES
 from igrow.edge.notifications.services import open_services
 

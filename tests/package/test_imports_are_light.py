@@ -36,6 +36,11 @@ def test_an_import_loads_nothing_heavy(code: str, most: int) -> None:
     assert len(found) < most
 
 
+def test_the_process_that_sends_a_message_fits_into_its_little_memory() -> None:
+    found = loaded_by("import igrow.edge.notifications.sending")
+    assert (HEAVY | {"numpy"}) & {name.split(".")[0] for name in found} == set()
+
+
 def test_the_interface_of_a_notebook_is_whole() -> None:
     import igrow.trainer
 
