@@ -7,11 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from igrow.core.agronomy import Agronomy
 from igrow.core.local_time import to_local
 from igrow.core.simulator.crop import CropStages
 from igrow.core.simulator.growth import GrowthFit, prior_of
-from igrow.core.site import Crop
+from igrow.core.site import Agronomy, Crop
 from igrow.core.telemetry import Telemetry
 from igrow.trainer import prepare_log
 from igrow.trainer.data import Log
