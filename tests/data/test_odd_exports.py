@@ -14,6 +14,7 @@ from igrow.core.site import load_site
 from igrow.core.telemetry import Telemetry, to_grid
 from igrow.trainer.cli import main
 from igrow.trainer.data import read_log
+from igrow.trainer.data.timestamps import to_utc
 from tests.virtual_log import virtual_log
 
 NAMES = {
@@ -119,3 +120,15 @@ def test_standard_time_all_the_year_is_found_by_the_change_of_clocks(
     assert main(["import", str(tmp_path / "export.csv"), "--site", str(site)]) == 0
     assert "times are Etc/GMT-1" in capsys.readouterr().out
     assert read_log(tmp_path / "export.csv", load_site(site)).telemetry.time[0] == spring.time[0]
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_the_hour_that_happens_twice_is_two_hours_of_an_hourly_log(backwards: bool) -> None:
+    """Both stood at the first, so that an hour was lost and another had its readings."""
+    times = np.arange(np.datetime64("2020-10-24T00:00", "h"), np.datetime64("2020-10-27T00:00", "h"))
+    written = pd.DatetimeIndex(to_local(times.astype("datetime64[s]"), "Europe/Amsterdam")).strftime("%d/%m/%Y %H:%M")
+    assert (written == "25/10/2020 02:00").sum() == 2
+    order = slice(None, None, -1) if backwards else slice(None)
+    read, wrong = to_utc(list(written[order]), "%d/%m/%Y %H:%M", "Europe/Amsterdam")
+    assert wrong is None
+    np.testing.assert_array_equal(read, times[order].astype("datetime64[s]"))

@@ -26,6 +26,8 @@ _UNIX_EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
 ZONE = "%Z"
 _WEEKDAY = re.compile(r"([^\W\d_]{2,})\.?,?\s+(?=\w)")
 _DATE = re.compile(r"\d{1,4}[-/.]\s?\d{1,2}[-/.]")
+_ONE_ROW = 0.9
+"""Share of rows with a time of their own from which on a log has one row for each time."""
 _LETTERS = re.compile(r"[^\W\d_]+", re.UNICODE)
 _MIDNIGHT = re.compile(r"(?<![\d:])(0?0:00|12:00(:00)?\s*a)", re.IGNORECASE)
 _CLOCKED = re.compile(r"(.*?\d)[\sT,]+\d{1,2}:\d\d")
@@ -141,6 +143,9 @@ def _of_wall(local: Times, time_zone: str) -> Times:
         return backwards
     new = np.ones(len(local), dtype=bool)
     new[1:] = local[1:] != local[:-1]
+    if new.mean() > _ONE_ROW:
+        # Of an hourly log the hour that happens twice is the one time that stands on two rows.
+        return from_local(local, time_zone)
     times: Times = from_local(local[new], time_zone)[np.cumsum(new) - 1]
     return times
 

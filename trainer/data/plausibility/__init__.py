@@ -35,6 +35,6 @@ def find_faults(telemetry: Telemetry, site: Site | None = None) -> tuple[DataFau
     if site is not None:
         found += sunlight.against_the_sun(telemetry, site)
         # On a clock that is wrong, day and night are.
-        if not any(fault.kind in sunlight.CLOCK for fault in found):
+        if not any(fault.kind in sunlight.SUN for fault in found):
             found += columns.screens_reversed(telemetry, site)
     return tuple(found)

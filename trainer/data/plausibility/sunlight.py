@@ -23,7 +23,9 @@ from igrow.trainer.data.grid import own_step
 from igrow.trainer.data.plausibility.hemisphere import other_hemisphere
 from igrow.trainer.data.plausibility.sums import running_sum
 
-CLOCK = ("clock", "local_time", "no_daylight", "latitude")
+CLOCK = ("clock", "local_time", "no_daylight")
+"""Faults that another time zone may mend."""
+SUN = (*CLOCK, "latitude")
 """Faults after which nothing can be said of day and night."""
 LARGEST_OFFSET = 0.4
 """Hours between the radiation's noon and the sun's that mornings of fog, mountains and chimneys explain; half a step
