@@ -55,7 +55,7 @@ def test_a_term_that_was_taken_out_gains_and_one_that_is_there_does_not(record: 
 
 
 def test_a_term_that_hides_behind_a_larger_one_is_named_beside_it() -> None:
-    month = site_record(virtual_log(28, seed=3), SITE, 1800.0)
+    month = site_record(virtual_log(28, seed=3), SITE, 3600.0)
     lacking = held("transpiration_night_share", "leakage_wind")
     found = omission.examine(month, SITE, lacking, DEFAULT)
     assert found is not None

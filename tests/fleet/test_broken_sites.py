@@ -116,7 +116,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     folder = tmp_path_factory.mktemp("fleet")
     fleet = make_fleet(
         folder, NAMES, limits="{memory: 1000, retries: 0}",
-        sites="{house-12: {exchange: sftp://trainer@127.0.0.1:1/srv}, house-99: {paused: true}}", known_hosts="none",
+        sites="{house-12: {exchange: sftp://trainer@127.0.0.1:1/srv}, house-99: {paused: true}}", known_hosts="nowhere",
     )  # fmt: skip
     for name in NAMES:
         leave_day(folder / "exchange", name, 1, step=3600)

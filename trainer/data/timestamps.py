@@ -143,7 +143,7 @@ def _of_wall(local: Times, time_zone: str) -> Times:
         return backwards
     new = np.ones(len(local), dtype=bool)
     new[1:] = local[1:] != local[:-1]
-    if new.mean() > _ONE_ROW:
+    if np.count_nonzero(new) > _ONE_ROW * len(new):
         # Of an hourly log the hour that happens twice is the one time that stands on two rows.
         return from_local(local, time_zone)
     times: Times = from_local(local[new], time_zone)[np.cumsum(new) - 1]
