@@ -20,8 +20,9 @@ $(STAMP): pyproject.toml
 demo: $(STAMP) ## Run the whole loop on a virtual greenhouse with an undeclared effect (seven minutes).
 	$(BIN)/python config/demo/run.py --out out/demo
 
+# One thread of linear algebra a process: more of them wait for each other beside other processes, and burn twice the time.
 test: $(STAMP) ## Run the tests (at most 10 minutes).
-	$(BIN)/pytest -n 3 --dist worksteal -m 'not soak and not notebooks' tests
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 3 --dist worksteal -m 'not soak and not notebooks' tests
 
 page-pictures: $(STAMP) ## Take the pictures of docs/page.md anew (needs Chromium).
 	IGROW_PICTURES=1 $(BIN)/pytest tests/page/test_page_in_a_browser.py
