@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 
@@ -17,13 +16,11 @@ from igrow.trainer.diagnosis.correction import (
     is_proven_change,
     same_in_all_regimes,
     stands,
-    with_parameter,
 )
 from igrow.trainer.diagnosis.estimate import Estimated, OnsetInterval
-from igrow.trainer.diagnosis.freerun import FreeRuns, Stage
-from igrow.trainer.diagnosis.knowledge import ActiveTerm, knowledge_of
+from igrow.trainer.diagnosis.freerun import Stage
+from igrow.trainer.diagnosis.knowledge import ActiveTerm
 from igrow.trainer.diagnosis.linear import Term
-from igrow.trainer.diagnosis.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.diagnosis.wording import discrepancy, finding
@@ -131,52 +128,3 @@ def test_the_corrected_model_keeps_correlations_adds_causes_and_remembers_where_
     assert corrected.calibrated_on == model.site.name
     assert corrected.discrepancy == {}
     assert [(one.before, one.after) for one in corrected.errors] == [(2.0, 0.5)]
-
-
-class Judged:
-    """Days of which each model makes the errors that it is told to: by physics, a parameter free, or with causes."""
-
-    def __init__(self, plain: float, freed: float, caused: float) -> None:
-        self.errors = plain, freed, caused
-
-    def fit(self, prior: Gaussian, _terms: Sequence[ActiveTerm]) -> Gaussian:
-        return prior
-
-    def run(self, stage: Stage) -> FreeRuns:
-        plain, freed, caused = self.errors
-        spread = stage.posterior.marginal(["transmissivity"]).standard_deviation[0]
-        free = spread > 0.5 * abs(stage.posterior.values["transmissivity"])
-        errors = np.full((96, 4), caused if stage.terms else freed if free else plain)
-        return FreeRuns({}, {"air_humidity": errors}, np.arange(4))
-
-
-@pytest.mark.parametrize(
-    ("errors", "causes", "named"),
-    [
-        ((3.0, 1.0, 2.0), True, True),
-        ((3.0, 1.0, 4.0), True, True),
-        ((3.0, 2.0, 1.0), True, False),
-        ((3.0, 2.0, 2.0), True, False),
-        ((3.0, 2.0, 1.0), False, True),
-        ((3.0, 3.0, 4.0), True, False),
-    ],
-)
-def test_of_a_cause_and_a_parameter_that_both_explain_a_log_the_one_that_unseen_days_ask_for_is_named(
-    errors: tuple[float, float, float], causes: bool, named: bool
-) -> None:
-    model = model_in_force()
-    knowledge = knowledge_of(model, model.site, DEFAULT)
-    recalibrated = Stage(knowledge.prior, ())
-    kept = (cause(),) if causes else ()
-    stages = {"recalibrated": recalibrated, "corrected": Stage(knowledge.prior, tuple(one.term for one in kept))}
-    change = ParameterChange("transmissivity", Estimate(-0.5, -0.6, -0.4, "1"), None, 0.001, ("transmissivity",), False)
-    told = with_parameter(
-        Judged(*errors),  # type: ignore[arg-type]
-        knowledge,
-        Corrected(stages, kept, kept),
-        change,
-        DEFAULT,
-    )
-    assert (told.parameter is change) is named
-    assert told.kept == (() if named else kept)
-    assert told.stages["corrected"].terms == (() if named else stages["corrected"].terms)

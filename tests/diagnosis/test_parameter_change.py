@@ -80,13 +80,6 @@ def test_a_parameter_must_gain_far_more_than_where_nothing_had_changed() -> None
     assert find(with_parameters(truth, 3, transmissivity=1e6), np.random.default_rng(0)) is None
 
 
-def test_days_that_bear_out_a_parameter_are_asked_for_it_alone() -> None:
-    changed = with_parameters(Truth({}, {}, (-3.0, 0.0, 4.0)), 3)
-    assert find(changed, np.random.default_rng(0), "transmissivity").parameter == "transmissivity"  # type: ignore[union-attr]
-    assert find(changed, np.random.default_rng(0), "leakage_wind").parameter == "leakage_wind"  # type: ignore[union-attr]
-    assert find(with_parameters(Truth({}, {}), 3), np.random.default_rng(0), "leakage_wind") is None
-
-
 def test_a_change_to_less_than_nothing_is_none() -> None:
     assert find(with_parameters(Truth({}, {}, (-11.0, 0.0, 0.0)), 6), np.random.default_rng(0)) is None
 

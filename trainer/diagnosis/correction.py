@@ -142,30 +142,25 @@ def with_parameter(
 ) -> Corrected:
     """Return a correction with a parameter that has changed, where it alone makes unseen days better.
 
-    Recalibration may have followed the change: it stays where freeing the parameter beside it adds nothing. Causes
-    that explain the log as well go where the parameter alone makes unseen days clearly better than they do: a large
-    change is seen as it is by a fit alone, while the search sees all of them linear.
+    Recalibration may have followed the change: it stays where freeing the parameter beside it adds nothing.
     """
-    values, recalibrated = knowledge.posterior.values, result.stages["recalibrated"]
+    values, recalibrated = knowledge.posterior.values, result.stages["corrected"]
     free = drift(values, 1.0, rules) * np.array([name == parameter.parameter for name in knowledge.prior.names])
     by_physics = knowledge.posterior.widened(home_drift(values, rules))
-    causes = (*recalibrated.terms, *(one.term for one in result.kept))
     try:
         without, alone, beside = (
             Stage(log.fit(prior, recalibrated.terms), recalibrated.terms)
             for prior in (by_physics, by_physics.widened(free), knowledge.prior.widened(free))
         )
-        rival = Stage(log.fit(by_physics, causes), causes) if result.kept else without
     except DivergenceError:
         return result
-    old, new, other = (log.run(one) for one in (without, alone, rival))
-    before, after = (log.run(one) for one in (recalibrated, beside))
-    if old is None or new is None or other is None or before is None or after is None:
-        return result if result.kept else replace(result, parameter=parameter)
-    if min(freerun.skill(old, new), freerun.skill(other, new)) < rules.least_skill:
+    old, new, before, after = (log.run(one) for one in (without, alone, recalibrated, beside))
+    if old is None or new is None or before is None or after is None:
+        return replace(result, parameter=parameter)
+    if freerun.skill(old, new) < rules.least_skill:
         return result
     corrected = beside if freerun.skill(before, after) >= 0.0 else recalibrated
-    return replace(result, stages={**result.stages, "corrected": corrected}, kept=(), parameter=parameter)
+    return replace(result, stages={**result.stages, "corrected": corrected}, parameter=parameter)
 
 
 def _with_patterns(

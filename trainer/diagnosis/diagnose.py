@@ -52,7 +52,6 @@ def diagnose(
     nuisance: NuisanceSubspace | None = None,
     drift: Drift | None = None,
     progress: Progress = silent,
-    changed: str = "",
 ) -> Diagnosis:
     """Return the diagnosis of a log.
 
@@ -66,7 +65,6 @@ def diagnose(
         nuisance: what greenhouses show though nothing is missing (None: what came with the trainer).
         drift: how greenhouses like it change with time (None: what came with the trainer).
         progress: is told what is being done, in lines.
-        changed: the one parameter that is asked whether it has changed (empty: all).
 
     Raises:
         IgrowError: the log is shorter than a week, or lacks outdoor or air temperature.
@@ -97,13 +95,13 @@ def diagnose(
     found = [replace(one, confounded=(*one.confounded, *rivals)) for one in found]
     # A parameter can stand in for an actuator that the log lacks, found or not.
     lacking = not set(REPLACEABLE).isdisjoint(logged.record.missing)
-    parameter = None if lacking else search.changed_parameter(rng, changed)
+    parameter = None if lacking else search.changed_parameter(rng)
     patterns = last.patterns
     if parameter is not None and parameter.onset is not None:
-        if parameter.leads or not patterns:
+        if parameter.leads or not (found or patterns):
             again = partial(
                 diagnose, model=model, without=without, seed=seed, rules=rules, nuisance=nuisance, drift=drift,
-                progress=progress, changed=parameter.parameter,
+                progress=progress,
             )  # fmt: skip
             told = _since(parameter, log.select(parameter.onset.time), again, rules)
             if told is not None:
@@ -114,7 +112,7 @@ def diagnose(
         found, patterns = [], ()
     progress("correcting the model")
     result = correct(days, knowledge, found, patterns, site.longitude, rules)
-    if parameter is not None and not patterns:
+    if parameter is not None and not (result.kept or patterns):
         result = with_parameter(days, knowledge, result, parameter, rules)
     verdict, findings = _verdict(completed, result, patterns, rules)
     stages = _stages(result, completed, logged)

@@ -81,19 +81,17 @@ class ParameterChange:
     """It explains the log better than any effect does."""
 
 
-def find(design: Design, rng: np.random.Generator, only: str = "") -> ParameterChange | None:
+def find(design: Design, rng: np.random.Generator) -> ParameterChange | None:
     """Return the parameter that has changed; None where none stands out, or one that nobody can look at.
 
     Args:
         design: of the log, in a greenhouse that changes by physics alone.
         rng: for the flips.
-        only: the one parameter that is asked for (empty: any).
     """
     rules, null = design.rules, linear.fit(design.grams, design.null_model())
     scored = search.score_parameters(design, null, search.onset_days(design), rng)
     net = {one.parameter: change.proven_gain(design, one) - _needed_gain(design, one) for one in scored}
-    asked = (one for one in scored if not only or one.parameter == only)
-    best = max(asked, key=lambda one: net[one.parameter], default=None)
+    best = max(scored, key=lambda one: net[one.parameter], default=None)
     if best is None or net[best.parameter] < 0.0 or best.parameter not in VISIBLE:
         return None
     named = linear.fit(design.grams, null.model.with_term(best.term))

@@ -61,7 +61,7 @@ class Search:
                 return first, judged, found
             found = terms
 
-    def changed_parameter(self, _rng: np.random.Generator, _only: str = "") -> ParameterChange | None:
+    def changed_parameter(self, _rng: np.random.Generator) -> ParameterChange | None:
         """Return nothing: without a history nobody knows what a parameter was."""
         return None
 
@@ -129,10 +129,10 @@ class Change(Search):
         """Return the design of a model with terms, about the calibrated parameters."""
         return self._expected(terms, self.drift or read_drift())
 
-    def changed_parameter(self, rng: np.random.Generator, only: str = "") -> ParameterChange | None:
-        """Return the parameter that has changed, of all or the one that is asked for."""
+    def changed_parameter(self, rng: np.random.Generator) -> ParameterChange | None:
+        """Return the parameter that has changed where no effect is missing."""
         by_physics = (self.drift or read_drift()).by_physics()
-        return parameter_change.find(self._expected(self.knowledge.terms, by_physics), rng, only)
+        return parameter_change.find(self._expected(self.knowledge.terms, by_physics), rng)
 
     def _expected(self, terms: Sequence[ActiveTerm], drift: Drift) -> Design:
         plain = history.laid_out(self.days, self.site, self.history, terms, self.rules) if terms else self.plain
