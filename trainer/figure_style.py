@@ -10,9 +10,11 @@ import io
 import re
 import warnings
 from collections.abc import Mapping
+from importlib.resources import files
 from typing import Any
 
 import numpy as np
+import yaml
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.dates import (
@@ -33,64 +35,16 @@ from igrow.core.arrays import Floats
 from igrow.core.language import Language
 from igrow.core.local_time import to_local
 
-COLOURS: Mapping[str, str] = {
-    "ink": "#1c2220",
-    "faint": "#d8deda",
-    "measured": "#1d2321",
-    "deployed": "#6f7672",
-    "recalibrated": "#2f6fc5",
-    "corrected": "#147f3f",
-    "aside": "#c93435",
-    "air_temperature": "#b8500f",
-    "air_humidity": "#2f6fc4",
-    "air_co2": "#6b4fa1",
-    "weather": "#55605b",
-}
-"""Each of another value, by which it is found in an SVG."""
-DARK: Mapping[str, str] = {
-    "ink": "#e7ece9",
-    "faint": "#3a433f",
-    "measured": "#e8edea",
-    "deployed": "#9fa8a3",
-    "recalibrated": "#86b6f5",
-    "corrected": "#58c98a",
-    "aside": "#ff8f85",
-    "air_temperature": "#f3a56c",
-    "air_humidity": "#86b6f4",
-    "air_co2": "#c3adf2",
-    "weather": "#a7b2ad",
-}
-"""The same by night."""
+_TABLE = yaml.safe_load(files("igrow.trainer").joinpath("figure_style.yaml").read_text(encoding="utf-8"))
+COLOURS: Mapping[str, str] = _TABLE["by_light"]
+DARK: Mapping[str, str] = _TABLE["by_night"]
+_STYLE: Any = _TABLE["matplotlib"]
 STROKES: Mapping[str, str] = {"measured": "-", "deployed": ":", "recalibrated": "--", "corrected": "-"}
 """So that nobody depends on colours."""
 WIDTH = 4.3
 """Inches: as wide as a telephone shows at the size that it is drawn in."""
 _MOST_TICKS = {YEARLY: 6, MONTHLY: 7, DAILY: 6, HOURLY: 7, MINUTELY: 8, SECONDLY: 8, MICROSECONDLY: 8}
 """As few as a telephone has room for; with fewer, matplotlib finds no step for some spans and draws every tick."""
-_STYLE: Any = {
-    "figure.facecolor": "none",
-    "axes.facecolor": "none",
-    "savefig.facecolor": "none",
-    "svg.fonttype": "none",
-    "svg.hashsalt": "igrow",
-    "font.size": 9,
-    "axes.labelsize": 9,
-    "axes.titlesize": 9,
-    "xtick.labelsize": 8.5,
-    "ytick.labelsize": 8.5,
-    "legend.fontsize": 8.5,
-    "legend.frameon": False,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": COLOURS["ink"],
-    "axes.labelcolor": COLOURS["ink"],
-    "text.color": COLOURS["ink"],
-    "xtick.color": COLOURS["ink"],
-    "ytick.color": COLOURS["ink"],
-    "axes.grid": True,
-    "grid.color": COLOURS["faint"],
-    "lines.linewidth": 1.5,
-}
 
 
 class ReportFigure(Figure):
