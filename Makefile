@@ -69,7 +69,7 @@ deb: ## Build the gateway's Debian package into dist, and try it in a throw-away
 	sh systemd/try-deb.sh dist/igrow-edge_*.deb
 
 translations: $(STAMP) ## Add new texts to the trainer's languages, and tell which are untranslated.
-	$(BIN)/python -m igrow.trainer.translations
+	$(BIN)/python -m tests.language.catalogues
 
 api: $(STAMP) ## Write the pages of the Python interface to out/api.
 	$(BIN)/pdoc --docformat google --output-directory out/api igrow

@@ -2,8 +2,8 @@
 
 What the daemon says stands in its ledger and its state as plain English: programs read it, and a ledger of years ago
 can still be read. Its texts are messages of the catalogues as all others are, with numbered places ("no reading for {0}
-s"): `igrow.trainer.translations` finds them in the code, and lists them in `sentences.json`. A line is told by the text
-that it was made of, and so are its values, which may be such lines again.
+s"): `make translations` finds them in the code, and lists them in `sentences.json`. A line is told by the text that it
+was made of, and so are its values, which may be such lines again.
 """
 
 from __future__ import annotations

@@ -14,9 +14,9 @@ from igrow.core.language.sentences import PLACE
 from igrow.core.quantities import QUANTITIES
 from igrow.trainer.diagnosis.candidates import patterns
 from igrow.trainer.report import sentences
-from igrow.trainer.translations import catalogue, compiled, locales, messages, numbered
-from igrow.trainer.translations import sentences as put_together
 from tests.diagnosis.conftest import greenhouse_log
+from tests.language.catalogues import catalogue, compiled, locales, messages, numbered
+from tests.language.catalogues import sentences as put_together
 from tests.needs import ROOT
 
 OTHERS = LANGUAGES[1:]

@@ -26,7 +26,7 @@ from igrow.edge.page.words import Words
 from igrow.edge.separating_tests import Approval
 from igrow.edge.sources.override import Lease, read_leases
 from igrow.edge.updates.worsening import Worsening, worsening_sentence
-from igrow.trainer.translations import catalogue
+from tests.language.catalogues import catalogue
 from tests.page.page_bench import CONFOUNDED, NOW, TESTS, alarm, clamp, plan, state, write_house
 
 OTHERS = LANGUAGES[1:]

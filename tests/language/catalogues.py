@@ -25,12 +25,9 @@ from babel.messages.pofile import read_po, write_po
 from igrow.core.effects import EFFECTS
 from igrow.core.language import LANGUAGES
 from igrow.core.language.sentences import PLACE
+from tests.needs import ROOT
 
-_ROOT = Path(__file__).parents[1]
-_CORE, _TRAINER, _EDGE = (
-    next(one for one in (_ROOT / name, _ROOT / alias) if one.is_dir())
-    for name, alias in (("igrow_core", "core"), ("trainer", "trainer"), ("edge", "edge"))
-)
+_CORE, _TRAINER, _EDGE = (ROOT / room for room in ("igrow_core", "trainer", "edge"))
 _FOLDERS = (_CORE / "language", _TRAINER / "report", _TRAINER / "diagnosis", _TRAINER / "data", _EDGE / "page")
 _METHODS = [("**.py", "python"), ("**.html", "jinja2.ext.babel_extract")]
 _CREATED = datetime.datetime(2026, 11, 22, tzinfo=datetime.UTC)
