@@ -1,8 +1,8 @@
 """Which texts there are, and which of them a language lacks; `make translations` adds and compiles them.
 
-Texts stand in the code of both sides (`text("...")`, `N_("...")`), in templates (`_("...")`) and in the effects. What
-the daemon and the reading of a log put together of text and values are f-strings: each becomes a text with numbered
-places, so that a sentence that somebody adds is missed until it is translated.
+Texts stand in the code of both sides (`text("...")`, `N_("...")`), in templates (`_("...")`), in the report's
+`texts.yaml` and in the effects. What the daemon and the reading of a log put together of text and values are f-strings:
+each becomes a text with numbered places, so that a sentence that somebody adds is missed until it is translated.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import yaml
 from babel import Locale
 from babel.dates import get_day_names, get_month_names
 from babel.messages.catalog import Catalog
@@ -68,6 +69,8 @@ def messages() -> list[str]:
         for folder in _FOLDERS
         for _, _, message, _, _ in extract_from_dir(folder, _METHODS, keywords=_KEYWORDS)
     ]
+    for texts in yaml.safe_load((_TRAINER / "report" / "texts.yaml").read_text(encoding="utf-8")).values():
+        found += texts.values()
     for effect in EFFECTS.values():
         found += [effect.title, effect.sentence, effect.separating_test, *filter(None, [effect.opposite])]
     return list(dict.fromkeys([*found, *sentences()]))

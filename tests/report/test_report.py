@@ -24,7 +24,7 @@ from igrow.trainer.data.plot import plot_log
 from igrow.trainer.diagnosis import Diagnosis, plots
 from igrow.trainer.diagnosis.open_vents import OpenVents
 from igrow.trainer.diagnosis.persistence import persistence_errors
-from igrow.trainer.report import data_faults, render_report, sentences, write_diagnosis
+from igrow.trainer.report import render_report, sentences, write_diagnosis
 from igrow.trainer.report.page import error_rows
 from igrow.trainer.report.worth import Worth, worth
 from tests.diagnosis.conftest import greenhouse_log
@@ -219,7 +219,7 @@ def test_what_a_fault_of_the_data_saw_is_told_and_its_mend_can_be_copied() -> No
     table = greenhouse_log(1, days=8).telemetry
     table = table.with_columns({"air_temperature": table["air_temperature"] * 1.8 + 32.0})
     (fault,) = find_faults(table)
-    _, detail = data_faults.fault(fault, speak("de"))
+    _, detail = sentences.fault(fault, speak("de"))
     assert re.search(r"Lufttemperatur .*Median von \d\d,\d", detail)
     assert "air_temperature: {column: ..., scale: 0.5555556, offset: -17.77778}" in detail
     assert not re.search(r"\b(has|so it is|in the mapping)\b", detail)

@@ -17,7 +17,7 @@ from igrow.core.quantities import QUANTITIES
 from igrow.trainer.diagnosis.freerun import HORIZONS
 from igrow.trainer.diagnosis.result import STAGES, Diagnosis, Finding
 from igrow.trainer.figure_style import COLOURS, DARK
-from igrow.trainer.report import data_faults, figures, sentences
+from igrow.trainer.report import figures, sentences
 from igrow.trainer.report.worth import worth
 
 MOVED = 0.05
@@ -99,7 +99,7 @@ def render_report(result: Diagnosis, language: str = "en") -> str:
         time_zone=site.time_zone,
         verdict=sentences.verdict(result, spoken),
         causes=[_cause(result, one, spoken) for one in result.findings],
-        faults=[data_faults.fault(one, spoken) for one in faults],
+        faults=[sentences.fault(one, spoken) for one in faults],
         gains=list(sentences.gains(result, spoken)),
         warnings=list(sentences.warnings(result, spoken)),
         notes=[] if faults else list(sentences.notes(result, spoken)),

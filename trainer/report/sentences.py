@@ -4,55 +4,26 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from importlib.resources import files
 
 import numpy as np
+import yaml
 
 from igrow.core.effects import EFFECTS, Effect
 from igrow.core.language import N_, Language
 from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator.hybrid.measurement import PREDICTED
+from igrow.trainer.data.fault import DataFault
 from igrow.trainer.diagnosis.candidates import WEEKDAYS
 from igrow.trainer.diagnosis.parameter_change import VISIBLE
 from igrow.trainer.diagnosis.result import DISCREPANCY, WORSE, Diagnosis, Finding
 from igrow.trainer.fit.omission import Omission
 from igrow.trainer.report.worth import Worth
 
-_VERDICTS: Mapping[str, str] = {
-    "nothing": N_("Nothing is missing that is large enough to matter: the model fits this greenhouse."),
-    "named": N_("The model lacked something, and it has a name."),
-    "ambiguous": N_("The model lacks something; more than one cause would explain it."),
-    "unexplained": N_("Something real goes on that no known cause explains."),
-    "data_fault": N_("The log cannot be diagnosed as it stands: the data are at fault, not the greenhouse."),
-}
-_NO_FIT: Mapping[str, str] = {
-    "nothing": N_("No known cause was found, and yet the model does not fit this greenhouse."),
-    "named": N_("The model lacked something that has a name, but even with it the model does not fit all of the log."),
-    "ambiguous": N_("The model lacks something; more than one cause would explain it, and none makes it fit all."),
-    "unexplained": N_(
-        "Something real goes on that no known cause explains, and the model does not fit this greenhouse."
-    ),
-}
+_TEXTS: Mapping[str, Mapping[str, str]] = yaml.safe_load(
+    files("igrow.trainer.report").joinpath("texts.yaml").read_text(encoding="utf-8")
+)
 _MORE, _LESS = N_("{channel}: more, {when}"), N_("{channel}: less, {when}")
-_WHEN: Mapping[str, str] = {
-    "on working days": N_("on working days"),
-    "working days": N_("on working days"),
-    "cold weather": N_("in cold weather"),
-    "dry weather": N_("in dry weather"),
-    "outdoor temperature": N_("with the outdoor temperature"),
-    "wind speed": N_("with the wind"),
-    "global radiation": N_("with the sun"),
-    "rain": N_("with the rain"),
-    "until rain has fallen": N_("until rain has fallen"),
-    "lamp power on": N_("while the lamps burn"),
-    "lamp on": N_("while the lamps burn"),
-    "irrigation on": N_("while irrigation runs"),
-    "an hour after lamp power": N_("an hour after the lamps"),
-    "an hour after lamp on": N_("an hour after the lamps"),
-    "an hour after irrigation": N_("an hour after irrigation"),
-    "an hour after irrigation on": N_("an hour after irrigation"),
-    "from day to day": N_("more from day to day"),
-    "all the time": N_("all the time"),
-}
 _HOURS = re.compile(r"(?:(?P<before>.+), )?(?P<first>\d\d) to (?P<last>\d\d) h(?: (?P<after>on .+))?")
 _LEAST = {"heat": 0.05, "co2": 0.001, "lamp_light": 0.02}
 """MJ, kg and kWh per m2 and week from which on they are told."""
@@ -61,9 +32,18 @@ _LEAST = {"heat": 0.05, "co2": 0.001, "lamp_light": 0.02}
 def verdict(result: Diagnosis, language: Language) -> str:
     """Return the first sentence; it never says that a model fits where its own errors say that it does not."""
     kind = result.verdict
-    wrong = kind in _NO_FIT and result.misfits
-    told = _NO_FIT[kind] if wrong else _VERDICTS[kind]
-    return language.text(told)
+    wrong = kind in _TEXTS["no_fit"] and result.misfits
+    told = _TEXTS["no_fit"] if wrong else _TEXTS["verdicts"]
+    return language.text(told[kind])
+
+
+def fault(one: DataFault, language: Language) -> tuple[str, str]:
+    """Return what a fault of the data is, and what was seen and how to mend it."""
+    known = _TEXTS["faults"].get(one.kind)
+    quantity = language.listed([language.name(name) for name in one.quantity.split(", ")])
+    # How to mend it may be a piece of YAML, whose names and numbers stay as they are.
+    seen, mend = language.told(one.sentence, language.values), language.told(one.mend)
+    return "" if known is None else language.text(known, quantity=quantity), f"{seen}: {mend}" if mend else seen
 
 
 def cause(finding: Finding, language: Language) -> str:
@@ -138,7 +118,8 @@ def _course(course: str, language: Language) -> str:
         if day in WEEKDAYS:
             name = language.locale.weekdays[WEEKDAYS.index(day)]
             return language.text("on {weekday}", weekday=name)
-        return language.text(_WHEN[course]) if course in _WHEN else course
+        told = _TEXTS["when"].get(course)
+        return course if told is None else language.text(told)
     hours = language.text("{first} to {last} h", first=found["first"], last=found["last"])
     parts = [_course(found["before"], language)] if found["before"] else []
     parts.append(hours)
