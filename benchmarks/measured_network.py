@@ -13,7 +13,7 @@ import numpy as np
 from igrow.core.arrays import Floats, Integers, Mask
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.fit.evaluation import Predictor
-from igrow.trainer.training.stage import StageData, TrainingPlan, layout, run_windows, train_stage, untrained
+from igrow.trainer.training.stage import StageData, StageLayout, TrainingPlan, run_windows, train_stage, untrained
 
 PLAN = TrainingPlan(updates=((4, 1500), (24, 500)), decay=10.0)
 """Chosen on weeks 7 and 8 of the AGC 2019 Reference compartment after training on weeks 1 to 6."""
@@ -38,7 +38,7 @@ def network_predictor(record: Record, setpoints: Mapping[str, Floats], fit: Mask
     known = np.stack([record.measured[name] for name in states], axis=-1)
     valid = (fit & record.usable)[row] & (place < len(record))
     data = StageData(acting, known[row], np.zeros(count), valid)
-    stage = untrained(layout("climate", states, drivers, (1.0, 3.0, 24.0), (64, 64)), data, seed=0)
+    stage = untrained(StageLayout("climate", states, drivers, (1.0, 3.0, 24.0), (64, 64)), data, seed=0)
     stage = train_stage(stage, data, PLAN)
 
     def predict(starts: Integers, steps: int) -> Mapping[str, Floats]:

@@ -66,11 +66,6 @@ class Stage:
         """Number of filter values carried from step to step."""
         return len(self.drivers) * len(self.time_constants)
 
-    @property
-    def parameters(self) -> int:
-        """Number of trained weights."""
-        return sum(matrix.size for matrix in self.matrices) + sum(bias.size for bias in self.biases)
-
 
 @dataclass(frozen=True)
 class LightFormula:

@@ -68,9 +68,7 @@ SMALL = Layouts(
     harvest_plan=TrainingPlan(updates=((4, 200), (10, 60)), batch=64, learning_rate=1e-2),
 )
 
-AIR = StageLayout(
-    "air", ("air_temperature",), ("heating_setpoint",), (3.0,), True, 1.0, (-20.0,), (60.0,), (False,), (8,)
-)
+AIR = StageLayout("air", ("air_temperature",), ("heating_setpoint",), (3.0,), (8,), clock=True)
 
 
 @pytest.fixture(scope="module")
@@ -142,11 +140,10 @@ def test_steps_made_by_hand_are_added_and_not_learned() -> None:
     jumps = np.zeros_like(states)
     jumps[:, 100::50] = -7.0
     fallen = states + np.cumsum(jumps, axis=1)
-    low = replace(AIR, low=(-1e3,))
     plain = StageData(drivers, states, hour, valid)
     by_hand = StageData(drivers, fallen, hour, valid, jumps=jumps)
-    np.testing.assert_allclose(untrained(low, by_hand, 1).increment_scale, untrained(low, plain, 1).increment_scale)
-    start = untrained(low, by_hand, 1)
+    np.testing.assert_allclose(untrained(AIR, by_hand, 1).increment_scale, untrained(AIR, plain, 1).increment_scale)
+    start = replace(untrained(AIR, by_hand, 1), low=np.array([-1e3], dtype=np.float32))
     idle = replace(start, matrices=(start.matrices[0], 0 * start.matrices[1]))
     plan = TrainingPlan(updates=((4, 1),), batch=16, learning_rate=0.0)
     lines: list[str] = []

@@ -17,11 +17,12 @@ from igrow.core.simulator.hybrid.record import Record, observe
 from igrow.core.simulator.network import Stage
 from igrow.core.telemetry import Telemetry, to_grid
 from igrow.trainer.progress import Progress, silent
-from igrow.trainer.training.stage import StageData, TrainingPlan, layout, train_stage, untrained
+from igrow.trainer.training.stage import StageData, StageLayout, TrainingPlan, train_stage, untrained
 
 GROWTH_PLAN = TrainingPlan(updates=((8, 600), (24, 500), (96, 250)), batch=128, learning_rate=3e-3)
 HARVEST_PLAN = TrainingPlan(updates=((4, 500), (14, 400)), batch=64, learning_rate=3e-3)
-_HIDDEN = (32, 32)
+_GROWTH = StageLayout("growth", GROWTH, GROWTH_DRIVERS, (), (32, 32), cumulative=("net_growth",))
+_HARVEST = StageLayout("harvest", YIELD, HARVEST_DRIVERS, (), (32, 32), step=24.0)
 
 
 def train_networks(seasons: Sequence[Telemetry], *, seed: int = 0, progress: Progress = silent) -> tuple[Stage, Stage]:
@@ -57,8 +58,7 @@ def train_networks(seasons: Sequence[Telemetry], *, seed: int = 0, progress: Pro
         hour=np.zeros(days - 1),
         valid=np.ones((len(hourly), days - 1), dtype=bool),
     )
-    first = untrained(layout("growth", GROWTH, GROWTH_DRIVERS, (), _HIDDEN, cumulative=("net_growth",)), growth, seed)
-    second = untrained(layout("harvest", YIELD, HARVEST_DRIVERS, (), _HIDDEN, step=24.0), harvest, seed)
+    first, second = untrained(_GROWTH, growth, seed), untrained(_HARVEST, harvest, seed)
     return train_stage(first, growth, GROWTH_PLAN, progress), train_stage(second, harvest, HARVEST_PLAN, progress)
 
 

@@ -21,36 +21,17 @@ from igrow.trainer.progress import Progress, silent
 
 @dataclass(frozen=True)
 class StageLayout:
-    """What a stage reads and predicts, before anything is trained."""
+    """What a stage reads and predicts, before anything is trained; its bounds are those of the registry."""
 
     name: str
     states: tuple[str, ...]
     drivers: tuple[str, ...]
     time_constants: tuple[float, ...]
-    clock: bool
-    step: float
-    low: tuple[float, ...]
-    high: tuple[float, ...]
-    cumulative: tuple[bool, ...]
     hidden: tuple[int, ...]
-
-
-def layout(
-    name: str,
-    states: tuple[str, ...],
-    drivers: tuple[str, ...],
-    time_constants: tuple[float, ...],
-    hidden: tuple[int, ...],
-    *,
-    clock: bool = False,
-    step: float = 1.0,
-    cumulative: tuple[str, ...] = ("fruit_fresh_weight",),
-) -> StageLayout:
-    """Return a layout whose bounds are those of the registry, and whose `cumulative` states can but grow."""
-    grows = tuple(state in cumulative for state in states)
-    low = tuple(QUANTITIES[state].low for state in states)
-    high = tuple(QUANTITIES[state].high for state in states)
-    return StageLayout(name, states, drivers, time_constants, clock, step, low, high, grows, hidden)
+    clock: bool = False
+    step: float = 1.0
+    cumulative: tuple[str, ...] = ("fruit_fresh_weight",)
+    """States that can but grow."""
 
 
 @dataclass(frozen=True)
@@ -134,8 +115,10 @@ def untrained(layout: StageLayout, data: StageData, seed: int) -> Stage:
         feature_offset=single(features.mean(axis=0)), feature_scale=single(np.where(still, 1.0, spread)),
         state_offset=single(np.nanmean(states, axis=0)), state_scale=single(np.nanstd(states, axis=0) + 1e-9),
         increment_scale=single(np.nanstd(increments, axis=0) + 1e-9),
-        low=np.array(layout.low, dtype=np.float32), high=np.array(layout.high, dtype=np.float32),
-        cumulative=layout.cumulative, matrices=tuple(matrices), biases=tuple(biases),
+        low=single(np.array([QUANTITIES[state].low for state in layout.states])),
+        high=single(np.array([QUANTITIES[state].high for state in layout.states])),
+        cumulative=tuple(state in layout.cumulative for state in layout.states),
+        matrices=tuple(matrices), biases=tuple(biases),
     )  # fmt: skip
 
 

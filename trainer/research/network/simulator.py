@@ -17,7 +17,7 @@ from igrow.trainer.fleet.calls import call_each
 from igrow.trainer.progress import Progress, silent
 from igrow.trainer.research.network.ensemble import merge
 from igrow.trainer.research.network.leaf_picking import fit_picking, followed, picked_area
-from igrow.trainer.training.stage import StageData, StageLayout, TrainingPlan, layout, train_stage, untrained
+from igrow.trainer.training.stage import StageData, StageLayout, TrainingPlan, train_stage, untrained
 
 CLIMATE_DRIVERS = (
     "global_radiation", "outdoor_temperature", "outdoor_humidity", "wind_speed", "sky_temperature",
@@ -29,7 +29,7 @@ HARVEST_DRIVERS = (
 )  # fmt: skip
 
 
-CLIMATE = layout(
+CLIMATE = StageLayout(
     "climate",
     ("air_temperature", "air_humidity", "air_co2"),
     CLIMATE_DRIVERS,
@@ -38,10 +38,10 @@ CLIMATE = layout(
     clock=True,
 )
 # Net growth falls in dark hours, when the crop respires more than it assimilates: it is not cumulative here.
-GROWTH = layout(
+GROWTH = StageLayout(
     "growth", ("leaf_area_index", "plant_load", "net_growth"), GROWTH_DRIVERS, (24.0, 240.0, 720.0), (64, 64)
 )
-HARVEST = layout("harvest", ("fruit_fresh_weight",), HARVEST_DRIVERS, (5.0, 20.0), (32, 32), step=24.0)
+HARVEST = StageLayout("harvest", ("fruit_fresh_weight",), HARVEST_DRIVERS, (5.0, 20.0), (32, 32), step=24.0)
 
 CLIMATE_PLAN = TrainingPlan(updates=((4, 10000), (16, 5000), (48, 1500)))
 GROWTH_PLAN = TrainingPlan(updates=((4, 4000), (24, 2000), (120, 600)), decay=0.3)
@@ -60,12 +60,6 @@ class Layouts:
     harvest_plan: TrainingPlan = HARVEST_PLAN
     members: int = 1
     """Networks per stage, merged into one; see `igrow.trainer.research.network.ensemble`."""
-
-
-def with_setting_drivers(layouts: Layouts, *names: str) -> Layouts:
-    """Return layouts whose climate stage also reads `names`: settings of the greenhouse computer that are known."""
-    drivers = (*layouts.climate.drivers, *names)
-    return replace(layouts, climate=replace(layouts.climate, drivers=drivers))
 
 
 def derived(columns: Mapping[str, Floats]) -> dict[str, Floats]:

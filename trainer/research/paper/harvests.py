@@ -28,7 +28,7 @@ from igrow.core.greenhouse.tomato import (
     young_crop,
 )
 from igrow.trainer.research.paper.compartments import Compartment, read_2018, read_2019
-from igrow.trainer.training.stage import StageData, TrainingPlan, layout, run_stage, train_stage, untrained
+from igrow.trainer.training.stage import StageData, StageLayout, TrainingPlan, run_stage, train_stage, untrained
 
 Predictor = Callable[[Sequence[Compartment], Compartment], Floats]
 
@@ -94,7 +94,7 @@ def learned(others: Sequence[Compartment], crop: Compartment) -> Floats:
     drivers = np.stack([_stage_drivers(other)[:days] for other in others])
     states = np.stack([other.cumulative()[:days, None] for other in others])
     data = StageData(drivers, states, np.zeros(days), np.ones(states.shape[:2], dtype=bool))
-    shape = layout("harvest", ("fruit_fresh_weight",), DRIVERS, (10.0, 40.0), (8,), step=24.0)
+    shape = StageLayout("harvest", ("fruit_fresh_weight",), DRIVERS, (10.0, 40.0), (8,), step=24.0)
     plan = TrainingPlan(updates=((10, 300), (40, 300)), batch=64, learning_rate=1e-2, decay=0.1, start_share=0.2)
     stage = train_stage(untrained(shape, data, 0), data, plan)
     run = run_stage(stage, _stage_drivers(crop)[None], np.zeros(crop.day.size), np.zeros((1, 1)))

@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import time
 from argparse import ArgumentParser, Namespace
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -23,14 +23,14 @@ from igrow.core.errors import IgrowError
 from igrow.core.simulator.network_run import free_run
 from igrow.trainer.research.network.checkpoint import BUNDLE_FOLDER
 from igrow.trainer.research.network.export import write_network_bundle
-from igrow.trainer.research.network.simulator import Layouts, train_simulator, with_setting_drivers
+from igrow.trainer.research.network.simulator import CLIMATE, Layouts, train_simulator
 from igrow.trainer.research.paper.scores import PUBLISHED_BASELINE, PUBLISHED_INCREMENTAL, SCORED, Score, score
 from igrow.trainer.research.paper.wur2020 import Seasons, TrajectoryFileError, read_seasons
 
 SITE = "wur2020"
 SETTINGS = ("ventilation_offset", "lamp_radiation_limit")
 """Settings of the virtual greenhouse computer: inputs of the published seasons, the same in all of them."""
-LAYOUTS = with_setting_drivers(Layouts(members=4), *SETTINGS)
+LAYOUTS = Layouts(replace(CLIMATE, drivers=(*CLIMATE.drivers, *SETTINGS)), members=4)
 
 
 @dataclass(frozen=True)
