@@ -19,7 +19,7 @@ from igrow.core.errors import IgrowError
 from igrow.core.local_time import utc_datetime
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.data import Log
-from igrow.trainer.data.splits import alternate_weeks
+from igrow.trainer.data.splits import held_out_weeks
 from igrow.trainer.diagnosis import DEFAULT, discrepancy_of, examine, history_of
 from igrow.trainer.diagnosis.wording import thin_air
 from igrow.trainer.fit.actuation import by_its_own_rules, fit_actuation, setpoint_columns
@@ -109,7 +109,7 @@ def _held_out_errors(record: Record, prior: Gaussian, progress: Progress) -> tup
 
     Empty where the log has no fourth week, or nothing complete in it.
     """
-    held_out = alternate_weeks(record.time).held_out
+    held_out = held_out_weeks(record.time)
     if not held_out.any():
         progress("the log is too short to hold a week back: no errors on unseen days; four weeks are needed")
         return ()
@@ -122,7 +122,7 @@ def _held_out_errors(record: Record, prior: Gaussian, progress: Progress) -> tup
 
 def _omission(record: Record, model: FittedModel, progress: Progress) -> Omission | None:
     """Return the term that a model lacks by its own log; None, and why, where that cannot be told."""
-    if not alternate_weeks(record.time).held_out.any():
+    if not held_out_weeks(record.time).any():
         progress("the log is too short to tell what the model lacks: four weeks are needed")
         return None
     progress("asking the log what the model lacks")

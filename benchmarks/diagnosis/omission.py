@@ -28,7 +28,7 @@ from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
 from igrow.trainer.data import prepare_log
-from igrow.trainer.data.splits import alternate_weeks
+from igrow.trainer.data.splits import held_out_weeks
 from igrow.trainer.diagnosis import DEFAULT, omission
 from igrow.trainer.diagnosis.omission import TERMS, USUAL_DEVIATION, UsualGains, root_gain
 from igrow.trainer.fit.climate import fit_climate, site_prior
@@ -110,7 +110,7 @@ def calibrations(
 
     Without usual gains nothing is named: what terms gain is all that is asked.
     """
-    prior, held_out = site_prior(site), alternate_weeks(record.time).held_out
+    prior, held_out = site_prior(site), held_out_weeks(record.time)
     whole = None
     for parameter in ("", *taken_out):
         known = without(prior, parameter) if parameter else prior

@@ -52,23 +52,13 @@ def split_days(record: Record, longitude: float) -> DaySplit:
     return DaySplit(day, ~held)
 
 
-@dataclass(frozen=True)
-class WeekSplit:
-    """Rows of a record by what they may be used for, (n,) each; no row is in two."""
-
-    fit: Mask
-    selection: Mask
-    held_out: Mask
-
-
 def weeks(time: Times) -> Integers:
     """Return the week of each row counted from the first row, (n,)."""
     number: Integers = (time - time[0]).astype("timedelta64[s]").astype(np.int64) // 604_800
     return number
 
 
-def alternate_weeks(time: Times) -> WeekSplit:
-    """Return every fourth week held out and the one before it for selection, for logs of few weeks."""
-    phase = weeks(time) % 4
-    held_out, selection = phase == 3, phase == 2
-    return WeekSplit(~held_out & ~selection, selection, held_out)
+def held_out_weeks(time: Times) -> Mask:
+    """Return the rows of every fourth week, (n,), for logs of few weeks."""
+    held_out: Mask = weeks(time) % 4 == 3
+    return held_out

@@ -9,10 +9,8 @@ before it looks for a cause. `benchmarks/diagnosis/factor_analysis.py` is how th
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -23,7 +21,7 @@ from igrow.trainer.data.splits import split_days
 from igrow.trainer.diagnosis import linear
 from igrow.trainer.diagnosis.design import Design, prepare
 from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, activate, knowledge_of
-from igrow.trainer.diagnosis.rules import DecisionRules
+from igrow.trainer.diagnosis.rules import DecisionRules, came_with_the_trainer
 from igrow.trainer.fit.model import FittedModel
 
 FILE = "learned/nuisance.json"
@@ -60,7 +58,7 @@ class NuisanceSubspace:
 
 def read_nuisance() -> NuisanceSubspace:
     """Return the subspace that came with the trainer."""
-    known = json.loads(files("igrow.trainer.diagnosis").joinpath(FILE).read_text(encoding="utf-8"))
+    known = came_with_the_trainer(FILE)
     return NuisanceSubspace(tuple(known["home"]), tuple(known["transferred"]), known["season"], known["provenance"])
 
 

@@ -10,10 +10,8 @@ question is asked again beside each that was found.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -25,13 +23,13 @@ from igrow.core.effects import EFFECTS, Effect
 from igrow.core.simulator.hybrid.climate import ActiveEffects
 from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
-from igrow.trainer.data.splits import alternate_weeks
+from igrow.trainer.data.splits import held_out_weeks
 from igrow.trainer.diagnosis import history, linear, search
 from igrow.trainer.diagnosis.candidates import Candidate
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.estimate import normal_quantile
 from igrow.trainer.diagnosis.linear import LinearModel, Term
-from igrow.trainer.diagnosis.rules import DecisionRules
+from igrow.trainer.diagnosis.rules import DecisionRules, came_with_the_trainer
 from igrow.trainer.fit.climate import fit_climate
 from igrow.trainer.fit.evaluation import Model, held_out_errors
 from igrow.trainer.fit.gaussian import Gaussian
@@ -79,8 +77,7 @@ def root_gain(gain: float) -> float:
 
 def read_usual_gains() -> UsualGains:
     """Return the gains that came with the trainer."""
-    file = files("igrow.trainer.diagnosis").joinpath(FILE)
-    return UsualGains(**json.loads(file.read_text(encoding="utf-8")))
+    return UsualGains(**came_with_the_trainer(FILE))
 
 
 def gains_of(
@@ -148,7 +145,7 @@ def examine(
         DivergenceError: the model runs out of all bounds on the log.
     """
     usual = usual or read_usual_gains()
-    held_out = alternate_weeks(record.time).held_out
+    held_out = held_out_weeks(record.time)
     named = usual.outstanding(gains_of(record, site, posterior, rules))
     if named is None or not held_out.any():
         return None

@@ -15,6 +15,12 @@ FILE = "learned/rules.json"
 HOUR = 3600.0
 
 
+def came_with_the_trainer(file: str) -> dict[str, Any]:
+    """Return what a command has learned and written to a file of this folder."""
+    document: dict[str, Any] = json.loads(files("igrow.trainer.diagnosis").joinpath(file).read_text(encoding="utf-8"))
+    return document
+
+
 def _chosen(value: float, meaning: str) -> Any:
     return field(default=value, metadata={"meaning": meaning, "set": "chosen"})
 
@@ -166,8 +172,7 @@ class DecisionRules:
 
 def read_rules() -> DecisionRules:
     """Return the rules that came with the trainer."""
-    document = json.loads(files("igrow.trainer.diagnosis").joinpath(FILE).read_text(encoding="utf-8"))
-    values: dict[str, Any] = {name: float(one["value"]) for name, one in document.items()}
+    values: dict[str, Any] = {name: float(one["value"]) for name, one in came_with_the_trainer(FILE).items()}
     return DecisionRules(**values)
 
 

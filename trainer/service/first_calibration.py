@@ -98,11 +98,11 @@ def _calibrate(
 
 def _gain(log: Log, model: FittedModel, deployed: FittedModel) -> float:
     """Return the relative fall of the 24 h error on weeks that the fit did not see, mean over quantities."""
-    from igrow.trainer.data.splits import alternate_weeks  # noqa: PLC0415
+    from igrow.trainer.data.splits import held_out_weeks  # noqa: PLC0415
     from igrow.trainer.fit import evaluate  # noqa: PLC0415
 
     record = log.record(model.alignment or 0.0)
-    held_out = alternate_weeks(record.time).held_out
+    held_out = held_out_weeks(record.time)
     errors = evaluate(record, deployed.posterior.values, deployed.active_effects, ("24_h",), held_out)
     falls = [
         1.0 - one.after / errors[one.quantity]["24_h"].mae
