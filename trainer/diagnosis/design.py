@@ -16,7 +16,7 @@ The blocks with a prior are the null: the model under which nothing is missing.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -26,12 +26,12 @@ from igrow.core.simulator.hybrid.climate import ActiveEffects
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.data.splits import DaySplit
 from igrow.trainer.diagnosis import candidates, linear, noise, possible_air, sensitivity
-from igrow.trainer.diagnosis.candidates import Candidate, Pattern
+from igrow.trainer.diagnosis.candidates import Candidate, EffectColumns, Pattern
 from igrow.trainer.diagnosis.drift import Drift
 from igrow.trainer.diagnosis.knowledge import drift
 from igrow.trainer.diagnosis.linear import DailyGrams, LinearModel
 from igrow.trainer.diagnosis.noise import NoiseFilter, Whitening
-from igrow.trainer.diagnosis.recalibration import averaging, recalibrate
+from igrow.trainer.diagnosis.recalibration import Averaging, averaging, recalibrate
 from igrow.trainer.diagnosis.rules import HOUR, DecisionRules
 from igrow.trainer.diagnosis.sensitivity import Linearisation
 from igrow.trainer.fit.gaussian import Gaussian
@@ -104,7 +104,7 @@ class Design:
     patterns: tuple[Pattern, ...]
     """Of the block of patterns."""
     untestable: tuple[str, ...]
-    usual_size: Mapping[str, float]
+    usual_size: Mapping[str, float] = field(default_factory=dict)
     """Amplitude, by effect, that a log with nothing missing usually shows."""
     history: History | None = None
     """What is known of this very greenhouse from its calibration; None: greenhouses in general stand in."""
@@ -240,34 +240,41 @@ def prepare(
         ("nuisance", list(map(str, range(len(nuisance)))), nuisance, np.zeros(len(nuisance)), np.eye(len(nuisance))),
         ("drift", prior.names[: len(drifting)], drifting, np.zeros(len(drifting)), np.eye(len(drifting))),
     ]
-    values = np.concatenate([average(columns) for _, _, columns, _, _ in parts])
-    products = linear.daily_products(whitening(values), runs.day, split.days)
-    return Design(
-        line=line,
-        split=split,
-        prior=prior,
-        rules=rules,
-        interval=interval,
-        blocks=blocks_of(parts),
-        values=values,
-        observed=average.observed,
-        whitening=whitening,
-        grams=DailyGrams(products, split.fit),
-        candidates=found.candidates,
-        patterns=patterns,
-        untestable=found.untestable,
-        usual_size=usual_size or {},
-    )
+    plain = of_parts(line, split, prior, rules, average, parts, found, patterns)
+    return replace(plain, usual_size=usual_size or {}).whitened(whitening)
 
 
-def blocks_of(parts: Sequence[Part]) -> dict[str, Block]:
-    """Return the blocks of columns that stand one after the other."""
+def of_parts(
+    line: Linearisation,
+    split: DaySplit,
+    prior: Gaussian,
+    rules: DecisionRules,
+    average: Averaging,
+    parts: Sequence[Part],
+    found: EffectColumns,
+    patterns: tuple[Pattern, ...],
+) -> Design:
+    """Return the design of columns that stand one after the other, before any noise."""
     blocks: dict[str, Block] = {}
     place = 0
     for name, labels, columns, mean, precision in parts:
         blocks[name] = Block(tuple(labels), range(place, place + len(columns)), mean, precision)
         place += len(columns)
-    return blocks
+    return Design(
+        line=line,
+        split=split,
+        prior=prior,
+        rules=rules,
+        interval=average.interval,
+        blocks=blocks,
+        values=np.concatenate([average(columns) for _, _, columns, _, _ in parts]),
+        observed=average.observed,
+        whitening=Whitening((), np.eye(len(average.balances)), average.observed.astype(np.float64)),
+        grams=DailyGrams(np.zeros((split.days, 0, 0)), split.fit),
+        candidates=found.candidates,
+        patterns=patterns,
+        untestable=found.untestable,
+    )
 
 
 def _combined(line: Linearisation, longitude: float, *groups: Sequence[Mapping[str, float]]) -> list[Floats]:
@@ -283,14 +290,7 @@ def _combined(line: Linearisation, longitude: float, *groups: Sequence[Mapping[s
 
 
 def _drifting(slopes: Floats, prior: Gaussian, day: Integers, rules: DecisionRules) -> Floats:
-    """Return d(error)/d(drift) of every parameter, (p, 3, r, steps): linear in time, at the size that it may have.
-
-    Args:
-        slopes: d(error)/d(parameter), (p, 3, r, steps).
-        prior: of the parameters.
-        day: of each run, (r,).
-        rules: how fast parameters drift.
-    """
+    """Return d(error)/d(drift) of every parameter, (p, 3, r, steps): linear in time, at the size that it may have."""
     middle = 0.5 * (day[0] + day[-1])
     course = (day - middle) / (0.5 * rules.drift_days)
     size = drift(prior.values, rules.parameter_drift, rules)

@@ -21,7 +21,7 @@ from igrow.trainer.data.splits import DaySplit, split_days
 from igrow.trainer.diagnosis import candidates, linear, noise, search, sensitivity
 from igrow.trainer.diagnosis.amplitudes import columns, drift_within, keys, omission, rate_keys, units
 from igrow.trainer.diagnosis.candidates import WEEKDAYS
-from igrow.trainer.diagnosis.design import Design, History, blocks_of
+from igrow.trainer.diagnosis.design import Design, History, of_parts
 from igrow.trainer.diagnosis.drift import Drift, read_drift
 from igrow.trainer.diagnosis.freerun import LogDays
 from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, ActiveTerm, activate, knowledge_of
@@ -128,23 +128,7 @@ def lay_out(
         ("pattern", tuple(one.key for one in patterns), courses[lasting], none, None),
         *((name, (), nothing, none, np.zeros((0, 0))) for name in ("discrepancy", "nuisance", "drift")),
     ]
-    values = np.concatenate([average(columns) for _, _, columns, _, _ in parts])
-    return Design(
-        line=line,
-        split=split,
-        prior=prior,
-        rules=rules,
-        interval=record.step,
-        blocks=blocks_of(parts),
-        values=values,
-        observed=average.observed,
-        whitening=Whitening((), np.eye(len(average.balances)), average.observed.astype(np.float64)),
-        grams=DailyGrams(np.zeros((split.days, 0, 0)), split.fit),
-        candidates=found.candidates,
-        patterns=patterns,
-        untestable=found.untestable,
-        usual_size={},
-    )
+    return of_parts(line, split, prior, rules, average, parts, found, patterns)
 
 
 def laid_out(
