@@ -21,6 +21,8 @@ OPSET = 21
 
 Shape = tuple[str | int, ...]
 """Of a tensor; a text names an axis whose length is free."""
+Ports = Mapping[str, tuple[tuple[str, ...], Shape]]
+"""Inputs or outputs of a graph: what stands in each, in order, and its shape."""
 Formula = Callable[[Any, Mapping[str, Any]], Mapping[str, Any]]
 """`formula(xp, arrays by name) -> arrays by name`."""
 
@@ -97,6 +99,11 @@ def grouped(arrays: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
         if colon:
             groups.setdefault(group, {})[name] = value
     return groups
+
+
+def shapes(ports: Ports) -> dict[str, Shape]:
+    """Return the shapes of inputs or outputs by name."""
+    return {name: shape for name, (_, shape) in ports.items()}
 
 
 def tags(group: str, names: Iterable[str]) -> list[str]:

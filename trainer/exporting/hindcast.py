@@ -2,7 +2,7 @@
 
 Row by row the graph predicts what the sensors will show at the end of the row's step. Where `follow` is 1 it
 then takes what they did show as its state, so that floor and memories settle; where `follow` is 0 it runs on
-freely. See `INPUTS` and `OUTPUTS` for the shapes; everything is float32.
+freely. See `ports` for the shapes; everything is float32.
 """
 
 from __future__ import annotations
@@ -12,22 +12,28 @@ from collections.abc import Mapping
 from onnx import GraphProto, ModelProto
 
 from igrow.core.simulator.hybrid.measurement import PREDICTED
-from igrow.trainer.exporting.blocks import Shape
+from igrow.trainer.exporting.blocks import Ports, shapes
 from igrow.trainer.exporting.climate import ClimateBlocks
 from igrow.trainer.exporting.climate_wiring import ClimateWiring
 from igrow.trainer.exporting.wiring import Wiring, finished_model
 
-INPUTS: Mapping[str, Shape] = {
-    "climate": (len(PREDICTED), "batch"),
-    "inputs": ("rows", "inputs", "batch"),
-    "measured": ("rows", len(PREDICTED), "batch"),
-    "follow": ("rows", 1),
-    "day": ("rows", 1),
-    "seconds": (1,),
-    "parameters": ("parameters", "members"),
-}
-"""Measured climate at the first row; drivers of each row; measured climate at each row's end; members is 1 or batch."""
-OUTPUTS: Mapping[str, Shape] = {"predicted": ("rows", len(PREDICTED), "batch")}
+
+def ports(blocks: ClimateBlocks) -> tuple[Ports, Ports]:
+    """Return the graph's inputs and outputs; members is 1 or batch.
+
+    Measured climate at the first row; drivers of each row; measured climate at each row's end, and what was predicted.
+    """
+    climate = (PREDICTED, ("rows", len(PREDICTED), "batch"))
+    inputs: Ports = {
+        "climate": (PREDICTED, (len(PREDICTED), "batch")),
+        "inputs": (blocks.inputs, ("rows", "inputs", "batch")),
+        "measured": climate,
+        "follow": (("follow",), ("rows", 1)),
+        "day": (("day",), ("rows", 1)),
+        "seconds": (("seconds",), (1,)),
+        "parameters": (blocks.parameters, ("parameters", "members")),
+    }
+    return inputs, {"predicted": climate}
 
 
 def hindcast_model(blocks: ClimateBlocks) -> ModelProto:
@@ -43,7 +49,7 @@ def hindcast_model(blocks: ClimateBlocks) -> ModelProto:
         "Scan", [packed, "inputs", "measured", "follow", "day"], 2, body=body, num_scan_inputs=4
     )
     outer.output("predicted", predicted)
-    return finished_model(outer.graph("hindcast", INPUTS, OUTPUTS), blocks.blocks)
+    return finished_model(outer.graph("hindcast", *map(shapes, ports(blocks))), blocks.blocks)
 
 
 def _row_graph(blocks: ClimateBlocks, parameters: Mapping[str, str]) -> GraphProto:

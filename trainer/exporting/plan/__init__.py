@@ -2,11 +2,11 @@
 
 An hour is a few steps of the climate stage with the actuation stage in front, then one step of growth; a day ends
 with one step of yield. Hours and days are scanned, so that one graph serves every horizon of whole days and every
-number of candidates. Everything is float32 and the batch comes last; `input_shapes` and `OUTPUTS` tell the shapes.
+number of candidates. Everything is float32 and the batch comes last; `ports` tells the shapes.
 """
 
 from igrow.trainer.exporting.plan.blocks import PlanBlocks, plan_blocks
-from igrow.trainer.exporting.plan.graph import OUTPUTS, input_shapes, plan_model
+from igrow.trainer.exporting.plan.graph import plan_model, ports
 from igrow.trainer.exporting.plan.training_range import RANGED
 
-__all__ = ["OUTPUTS", "RANGED", "PlanBlocks", "input_shapes", "plan_blocks", "plan_model"]
+__all__ = ["RANGED", "PlanBlocks", "plan_blocks", "plan_model", "ports"]

@@ -2,42 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from onnx import ModelProto
 
 from igrow.core.quantities import GROWTH, SETPOINTS, YIELD
 from igrow.core.simulator.hybrid.measurement import PREDICTED
 from igrow.core.simulator.plan import CLIMATE_OUT, CLOCK, EQUIPMENT, RESOURCES
-from igrow.trainer.exporting.blocks import Shape
+from igrow.trainer.exporting.blocks import Ports, shapes
 from igrow.trainer.exporting.climate_wiring import ClimateWiring
 from igrow.trainer.exporting.plan.blocks import PlanBlocks
 from igrow.trainer.exporting.plan.days import wire_days
 from igrow.trainer.exporting.plan.hour import carried_names, climate_inputs, hour_graph
 from igrow.trainer.exporting.wiring import Wiring, finished_model
 
-OUTPUTS: Mapping[str, Shape] = {
-    "climate_out": ("hours", len(CLIMATE_OUT), "batch"),
-    "resources": ("hours", len(RESOURCES), "batch"),
-    "growth_out": ("hours", len(GROWTH), "batch"),
-    "harvest_out": ("days", len(YIELD), "batch"),
-    "outside": ("hours", "batch"),
-}
 
-
-def input_shapes(blocks: PlanBlocks) -> dict[str, Shape]:
-    """Return the shapes of the graph's inputs; `w` and `members` are 1 or batch."""
-    return {
-        "climate": (len(PREDICTED), "batch"),
-        "growth": (len(GROWTH), "batch"),
-        "harvest": (len(YIELD), "batch"),
-        "equipment": (len(EQUIPMENT), "batch"),
-        "weather": ("hours", len(blocks.weather), "w"),
-        "clock": ("hours", len(CLOCK), 1),
-        "day": ("hours", 1),
-        "setpoints": ("hours", len(SETPOINTS), "batch"),
-        "parameters": (len(blocks.parameters), "members"),
+def ports(blocks: PlanBlocks) -> tuple[Ports, Ports]:
+    """Return the graph's inputs and outputs; `w` and `members` are 1 or batch."""
+    inputs: Ports = {
+        "climate": (PREDICTED, (len(PREDICTED), "batch")),
+        "growth": (GROWTH, (len(GROWTH), "batch")),
+        "harvest": (YIELD, (len(YIELD), "batch")),
+        "equipment": (EQUIPMENT, (len(EQUIPMENT), "batch")),
+        "weather": (blocks.weather, ("hours", len(blocks.weather), "w")),
+        "clock": (CLOCK, ("hours", len(CLOCK), 1)),
+        "day": (("day",), ("hours", 1)),
+        "setpoints": (SETPOINTS, ("hours", len(SETPOINTS), "batch")),
+        "parameters": (blocks.parameters, (len(blocks.parameters), "members")),
     }
+    outputs: Ports = {
+        "climate_out": (CLIMATE_OUT, ("hours", len(CLIMATE_OUT), "batch")),
+        "resources": (RESOURCES, ("hours", len(RESOURCES), "batch")),
+        "growth_out": (GROWTH, ("hours", len(GROWTH), "batch")),
+        "harvest_out": (YIELD, ("days", len(YIELD), "batch")),
+        "outside": (("outside",), ("hours", "batch")),
+    }
+    return inputs, outputs
 
 
 def plan_model(blocks: PlanBlocks) -> ModelProto:
@@ -68,4 +66,4 @@ def plan_model(blocks: PlanBlocks) -> ModelProto:
     outer.output("growth_out", growth_out)
     outer.output("outside", outside, outer.constant("axis", [1]), operator="Squeeze")
     outer.output("harvest_out", wire_days(outer, blocks.harvest, climate_out, growth_out))
-    return finished_model(outer.graph("simulator", input_shapes(blocks), OUTPUTS), blocks.blocks)
+    return finished_model(outer.graph("simulator", *map(shapes, ports(blocks))), blocks.blocks)
