@@ -18,6 +18,7 @@ from igrow.trainer.data.public import challenge, excel_tables
 from igrow.trainer.data.source import DailyTable, Source
 
 _CLIMATE = ("Greenhouse_climate", "GreenhouseClimate")
+_COLUMNS = challenge.COLUMNS["agc2018"]
 _LAMP_POWER = 117.0
 """W m-2: 187 umol m-2 s-1 at 1.6 umol J-1 (data documentation, checked against the daily electricity)."""
 
@@ -52,8 +53,9 @@ def read(folder: Path, compartment: str | None = None) -> Source:
     notes = ["no CO2 dosing signal: only its daily sums are known", *_setpoints(folder / name, local, columns)]
     empty = ~np.isfinite(table[["Tair", "VentLee", "EnScr"]].to_numpy(dtype=np.float64)).any(axis=1)
     telemetry = challenge.to_telemetry(local, columns, empty)
+    used = challenge.daily(excel_tables.find(folder / name, "ResourceCalculations"), _COLUMNS["resources"])
     site = replace(challenge.site("agc2018"), name=f"agc2018-{name.lower().replace('_', '-')}")
-    return Source(f"agc2018 {name}", telemetry, _harvests(folder / name), _resources(folder / name), site, tuple(notes))
+    return Source(f"agc2018 {name}", telemetry, _harvests(folder / name), used, site, tuple(notes))
 
 
 def _setpoints(folder: Path, local: Times, columns: dict[str, Floats]) -> list[str]:
@@ -64,21 +66,13 @@ def _setpoints(folder: Path, local: Times, columns: dict[str, Floats]) -> list[s
     time = excel_tables.excel_times(table["time"].to_numpy(dtype=np.float64), path)
     row = np.minimum(np.searchsorted(time, local), len(time) - 1)
     there = time[row] == local
-    names = {"heating_setpoint": "HeatTemp_Vip", "co2_setpoint": "CO2_Vip"}
-    for ours, values in excel_tables.columns(table, names).items():
+    for ours, values in excel_tables.columns(table, _COLUMNS["setpoints"]).items():
         columns[ours] = np.where(there, values[row], np.nan)
     return []
 
 
 def _harvests(folder: Path) -> DailyTable | None:
-    table = challenge.daily(excel_tables.find(folder, "Production"), {"class_a": "ProdA_cum", "class_b": "ProdB_cum"})
+    table = challenge.daily(excel_tables.find(folder, "Production"), _COLUMNS["harvests"])
     if table is None:
         return None
     return DailyTable(table.day, {name: np.diff(values, prepend=0.0) for name, values in table.columns.items()})
-
-
-def _resources(folder: Path) -> DailyTable | None:
-    return challenge.daily(
-        excel_tables.find(folder, "ResourceCalculations"),
-        {"heat": "Heating_Energy", "electricity": "Electricity_Lamp", "co2": "CO2_dosage", "irrigation": "net_water"},
-    )

@@ -21,6 +21,7 @@ from igrow.trainer.data.public import challenge, excel_tables, traps
 from igrow.trainer.data.source import DailyTable, Source
 
 _CLIMATE = ("GreenhouseClimate", "Greenhouse_climate")
+_COLUMNS = challenge.COLUMNS["agc2019"]
 _HPS_POWER = 81.0
 _LED_POWER = {"int_blue_vip": 7.27, "int_red_vip": 25.3, "int_farred_vip": 6.23, "int_white_vip": 22.72}
 """W m-2 at full range (data documentation)."""
@@ -53,17 +54,7 @@ def read(folder: Path, compartment: str | None = None) -> Source:
     empty = ~np.isfinite(table[["Tair", "VentLee", "EnScr"]].to_numpy(dtype=np.float64)).any(axis=1)
     telemetry = challenge.to_telemetry(local, columns, empty)
     harvests, notes = _harvests(excel_tables.find(folder / name, "Production"))
-    resources = challenge.daily(
-        excel_tables.find(folder / name, "Resources"),
-        {
-            "heat": "Heat_cons",
-            "electricity_peak": "ElecHigh",
-            "electricity_off_peak": "ElecLow",
-            "co2": "CO2_cons",
-            "irrigation": "Irr",
-            "drain": "Drain",
-        },
-    )
+    resources = challenge.daily(excel_tables.find(folder / name, "Resources"), _COLUMNS["resources"])
     site = replace(challenge.site("agc2019"), name=f"agc2019-{name.lower()}")
     return Source(f"agc2019 {name}", telemetry, harvests, resources, site, notes)
 
@@ -100,7 +91,7 @@ def _rate(since_midnight: Floats, local: Times) -> Floats:
 
 def _setpoints(table: Any) -> dict[str, Floats]:
     """Return the realised setpoints, which exist in all rows, unlike the requested ones."""
-    columns = excel_tables.columns(table, {"heating_setpoint": "t_heat_vip", "co2_setpoint": "co2_vip"})
+    columns = excel_tables.columns(table, _COLUMNS["setpoints"])
     lamp = excel_tables.column(table, "assim_vip")
     if lamp is not None:
         columns["lamp_on"] = np.clip(0.01 * lamp, 0.0, 1.0)
@@ -108,7 +99,7 @@ def _setpoints(table: Any) -> dict[str, Floats]:
 
 
 def _harvests(path: Path | None) -> tuple[DailyTable | None, tuple[str, ...]]:
-    table = challenge.daily(path, {"class_a": "ProdA", "class_b": "ProdB"})
+    table = challenge.daily(path, _COLUMNS["harvests"])
     if table is None:
         return None, ()
     day = np.array(table.day)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 
 from igrow.core.air import STEFAN_BOLTZMANN
 from igrow.core.arrays import Floats, Mask, Times
@@ -20,11 +21,14 @@ from igrow.trainer.data.source import DailyTable
 
 TIME_ZONE = "Europe/Amsterdam"
 STEP = 300.0
+_FOLDER = resources.files("igrow.trainer.data.public")
+COLUMNS: Mapping[str, Any] = yaml.safe_load((_FOLDER / "columns.yaml").read_text(encoding="utf-8"))
+"""Our names -> the files', by challenge and table."""
 
 
 def site(name: str) -> Site:
     """Return the site description that comes with the reader of a challenge."""
-    with resources.as_file(resources.files("igrow.trainer.data.public") / "sites" / f"{name}.yaml") as path:
+    with resources.as_file(_FOLDER / "sites" / f"{name}.yaml") as path:
         return load_site(path)
 
 
@@ -53,14 +57,8 @@ def choose(folder: Path, compartment: str | None, *stems: str) -> str:
 
 def weather(frame: Any) -> dict[str, Floats]:
     """Return the weather columns of a challenge's weather table by our names."""
-    names = {
-        "outdoor_temperature": "Tout",
-        "outdoor_humidity": "Rhout",
-        "global_radiation": "Iglob",
-        "wind_speed": "Windsp",
-        "rain": "Rain",
-    }
-    columns = {ours: traps.without_spikes(ours, values) for ours, values in excel_tables.columns(frame, names).items()}
+    found = excel_tables.columns(frame, COLUMNS["both"]["weather"])
+    columns = {ours: traps.without_spikes(ours, values) for ours, values in found.items()}
     net = excel_tables.column(frame, "Pyrgeo")
     if net is not None and "outdoor_temperature" in columns:
         # A pyrgeometer shows the sky's radiation minus its own, which is that of a body at outdoor temperature.
@@ -76,22 +74,15 @@ def weather(frame: Any) -> dict[str, Floats]:
 
 def climate(frame: Any) -> dict[str, Floats]:
     """Return measured climate and actuators of a challenge's climate table by our names, without lamps and CO2."""
-    sensors = {"air_temperature": "Tair", "air_humidity": "RHair", "air_co2": "CO2air"}
-    measured = excel_tables.columns(frame, sensors)
-    for ours, theirs in sensors.items():
+    names = COLUMNS["both"]
+    measured = excel_tables.columns(frame, names["climate"])
+    for ours, theirs in names["climate"].items():
         if ours not in measured:
             raise IgrowError(f"the climate table has no column {theirs}")
     columns = {ours: traps.without_spikes(ours, values) for ours, values in measured.items()}
-    positions = {
-        "vent_lee": "VentLee",
-        "vent_wind": "VentWind",
-        "energy_screen": "EnScr",
-        "blackout_screen": "BlackScr",
-    }
-    for ours, values in excel_tables.columns(frame, positions).items():
+    for ours, values in excel_tables.columns(frame, names["positions"]).items():
         columns[ours] = np.clip(values, 0.0, 100.0)
-    pipes = {"rail_pipe_temperature": "PipeLow", "grow_pipe_temperature": "PipeGrow"}
-    for ours, values in excel_tables.columns(frame, pipes).items():
+    for ours, values in excel_tables.columns(frame, names["pipes"]).items():
         columns[ours] = traps.cooling_pipe(values, columns["air_temperature"], STEP)
     return columns
 

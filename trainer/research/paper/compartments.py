@@ -16,7 +16,7 @@ from igrow.core import gaps
 from igrow.core.arrays import Floats, Integers, Times
 from igrow.core.errors import IgrowError
 from igrow.trainer.data.public import agc2018, excel_tables
-from igrow.trainer.data.public.challenge import daily
+from igrow.trainer.data.public.challenge import COLUMNS, daily
 
 LAMP_EFFICACY_2019 = 100.0 / 81.0
 """umol per J: 100 umol m-2 s-1 from HPS lamps of 81 W m-2; the LEDs give 97 from 62 W m-2."""
@@ -38,8 +38,6 @@ class Compartment:
     """(harvests,) rows of `day`."""
     harvested: Floats
     """(harvests,) cumulative kg m-2, classes A and B, after each harvest."""
-    class_b: Floats
-    """(harvests,) kg m-2 of class B among each harvest."""
     resources: Mapping[str, Floats]
     """(days,): heat (MJ m-2), electricity_peak, electricity_off_peak (kWh m-2), co2 (kg m-2), where known."""
     brix: Floats
@@ -85,18 +83,12 @@ def read_2019(folder: Path) -> list[Compartment]:
     outside = excel_tables.read(weather)
     time = excel_tables.excel_times(outside["time"].to_numpy(dtype=np.float64), weather)
     names = [child.name for child in sorted(folder.iterdir()) if excel_tables.find(child, "Production") is not None]
-    compartments = []
+    compartments, columns = [], COLUMNS["agc2019"]
     for name in names:
-        resources = daily(
-            excel_tables.find(folder / name, "Resources"),
-            {"heat": "Heat_cons", "electricity_peak": "ElecHigh", "electricity_off_peak": "ElecLow", "co2": "CO2_cons"},
-        )
-        crop = daily(
-            excel_tables.find(folder / name, "CropParameters"),
-            {"stem_density": "stem_dens", "plant_density": "plant_dens"},
-        )
-        quality = daily(excel_tables.find(folder / name, "TomQuality"), {"brix": "TSS"})
-        harvest = daily(excel_tables.find(folder / name, "Production"), {"class_a": "ProdA", "class_b": "ProdB"})
+        resources = daily(excel_tables.find(folder / name, "Resources"), columns["resources"])
+        crop = daily(excel_tables.find(folder / name, "CropParameters"), columns["crop"])
+        quality = daily(excel_tables.find(folder / name, "TomQuality"), columns["quality"])
+        harvest = daily(excel_tables.find(folder / name, "Production"), columns["harvests"])
         slab = excel_tables.find(folder / name, "GrodanSens")
         if resources is None or crop is None or quality is None or harvest is None or slab is None:
             raise IgrowError(f"{folder / name}: Resources, CropParameters, TomQuality, Production, GrodanSens needed")
@@ -124,7 +116,7 @@ def read_2019(folder: Path) -> list[Compartment]:
                     "temperature": _by_day(slab_time, temperature, day),
                     "stem_density": _held(day, crop.day, crop["stem_density"]),
                 },
-                harvest_day=rows, harvested=np.cumsum(class_a + class_b), class_b=class_b, resources=books,
+                harvest_day=rows, harvested=np.cumsum(class_a + class_b), resources=books,
                 brix=np.interp(rows, quality_day[good], quality["brix"][good]),
                 plant_density=float(np.nanmedian(crop["plant_density"])),
             )
@@ -157,7 +149,6 @@ def read_2018(folder: Path) -> list[Compartment]:
                     "stem_density": np.ones(day.size),
                 },
                 harvest_day=rows[keep], harvested=np.cumsum(total)[keep],
-                class_b=np.nan_to_num(log.harvests["class_b"])[keep],
                 resources={}, brix=np.full(int(keep.sum()), np.nan), plant_density=float("nan"),
             )
         )  # fmt: skip
