@@ -1,7 +1,7 @@
 """Separating tests at the plant: who approved one, whether this site can run it, and its run."""
 
 from igrow.edge.separating_tests.approval import Approval, approval_file, approve, read_approval, withdraw
-from igrow.edge.separating_tests.possible import lent_points, obstacles, possible
+from igrow.edge.separating_tests.possible import obstacles, possible
 from igrow.edge.separating_tests.runner import SeparatingTests
 
 __all__ = [
@@ -9,7 +9,6 @@ __all__ = [
     "SeparatingTests",
     "approval_file",
     "approve",
-    "lent_points",
     "obstacles",
     "possible",
     "read_approval",

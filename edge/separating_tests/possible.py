@@ -24,12 +24,6 @@ def possible(configuration: Configuration) -> Mapping[str, SeparatingTest]:
     return {name: SEPARATING_TESTS[name] for name, obstacle in obstacles(configuration).items() if not obstacle}
 
 
-def lent_points(configuration: Configuration) -> tuple[str, ...]:
-    """Return the points of possible tests that are the PLC's own, such as vents."""
-    points = dict.fromkeys(point for test in possible(configuration).values() for point in test.points)
-    return tuple(point for point in points if point not in configuration.setpoints)
-
-
 def conditions_of(test: SeparatingTest, site: Site) -> tuple[Condition, ...]:
     """Return a test's own conditions, and those of the site's crop."""
     crop = site.crop

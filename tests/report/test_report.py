@@ -226,7 +226,7 @@ def test_what_a_fault_of_the_data_saw_is_told_and_its_mend_can_be_copied() -> No
 
 
 def test_a_note_with_figures_is_told_too(leak: Diagnosis) -> None:
-    sentence = OpenVents(-120.0, -110.0, 500).sentence
+    sentence = OpenVents(-120.0, -110.0).sentence
     (note,) = sentences.notes(replace(leak, notes=(sentence,)), speak("de"))
     assert note.startswith("Bei weit offenen Lüftungen zeigt der CO2-Sensor von den ersten Tagen an 115 ppm unter der")
 

@@ -135,14 +135,9 @@ def _groups(given: Path, site: Site | None, answers: Answers, arguments: argpars
 def _finish(
     given: Path, groups: Sequence[_Group], known: Collection[str], site: Site | None, arguments: argparse.Namespace
 ) -> bool:
-    """Say what was understood and write it down; tells whether nothing is left open.
+    """Say what was understood of a file or folder and write it down; tells whether nothing is left open.
 
-    Args:
-        given: file or folder.
-        groups: its layouts.
-        known: quantities that this or another file of the call has.
-        site: the greenhouse, where it is known.
-        arguments: of the command.
+    `known` are the quantities that this or another file of the call has.
     """
     parts = [group.checked.merged.telemetry for group in groups if group.checked.mapping.columns]
     log = prepare_log(concatenate(parts), site, name=given.name) if parts and any(map(len, parts)) else None

@@ -44,8 +44,6 @@ class Log:
     """Stretches of single quantities that were set aside."""
     faults: tuple[DataFault, ...] = ()
     """Why no model may be fitted to it, with the mend; empty for a good log."""
-    source: str = ""
-    """Where it was read from."""
     harvests: DailyTable | None = field(default=None)
     """See `igrow.trainer.data.source.Source`."""
     resources: DailyTable | None = field(default=None)

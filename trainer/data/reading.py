@@ -45,19 +45,18 @@ def read_log(
     """
     if not isinstance(path, str | Path | Sequence):
         raise IgrowError(f"a path is needed, not a {type(path).__name__}: prepare_log takes telemetry in memory")
-    place = [path] if isinstance(path, str | Path) else list(path)
     given = load_site(site) if isinstance(site, str | Path) else site
     source = open_source(path, compartment, mapping)
-    return _prepared(source, given or source.site, ", ".join(map(str, place)), accept)
+    return _prepared(source, given or source.site, accept)
 
 
 def prepare_log(telemetry: Telemetry, site: Site | None = None, *, name: str = "log") -> Log:
     """Return the log of a table in memory, screened and put on the grid as `read_log` does it."""
     must_be(Telemetry, telemetry, "Telemetry(times, columns) makes one, read_log reads files")
-    return _prepared(Source(name, telemetry), site, "memory")
+    return _prepared(Source(name, telemetry), site)
 
 
-def _prepared(source: Source, site: Site | None, place: str, accept: Collection[str] = ()) -> Log:
+def _prepared(source: Source, site: Site | None, accept: Collection[str] = ()) -> Log:
     if len(source.telemetry) == 0:
         raise IgrowError(f"{source.name}: the log has no rows (`igrow-trainer import` shows what is read of an export)")
     telemetry, strays = without_strays(source.telemetry)
@@ -65,7 +64,7 @@ def _prepared(source: Source, site: Site | None, place: str, accept: Collection[
     accepted = tuple(f"accepted although {fault.sentence}" for fault in found if fault.kind in accept)
     faults = [fault for fault in found if fault.kind not in accept]
     if not own_step(telemetry.time) <= HOUR:
-        return Log(source.name, telemetry, site, source.notes, faults=tuple(faults), source=place)
+        return Log(source.name, telemetry, site, source.notes, faults=tuple(faults))
     screened = screen(telemetry)
     table = on_grid(screened.telemetry)
     # What a wrong unit pushes out of range is no sensor's fault.
@@ -86,7 +85,6 @@ def _prepared(source: Source, site: Site | None, place: str, accept: Collection[
         tuple(notes),
         screened.screened,
         tuple(faults),
-        place,
         source.harvests,
         source.resources,
     )

@@ -24,7 +24,6 @@ class Unit:
     """A unit that a column may be in, and the way to the registry's: a value becomes value * scale + offset."""
 
     name: str
-    dimension: str
     scale: float = 1.0
     offset: float = 0.0
     amount: Amount = "rate"
@@ -126,7 +125,6 @@ def units() -> Mapping[str, Mapping[str, Unit]]:
         for name, unit in table.items():
             one = Unit(
                 name,
-                dimension,
                 float(unit.get("scale", 1)),
                 float(unit.get("offset", 0)),
                 cast("Amount", unit.get("amount", "rate")),

@@ -119,15 +119,7 @@ def reach(rules: DecisionRules) -> float:
 def _confounded(
     design: Design, null: Fit, hypothesis: Hypothesis, gain: float, rng: np.random.Generator
 ) -> tuple[str, ...]:
-    """Return the effects that would do as well in the place of a cause, itself first.
-
-    Args:
-        design: under the noise that is left beside the cause.
-        null: the model without it.
-        hypothesis: the cause.
-        gain: of the cause, scored as the others are.
-        rng: for the flips.
-    """
+    """Return the effects that would do as well in the place of a cause of this gain, itself first."""
     margin = max(design.rules.confounded_gain, design.rules.confounded_share * gain)
     onsets = search.onset_days(design) if hypothesis.term.onset is not None else [None]
     scored = search.score_candidates(design, null, onsets, rng)

@@ -25,7 +25,6 @@ class OpenVents:
     first: float
     """Median in the first part of the log."""
     last: float
-    rows: int
 
     def is_offset(self, rules: DecisionRules) -> bool:
         """Tell whether the sensor is off from the beginning, by about as much at the end."""
@@ -52,4 +51,4 @@ def under_open_vents(record: Record, rules: DecisionRules) -> OpenVents | None:
     first, last = read[chosen[part == 0]], read[chosen[part == PARTS - 1]]
     if min(len(first), len(last)) < rules.open_rows:
         return None
-    return OpenVents(float(np.median(first)), float(np.median(last)), len(chosen))
+    return OpenVents(float(np.median(first)), float(np.median(last)))

@@ -270,12 +270,7 @@ def _regimes(
 ) -> dict[str, tuple[float, float]]:
     """Return (amplitude, standard deviation) refitted on the samples of each regime, all else held.
 
-    Args:
-        unknowns: of the refit.
-        view: how errors are seen.
-        residual: white, after the fit, (b, r, intervals).
-        slope: white, of the amplitude, (b, r, intervals).
-        amplitude: as fitted on all samples.
+    Residual and slope of the amplitude are white, (b, r, intervals).
     """
     line, rules = unknowns.design.line, unknowns.design.rules
     samples, inputs = line.runs.samples - 1, line.record.inputs

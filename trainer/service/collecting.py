@@ -51,8 +51,6 @@ class Collected:
     records: int = 0
     reports: int = 0
     bytes: int = 0
-    repeated: int = 0
-    """Segments that were there already."""
     newest: datetime | None = None
     """Time of the newest row that was ever collected of this site."""
     notes: list[str] = field(default_factory=list)
@@ -107,7 +105,6 @@ def _collect_segment(
     """Bring one segment into archive and ledger; tell whether the exchange needs it no more."""
     site = ledger.site
     if ledger.has(name):
-        done.repeated += 1
         return True
     data = place.get(f"{site}/segments/{name}", LARGEST_SEGMENT)
     if data is None:

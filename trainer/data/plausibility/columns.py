@@ -12,6 +12,7 @@ from igrow.core.quantities import difference_with_unit
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data.fault import DataFault, Remedy
+from igrow.trainer.data.plausibility.units import readings
 
 SWAPPED_ALIKE = 3.0
 """K by which the nights outside are warmer than those inside, in columns that stand in each other's place."""
@@ -109,6 +110,5 @@ def screens_reversed(telemetry: Telemetry, site: Site) -> list[DataFault]:
 
 
 def _median(telemetry: Telemetry, name: str) -> float | None:
-    if name not in telemetry or not np.isfinite(telemetry[name]).any():
-        return None
-    return float(np.nanmedian(telemetry[name]))
+    values = readings(telemetry, name)
+    return float(np.median(values)) if len(values) else None

@@ -7,6 +7,7 @@ import numpy as np
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data.fault import DataFault
 from igrow.trainer.data.grid import HOUR, own_step
+from igrow.trainer.data.plausibility.units import readings
 from igrow.trainer.data.screening import NEEDED
 
 LEAST_DAYS = 5
@@ -40,9 +41,7 @@ def sparse(telemetry: Telemetry) -> tuple[DataFault, ...]:
 def shuffled(telemetry: Telemetry) -> tuple[DataFault, ...]:
     """Tell whether one row says nothing of the next: the times are not those of the readings."""
     for name in ("outdoor_temperature", "air_temperature", "global_radiation"):
-        if name not in telemetry:
-            continue
-        values = telemetry[name][np.isfinite(telemetry[name])]
+        values = readings(telemetry, name)
         if len(values) < _LEAST_ROWS or np.ptp(values) == 0.0:
             continue
         ranks = np.argsort(np.argsort(values, kind="stable"), kind="stable").astype(np.float64)

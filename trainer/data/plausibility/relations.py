@@ -9,12 +9,18 @@ from __future__ import annotations
 import numpy as np
 
 from igrow.core import sun
-from igrow.core.arrays import Floats
 from igrow.core.quantities import difference_with_unit, with_unit
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data.fault import DataFault, Remedy
-from igrow.trainer.data.plausibility.units import FAHRENHEIT, LEAST_VALUES, PIPES, RELATIVE_IN_PER_CENT, in_another_unit
+from igrow.trainer.data.plausibility.units import (
+    FAHRENHEIT,
+    LEAST_VALUES,
+    PIPES,
+    RELATIVE_IN_PER_CENT,
+    in_another_unit,
+    readings,
+)
 
 LAG_DAYS = 30
 """By which the seasons of the air follow the sun."""
@@ -58,13 +64,13 @@ def warmest_median(telemetry: Telemetry, latitude: float) -> float:
 
 def _outdoor_temperature(telemetry: Telemetry, site: Site | None) -> DataFault | None:
     name = "outdoor_temperature"
-    values = _readings(telemetry, name)
+    values = readings(telemetry, name)
     if site is None or len(values) < LEAST_VALUES:
         return None
     middle, most = float(np.median(values)), warmest_median(telemetry, site.latitude)
     if middle <= most or middle > 140.0:
         return None
-    inside = _readings(telemetry, "air_temperature")
+    inside = readings(telemetry, "air_temperature")
     if len(inside) and float(np.median(inside)) <= most:
         # What is warm here may be the air inside, and the column of that the weather.
         return None
@@ -131,7 +137,7 @@ def _outdoor_humidity(telemetry: Telemetry) -> DataFault | None:
 
 def _carbon_outside(telemetry: Telemetry) -> DataFault | None:
     name = "outdoor_co2"
-    values = _readings(telemetry, name)
+    values = readings(telemetry, name)
     if len(values) < LEAST_VALUES:
         return None
     middle = float(np.median(values))
@@ -139,10 +145,3 @@ def _carbon_outside(telemetry: Telemetry) -> DataFault | None:
         return None
     seen = f"{name} has a median of {middle:.4g}, so it is in mg m-3"
     return in_another_unit("milligrams", name, seen, _MILLIGRAMS)
-
-
-def _readings(telemetry: Telemetry, name: str) -> Floats:
-    if name not in telemetry:
-        return np.empty(0)
-    values = telemetry[name]
-    return values[np.isfinite(values)]

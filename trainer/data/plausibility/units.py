@@ -26,6 +26,12 @@ FAHRENHEIT = Remedy(5.0 / 9.0, -160.0 / 9.0)
 _KELVIN = Remedy(1.0, -273.15)
 
 
+def readings(telemetry: Telemetry, name: str) -> Floats:
+    """Return what was read of a quantity, (k,); nothing of one that the log lacks."""
+    values = telemetry.columns.get(name, np.empty(0))
+    return values[np.isfinite(values)]
+
+
 def wrong_units(telemetry: Telemetry) -> list[DataFault]:
     """Return the columns whose values are of another unit than the registry's."""
     checks: Mapping[tuple[str, ...], Callable[[str, Floats], DataFault | None]] = {
@@ -42,11 +48,10 @@ def wrong_units(telemetry: Telemetry) -> list[DataFault]:
     found = []
     for names, check in checks.items():
         for name in names:
-            if name in telemetry:
-                values = telemetry[name][np.isfinite(telemetry[name])]
-                fault = check(name, values) if len(values) >= LEAST_VALUES else None
-                if fault is not None:
-                    found.append(fault)
+            values = readings(telemetry, name)
+            fault = check(name, values) if len(values) >= LEAST_VALUES else None
+            if fault is not None:
+                found.append(fault)
     return found
 
 
