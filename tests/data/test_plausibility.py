@@ -199,7 +199,7 @@ def test_an_accepted_fault_is_a_note(clean: Clean) -> None:
     from igrow.trainer.data.reading import _prepared
     from igrow.trainer.data.source import Source
 
-    log = _prepared(Source("late", late), SITE, "here", accept=("clock", "local_time"))
+    log = _prepared(Source("late", late), SITE, accept=("clock", "local_time"))
     assert log.faults == ()
     assert any(note.startswith("accepted although noon comes") for note in log.notes)
 
