@@ -114,7 +114,7 @@ def crop(name: str, yield_per_mol: float, days: int = 120) -> Compartment:
     return Compartment(
         name, np.arange(np.datetime64("2020-01-01"), np.datetime64("2020-01-01") + days),
         {"light_sum": light, "temperature": np.full(days, 20.0), "stem_density": np.full(days, 3.9)},
-        harvest_day, harvested, np.zeros_like(harvested),
+        harvest_day, harvested,
         {name: np.ones(days) for name in ("heat", "electricity_peak", "electricity_off_peak", "co2")},
         np.full(harvest_day.size, 8.0), 1.95,
     )  # fmt: skip
