@@ -182,7 +182,7 @@ class ControlCycle:
         for write in verdict.writes:
             if not image.makes_sense(write.point):
                 self.state = never_sent(self.state, before, write.point)
-                outcomes.append(WriteOutcome(write, SenselessUnitError("the numbers of its unit make no sense")))
+                outcomes.append(WriteOutcome(write, SenselessUnitError(image.why_senseless(write.point))))
         self._remember(image)  # that which never left, too
         self._journal.ledger(verdict.clamps, outcomes, ())
         return outcomes
@@ -207,6 +207,7 @@ class ControlCycle:
     def _image(self, readings: Mapping[str, RawReading], *, patient: bool = False) -> Image:
         """Make the image of these readings, and look what it shows of our writes and of others' hands."""
         image = self._builder.build(readings, self._clock.monotonic(), self._clock.true_time())
+        image = self.readback.recognised(image)
         self._seen |= image.link_ok and bool(readings)
         self._journal.begin(image)
         findings = self.readback.observe(image, restarted=self._heart.was_cleared(image), patient=patient)

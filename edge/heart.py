@@ -23,7 +23,9 @@ class Heart:
     def was_cleared(self, image: Image) -> bool:
         """Tell whether the register, where it was read just now, shows that its PLC has started anew."""
         beat = image.value_of(HEARTBEAT)
-        return beat.value is not None and beat.age <= 0.0 and self._writer.beats.was_cleared(beat.value)
+        if beat.value is None or beat.age > 0.0 or not image.makes_sense(HEARTBEAT):
+            return False
+        return self._writer.beats.was_cleared(beat.value)
 
     def meant_a_start(self, image: Image) -> None:
         """Hear that the setpoints of this image show a start of the PLC."""

@@ -55,12 +55,14 @@ MISSING = Value(None, Quality.MISSING, float("inf"), "never read")
 
 @dataclass(frozen=True, slots=True)
 class Senseless:
-    """A unit whose numbers make no sense."""
+    """A unit, or several, that nothing may be written to, as what is read there is not what the map says."""
 
     points: frozenset[str]
     """All that it holds."""
-    told_by: tuple[str, ...]
-    """Those that show it."""
+    what: str
+    """What is wrong with it, as the beginning of a sentence."""
+    question: str
+    """What people should ask themselves."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +82,7 @@ class Image:
     """The units that did not answer each of these requests, or none, each with its points."""
 
     senseless: Mapping[str, Senseless] = field(default_factory=lambda: MappingProxyType({}))
-    """The units whose numbers make no sense, so that nothing may be written there."""
+    """The units whose numbers make no sense or are another one's, so that nothing may be written there."""
 
     def value_of(self, name: str) -> Value:
         """Return the value of a point, `MISSING` for a point that this plant does not have."""
@@ -92,7 +94,11 @@ class Image:
 
     def makes_sense(self, name: str) -> bool:
         """Tell whether what the unit that holds a point says can be understood."""
-        return not any(name in unit.points for unit in self.senseless.values())
+        return not self.why_senseless(name)
+
+    def why_senseless(self, name: str) -> str:
+        """Return what is wrong with the unit that holds a point; empty where it is understood."""
+        return next((unit.what for unit in self.senseless.values() if name in unit.points), "")
 
     def reaches(self, name: str) -> bool:
         """Tell whether the unit that holds a point answers and is understood: whether it may be written to."""

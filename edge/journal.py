@@ -94,15 +94,12 @@ class Journal:
         self._understood(image)
 
     def _understood(self, image: Image) -> None:
-        """Raise an alarm for each unit whose numbers make no sense."""
+        """Raise an alarm for each unit whose numbers make no sense, or are another one's."""
         self._senseless |= image.senseless.keys()
         for unit in self._senseless:
             lost, text = image.senseless.get(unit), ""
             if lost is not None:
-                text = (
-                    f"the numbers of unit {unit} make no sense ({', '.join(lost.told_by)}), so nothing is written to "
-                    "it, no heartbeat either: has its program changed its addresses, scales or order of words?"
-                )
+                text = f"{lost.what}, so nothing is written there, no heartbeat either: {lost.question}"
             self.alarm(f"registers {unit}".strip(), text)
 
     def _links(self, image: Image) -> None:

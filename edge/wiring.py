@@ -25,6 +25,7 @@ from igrow.edge.pace import FollowedPlant, Pace, TickPace
 from igrow.edge.planning_schedule import PlanningRules, PlanningSchedule
 from igrow.edge.point_rules import highest_beat
 from igrow.edge.ports import Plan
+from igrow.edge.registers.look_alikes import look_alikes
 from igrow.edge.registers.model import TWIN_SUFFIX
 from igrow.edge.remembering import StateNotes, registers_of
 from igrow.edge.sensors import ImageBuilder, TwinSensors
@@ -144,6 +145,7 @@ def build_control(
             respect_hand=respect_hand,
             silence=FALLBACK_CYCLES * interval,
             units=units,
+            look_alikes=look_alikes(register_map, configuration.setpoints),
         ),
         GuardedWriter(
             plc, has_heartbeat=heartbeat is not None, highest_beat=highest_beat(heartbeat) if heartbeat else 1

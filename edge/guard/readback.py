@@ -10,18 +10,21 @@ one of these causes, looked for in this order:
 5. a hand. It is respected for a configured time, and its value is remembered: what moves the point away meanwhile
    (an interlock, a fallback, a restart) does not end it.
 
-Whether a PLC could be heard is judged for each unit by itself.
+Whether a PLC could be heard is judged for each unit by itself. Units that have changed places are not read at all
+(`igrow.edge.guard.exchanged`).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Mapping
+from types import MappingProxyType
 
 from igrow.core.quantities import with_unit
 from igrow.edge.guard.answers import matches, on_the_way
 from igrow.edge.guard.causes import FALLBACK, Causes
 from igrow.edge.guard.evidence import Questions, disturbed
+from igrow.edge.guard.exchanged import Exchanged
 from igrow.edge.guard.findings import Finding, Hand, Outcome, Problem
 from igrow.edge.guard.heartbeat import HEARTBEAT
 from igrow.edge.guard.our_writes import OurWrites
@@ -30,6 +33,7 @@ from igrow.edge.guard.power_up import Look
 from igrow.edge.guard.rules import PointRule
 from igrow.edge.guard.state import Write
 from igrow.edge.image import Image
+from igrow.edge.registers.look_alikes import LookAlikes
 
 SILENCE = 30.0
 """Seconds without a word after which a PLC may have fallen back: three cycles of ten seconds."""
@@ -46,10 +50,12 @@ class Readback:
         respect_hand: float,
         silence: float = SILENCE,
         units: Mapping[str, str] | None = None,
+        look_alikes: LookAlikes = MappingProxyType({}),
     ) -> None:
         """`confirm_within`, `respect_hand` and `silence` in seconds; `units` maps points to the unit that holds them.
 
-        After `silence` without a word, or without our heartbeat, a PLC may have fallen back by itself.
+        After `silence` without a word, or without our heartbeat, a PLC may have fallen back by itself. `look_alikes`
+        are the units that could be taken for each other.
         """
         self._rules = rules
         self._respect_hand = respect_hand
@@ -61,6 +67,7 @@ class Readback:
             rules, self.points, self._causes, confirm_within=confirm_within, respect_hand=respect_hand
         )
         self._questions = Questions(rules, self._units, confirm_within)
+        self._exchanged = Exchanged(rules, self.points, self._units, look_alikes)
 
     def wrote(self, write: Write, now: float) -> None:
         """Remember a write that is about to leave; a later reading must show it."""
@@ -113,7 +120,7 @@ class Readback:
 
     def unseen(self, image: Image) -> set[str]:
         """Return the points to be read now, although they may not be due: something has happened to their PLC."""
-        return disturbed(self.points, image).union(self._questions.wanted)
+        return disturbed(self.points, image).union(self._questions.wanted, self._exchanged.wanted)
 
     def cannot_be_read(self, name: str, image: Image) -> bool:
         """Tell whether no reading of a point is to be waited for."""
@@ -132,6 +139,10 @@ class Readback:
         for name, memory in self.points.items():
             memory.settle(self._rules[name], targets.get(name))
         return {name: memory.problem for name, memory in self.points.items()}
+
+    def recognised(self, image: Image) -> Image:
+        """Return the image in which units that have changed places are not read as themselves; before `observe`."""
+        return self._exchanged.judge(image)
 
     def observe(self, image: Image, *, restarted: bool = False, patient: bool = False) -> list[Finding]:
         """Compare an image with what was written, before deciding; call again where `unseen` was read.

@@ -29,6 +29,7 @@ FEW = 3
 """So many times as many numbers have to make sense as do not, until a unit does again."""
 CALM = 60.0
 """Seconds for which they have to."""
+QUESTION = "has its program changed its addresses, scales or order of words?"
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +62,8 @@ class Sense:
                 mine = {name: shown[name] for name in points & shown.keys() if _counts(name, setpoints=setpoints)}
                 told |= self._told((unit, setpoints), mine, now)
             if told:
-                found[unit] = Senseless(frozenset(points), tuple(sorted(told)))
+                what = f"the numbers of unit {unit} make no sense ({', '.join(sorted(told))})"
+                found[unit] = Senseless(frozenset(points), what, QUESTION)
         return found
 
     def _told(self, key: tuple[str, bool], shown: Mapping[str, Shown], now: float) -> set[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 from igrow.edge.bus.modbus_bus import ModbusBus
 from igrow.edge.bus.plc import RegisterPlc
@@ -17,12 +17,13 @@ from igrow.edge.image import Image
 from igrow.edge.journal import Journal
 from igrow.edge.registers.codec import decode
 from igrow.edge.registers.loading import parse_register_map
+from igrow.edge.registers.look_alikes import look_alikes
 from igrow.edge.registers.model import BusSettings, Function, RegisterMap, Transport
 from igrow.edge.sensors import ImageBuilder, SensorRule
 from igrow.edge.sources import HandsOff, Source
 from igrow.edge.stopping import STOP_SECONDS, StopReport
 from igrow.edge.virtual_plc.memory import DeviceMemory
-from igrow.edge.virtual_plc.modbus_server import ModbusServer
+from igrow.edge.virtual_plc.modbus_server import ModbusServer, Unit
 from tests.bus.fault_proxy import FaultProxy
 from tests.control.control_fakes import MemoryStore
 
@@ -153,6 +154,16 @@ class PlcBench:
     def unit_of(self, name: str) -> RecordingUnit:
         return next(unit for unit in self.units.values() if name in unit.points)
 
+    @property
+    def numbers(self) -> list[dict[int, Unit]]:
+        """What answers under which number, on the first line and on the last one, which may be the same."""
+        return [cast(dict[int, Unit], self.servers[place]._units) for place in (0, -1)]
+
+    def change_places(self) -> None:
+        """Let each unit answer under the other's number, or address where it has a line of its own."""
+        first, second = self.numbers
+        first[1], second[2] = second[2], first[1]
+
     def stands(self, name: str) -> float | None:
         return self.unit_of(name).value(name)
 
@@ -225,7 +236,14 @@ async def make_plc_bench(
             ImageBuilder({name: SensorRule(-1e6, 1e6, stale_after=30.0) for name in points.points}, units=devices),
             [*sources, HandsOff(SAFE)],
             GuardRules(RULES, ()),
-            Readback(RULES, confirm_within=60.0, respect_hand=respect_hand, silence=3 * INTERVAL, units=devices),
+            Readback(
+                RULES,
+                confirm_within=60.0,
+                respect_hand=respect_hand,
+                silence=3 * INTERVAL,
+                units=devices,
+                look_alikes=look_alikes(points, RULES),
+            ),
             GuardedWriter(plc, has_heartbeat=True),
             Journal(store),
             setpoints=tuple(RULES),
