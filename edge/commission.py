@@ -13,6 +13,7 @@ from datetime import timedelta
 from typing import Protocol
 
 from igrow.core.yaml_scalars import duration
+from igrow.edge.bus.errors import OtherUnitError
 from igrow.edge.bus.plc import Reading, RegisterPlc
 from igrow.edge.configuration import Configuration
 from igrow.edge.guard import GuardedWriter, GuardRules, GuardState, Request, guard
@@ -92,6 +93,7 @@ class Commissioning:
         try:
             if not await self._line_is_up(plc):
                 return False
+            await self._ask_who_they_are(plc)
             await self._confirm_readings(plc)
             if self._only_read:
                 tell("setpoints and heartbeat were left alone (--only-read)")
@@ -118,6 +120,15 @@ class Commissioning:
                 return False
             await asyncio.sleep(0.5)
 
+    async def _ask_who_they_are(self, plc: RegisterPlc) -> None:
+        """Compare what each unit says of itself with the map."""
+        for name, device in self._configuration.register_map.devices.items():
+            error = await plc.not_itself(name)
+            if error is not None:
+                self._wrong.append(str(error))
+            elif device.identity is not None:
+                self._dialogue.tell(f"  unit {name} shows its identity: {device.identity}")
+
     async def _confirm_readings(self, plc: RegisterPlc) -> None:
         """Compare the values with the PLC's own display, a screenful at a time, each read when it is shown."""
         names = [name for name in self._configuration.register_map.points if name not in MOVING]
@@ -138,6 +149,8 @@ class Commissioning:
         """Find what cannot be read, or cannot be true; nobody has to be asked for that."""
         for name, reading in (await plc.read(names)).items():
             rule = self._configuration.sensor_rules[name]
+            if isinstance(reading.error, OtherUnitError):
+                continue  # said of its unit
             if reading.value is None:
                 self._wrong.append(f"{name} cannot be read: {reading.error}")
             elif not rule.low <= reading.value <= rule.high:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from igrow.edge.bus.errors import BusError, RefusedError
+from igrow.edge.bus.identity import not_itself
 from igrow.edge.bus.modbus_bus import ModbusBus
 from igrow.edge.bus.protocol import Bus, Priority, ReadRequest
 from igrow.edge.registers.codec import decode_raw
-from igrow.edge.registers.model import BusSettings, ByteOrder, DataType, Function
+from igrow.edge.registers.model import BusSettings, ByteOrder, DataType, Device, Function
 
 _BY_WIDTH = {
     1: (DataType.INT16, DataType.UINT16),
@@ -36,19 +37,27 @@ async def probe(
     function: Function = Function.HOLDING,
     first: int = 0,
     count: int = 16,
+    devices: Iterable[Device] = (),
 ) -> Answers:
     """Return which units answer, what their registers hold, and what that may mean.
 
-    Each unit is asked for `count` addresses from `first` on, in one request, then one by one where it refuses.
+    Each unit is asked for `count` addresses from `first` on, in one request, then one by one where it refuses; those of
+    `devices` also for their identity.
     Reads only. Never raises BusError: what goes wrong stands in the lines.
     """
     bus = ModbusBus(settings, rest_step=0.0)
     bus.start()
     try:
         units = [await probe_unit(bus, device_id, function, first, count) for device_id in device_ids]
-        return Answers([line for unit in units for line in unit.lines], any(unit.any for unit in units))
+        identities = [await _identity(bus, device) for device in devices if device.identity is not None]
+        return Answers([*(line for unit in units for line in unit.lines), *identities], any(unit.any for unit in units))
     finally:
         await bus.close()
+
+
+async def _identity(bus: Bus, device: Device) -> str:
+    error = await not_itself(bus, device)
+    return f"unit {device.name} shows its identity: {device.identity}" if error is None else str(error)
 
 
 async def probe_unit(bus: Bus, device_id: int, function: Function, first: int, count: int) -> Answers:

@@ -89,6 +89,10 @@ class TurnedWordsError(NoValueError):
         """What they may mean."""
 
 
+class OtherUnitError(BusError):
+    """Another unit answers in place of the one that the map means. What it shows and takes is not the map's."""
+
+
 class SenselessUnitError(BusError):
     """What the unit shows makes no sense, so neither would what is written. Nothing was sent: correct the map."""
 

@@ -8,7 +8,15 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from igrow.edge.bus.block_reader import BlockReader
-from igrow.edge.bus.errors import BusError, NoValueError, TurnedWordsError, UnknownPointError, ValueDoesNotFitError
+from igrow.edge.bus.errors import (
+    BusError,
+    NoValueError,
+    OtherUnitError,
+    TurnedWordsError,
+    UnknownPointError,
+    ValueDoesNotFitError,
+)
+from igrow.edge.bus.identity import not_itself
 from igrow.edge.bus.modbus_bus import ModbusBus
 from igrow.edge.bus.protocol import Bus, Priority, WriteRequest
 from igrow.edge.clock import since_boot
@@ -78,6 +86,11 @@ class RegisterPlc:
         self._readers = {name: BlockReader(bus, devices, monotonic) for name, bus in self.buses.items()}
         self._bus_of = {name: devices[point.device].bus for name, point in register_map.points.items()}
         self._due: dict[str, float] = {}
+        identified = {
+            point.device: name for name, point in register_map.points.items() if devices[point.device].identity
+        }
+        self._in_each_cycle = set(identified.values())
+        """One point of each unit that can say who it is: nothing is written to another one."""
 
     def start(self) -> None:
         """Begin to connect to every bus, in the background. Never waits."""
@@ -130,11 +143,16 @@ class RegisterPlc:
         priority = Priority.HEARTBEAT if name == "heartbeat" else Priority.WRITE
         await self.buses[device.bus].write(request, priority)
 
+    async def not_itself(self, device: str) -> BusError | None:
+        """Ask a unit who it is; returns why nothing of it may be believed, or None."""
+        settings = self.register_map.devices[device]
+        return await not_itself(self.buses[settings.bus], settings)
+
     def _due_names(self) -> list[str]:
         now = self._monotonic()
         due: list[str] = []
         for point in self.register_map.points.values():
-            if point.poll > 0:
+            if point.poll > 0 and point.name not in self._in_each_cycle:
                 if now < self._due.get(point.name, now):
                     continue
                 self._due[point.name] = now + POLL_SLACK * point.poll
@@ -143,6 +161,13 @@ class RegisterPlc:
 
     async def _read_share(self, bus: str, points: list[Point], readings: dict[str, Reading]) -> None:
         contents = await self._readers[bus].read(points)
+        # Asked after the rest, so that what was read before another unit took the place is not believed either.
+        for device in dict.fromkeys(point.device for point in points):
+            stranger = await self.not_itself(device)
+            for point in points if stranger is not None else ():
+                answered = contents[point.name][0] is not None or isinstance(stranger, OtherUnitError)
+                if point.device == device and answered:
+                    contents[point.name] = None, stranger, self._monotonic()
         for point in points:
             content, error, at = contents[point.name]
             value = None

@@ -11,6 +11,7 @@ from igrow.edge.cli.common import add_configuration, configuration_of
 from igrow.edge.configuration import Configuration
 from igrow.edge.daemon_file import PAGE_PORT, STATUS_PORT, ClockSource, PageSettings
 from igrow.edge.registers.bus_load import estimate
+from igrow.edge.registers.look_alikes import look_alikes
 from igrow.edge.registers.model import SYSTEM_POINTS
 
 EXAMPLE = "igrow-edge check-config /etc/igrow/daemon.yaml"
@@ -52,6 +53,20 @@ def _page(page: PageSettings) -> Iterator[str]:
         yield "  note      passwords pass this network as they are typed; docs/page.md says how to encrypt them"
 
 
+def _identities(configuration: Configuration) -> Iterator[str]:
+    """Yield by what each unit is told from the others, and which ones cannot be."""
+    devices = configuration.register_map.devices
+    for name, device in devices.items():
+        if device.identity is not None:
+            yield f"  identity  {name}: {device.identity}"
+    for unit, other in look_alikes(configuration.register_map, configuration.setpoints):
+        if unit < other and devices[unit].identity is None and devices[other].identity is None:
+            yield (
+                f"  note      {unit} and {other} have their setpoints in the same registers: an `identity` would tell "
+                "the one from the other; see docs/commissioning.md"
+            )
+
+
 def describe(configuration: Configuration) -> Iterator[str]:
     """Yield what the configuration means, for people."""
     site, register_map, file = configuration.site, configuration.register_map, configuration.file
@@ -63,6 +78,7 @@ def describe(configuration: Configuration) -> Iterator[str]:
     for assumption in register_map.check_on_site:
         yield f"  on site   {assumption}"
     simulated = file.cycle.clock is not ClockSource.SYSTEM
+    yield from _identities(configuration)
     for load in estimate(register_map) if simulated else estimate(register_map, cycle=interval):
         yield f"  {load}"
     yield f"cycle       each {interval:g} s, clock: {file.cycle.clock.value}"

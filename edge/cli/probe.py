@@ -9,7 +9,7 @@ from dataclasses import replace
 from igrow.core.errors import IgrowError
 from igrow.edge.probe import probe, scan
 from igrow.edge.registers.loading import load_register_map
-from igrow.edge.registers.model import BusSettings, Function, Parity, Transport
+from igrow.edge.registers.model import BusSettings, Device, Function, Parity, Transport
 
 EXAMPLE = "igrow-edge probe --tcp 192.168.1.20 --units 1 --function input --first 0 --count 20"
 
@@ -41,33 +41,36 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Ask and print; the exit code is 0 where a unit answered, else 1."""
-    settings = replace(_settings(options), timeout=options.timeout)
+    settings, devices = _settings(options)
+    settings = replace(settings, timeout=options.timeout)
     if options.scan:
         answers = asyncio.run(scan(settings, parse_units(options.units or "1-247")))
     else:
         if not (options.first >= 0 and 1 <= options.count <= 125 and options.first + options.count <= 65536):
             raise IgrowError("--first and --count: 1 to 125 addresses between 0 and 65535 are right")
         units = parse_units(options.units or "1")
-        answers = asyncio.run(probe(settings, units, Function(options.function), options.first, options.count))
+        answers = asyncio.run(probe(settings, units, Function(options.function), options.first, options.count, devices))
     print("\n".join(answers.lines))
     return 0 if answers.any else 1
 
 
-def _settings(options: argparse.Namespace) -> BusSettings:
+def _settings(options: argparse.Namespace) -> tuple[BusSettings, list[Device]]:
+    """Return the line, and what a map says of the devices on it."""
     if options.map:
-        buses = load_register_map(options.map).buses
+        register_map = load_register_map(options.map)
+        buses = register_map.buses
         name = options.bus or next(iter(buses))
         if name not in buses:
             raise IgrowError(f"{options.map}: there is no bus {name}: {', '.join(buses)}")
-        return buses[name]
+        return buses[name], [device for device in register_map.devices.values() if device.bus == name]
     if options.serial:
         return BusSettings(
             options.serial, Transport.RTU, serial_port=options.serial, baudrate=options.baudrate,
             parity=Parity(options.parity), stop_bits=options.stop_bits, gap=0.03,
-        )  # fmt: skip
+        ), []  # fmt: skip
     host, port = _host_and_port(options.tcp or options.rtu_over_tcp)
     transport = Transport.TCP if options.tcp else Transport.RTU_OVER_TCP
-    return BusSettings(f"{host}:{port}", transport, host=host, port=port, baudrate=options.baudrate)
+    return BusSettings(f"{host}:{port}", transport, host=host, port=port, baudrate=options.baudrate), []
 
 
 def _host_and_port(text: str) -> tuple[str, int]:

@@ -82,4 +82,9 @@ def estimate(register_map: RegisterMap, *, cycle: float | None = None) -> tuple[
                 bus = register_map.buses[device.bus]
                 busy[device.bus] += transaction_time(bus, device, 9 + 2 * point.type.width, 8) / written
                 rate[device.bus] += 1 / written
+    for device in register_map.devices.values():
+        if device.identity is not None:
+            bus, answer = register_map.buses[device.bus], 5 + 2 * len(device.identity.content)
+            busy[device.bus] += transaction_time(bus, device, 8, answer) / (cycle or EVERY_CYCLE)
+            rate[device.bus] += 1 / (cycle or EVERY_CYCLE)
     return tuple(BusLoad(name, rate[name], busy[name]) for name in register_map.buses)

@@ -14,6 +14,7 @@ from igrow.core.yaml_schema import SettingError, load, parse, setting
 from igrow.edge.registers.bus_file import RtuBus, RtuOverTcpBus, TcpBus, TlsBus, bus_settings
 from igrow.edge.registers.bus_load import estimate
 from igrow.edge.registers.codec import NotEncodableError, encode
+from igrow.edge.registers.identity_file import IdentitySettings
 from igrow.edge.registers.model import (
     POINT_NAMES,
     ByteOrder,
@@ -54,6 +55,7 @@ class DeviceSettings:
     longest_bit_block: int = setting(help="most bits in one answer", low=1, high=2000, default=2000)
     bridge: int = setting(help="unused addresses that one read may span", low=0, high=124, default=8)
     unreadable: tuple[AddressRange, ...] = setting(help="addresses that it refuses to read", default=())
+    identity: IdentitySettings | None = setting(help="registers that no other unit shows so", default=None)
 
 
 @dataclass(frozen=True)
@@ -181,6 +183,25 @@ class MapFile:
             if device.device_id == 0 and self.buses[device.bus].transport in ("rtu", "rtu_over_tcp"):
                 what = "device_id 0 is the broadcast, which nobody answers: 1 to 247 on a serial line"
                 raise SettingError(what, "devices", name, "device_id")
+        self._check_identities()
+
+    def _check_identities(self) -> None:
+        seen: dict[IdentitySettings, str] = {}
+        for name, device in self.devices.items():
+            if device.identity is None:
+                continue
+            other = seen.setdefault(device.identity, name)
+            if other != name:
+                what = f"it is {other}'s as well, so it would not tell the one from the other"
+                raise SettingError(what, "devices", name, "identity")
+            identity = device.identity.identity
+            for point_name, settings in self.points.items():
+                point = settings.point(point_name)
+                shared = point.address < identity.end and identity.address < point.end
+                if point.device == name and point.function is identity.function and shared:
+                    where = f"{point.function.value} {point.address}"
+                    what = f"{where} holds {point_name}, which changes: take what never does"
+                    raise SettingError(what, "devices", name, "identity", "address")
 
     def _check_point(self, name: str, settings: PointSettings) -> None:
         if settings.device not in self.devices:
@@ -247,6 +268,7 @@ def _device(name: str, device: DeviceSettings) -> Device:
         longest_bit_block=device.longest_bit_block,
         bridge=device.bridge,
         unreadable=tuple((r.function, r.first, r.last) for r in device.unreadable),
+        identity=None if device.identity is None else device.identity.identity,
     )
 
 

@@ -133,6 +133,23 @@ SYSTEM_POINTS: Mapping[str, SystemPoint] = MappingProxyType(
 
 
 @dataclass(frozen=True)
+class Identity:
+    """Registers by which a unit is told from every other one."""
+
+    function: Function
+    address: int
+    content: tuple[int, ...]
+
+    @property
+    def end(self) -> int:
+        """First address after it."""
+        return self.address + len(self.content)
+
+    def __str__(self) -> str:
+        return f"{', '.join(map(str, self.content))} in {self.function.value} {self.address}"
+
+
+@dataclass(frozen=True)
 class Device:
     """One Modbus unit on a bus and what it can bear."""
 
@@ -149,6 +166,7 @@ class Device:
     """Unused addresses that a read may span rather than pay for another request."""
     unreadable: tuple[tuple[Function, int, int], ...] = ()
     """Tables and address ranges, both ends included, that the device refuses to read."""
+    identity: Identity | None = None
 
     def block_limit(self, function: Function) -> int:
         """Most addresses of one table that one request may ask for."""

@@ -93,7 +93,7 @@ class ImageBuilder:
         self._contact.hear(readings)
         contact = self._contact
         shown = {name: one for name, track in self._tracks.items() if (one := _shown(track, monotonic)) is not None}
-        senseless = self._sense.judge(shown, monotonic)
+        senseless = {**self._sense.judge(shown, monotonic), **contact.others}
         return Image(monotonic, true_time, values, contact.link_ok, contact.silent, contact.interrupted, senseless)
 
 

@@ -22,9 +22,10 @@ class AnswerWithExceptionError(Exception):
 class Table:
     """One of the four tables: consecutive addresses, some of which may be refused."""
 
-    def __init__(self, points: Sequence[Point], refused: Sequence[tuple[int, int]] = ()) -> None:
-        self.first = min((point.address for point in points), default=0)
-        end = max((point.end for point in points), default=0)
+    def __init__(self, spans: Sequence[tuple[int, int]], refused: Sequence[tuple[int, int]] = ()) -> None:
+        """`spans` are the addresses in use: first, and first behind; `refused` both ends."""
+        self.first = min((first for first, _ in spans), default=0)
+        end = max((end for _, end in spans), default=0)
         self.content = [0] * (end - self.first)
         self._refused = refused
 
@@ -47,17 +48,20 @@ class DeviceMemory:
     """The four tables of one device of a register map, read and written by address (clients) or name (the PLC)."""
 
     def __init__(self, register_map: RegisterMap, device: str) -> None:
-        unreadable = register_map.devices[device].unreadable
+        unreadable, identity = register_map.devices[device].unreadable, register_map.devices[device].identity
         self.points: Mapping[str, Point] = {
             name: point for name, point in register_map.points.items() if point.device == device
         }
         self.tables = {
             function: Table(
-                [point for point in self.points.values() if point.function is function],
+                [(point.address, point.end) for point in self.points.values() if point.function is function]
+                + [(one.address, one.end) for one in (identity,) if one is not None and one.function is function],
                 [(first, last) for table, first, last in unreadable if table is function],
             )
             for function in Function
         }
+        if identity is not None:
+            self.tables[identity.function].put(identity.address, identity.content)
         self._writable = {
             (point.function, address)
             for point in self.points.values()

@@ -6,6 +6,7 @@ import pytest
 
 from igrow.edge.commission import Commissioning
 from igrow.edge.configuration import load_configuration
+from igrow.edge.registers.model import Function
 from igrow.edge.virtual_plc.pace import Lockstep, Realtime
 from tests.control.daemon_bench import Plant, free_port, write_files
 
@@ -64,6 +65,31 @@ async def test_a_plc_that_does_everything_right_passes(tmp_path):
     assert passed, person.lines
     assert any("fell back after" in line for line in person.lines)
     assert any(line.strip() == "its own co2_setpoint = 400 ppm" for line in person.lines)
+
+
+IDENTITY = "device_id: 1, identity: {function: input, address: 20, content: [47, 11]}}"
+
+
+async def test_a_plc_that_says_who_it_is_is_asked_first(tmp_path):
+    person = Script()
+    passed, _ = await walk(tmp_path, person, only_read=True, edit=lambda text: text.replace("device_id: 1}", IDENTITY))
+    assert passed, person.lines
+    assert person.lines[0] == "  unit plc shows its identity: 47, 11 in input 20"
+
+
+async def test_another_plc_at_the_address_is_one_line_and_nothing_is_written(tmp_path):
+    def another(plant):
+        table = plant.plc.memory.tables[Function.INPUT]
+        table.put(20, [47, 12])
+
+    person = Script()
+    passed, plant = await walk(
+        tmp_path, person, prepare=another, edit=lambda text: text.replace("device_id: 1}", IDENTITY)
+    )
+    assert not passed
+    (line,) = person.lines
+    assert "unit plc shows 47, 12 in input 20, but its `identity` in the map is 47, 11 in input 20" in line
+    assert plant.written == []
 
 
 async def test_a_person_is_asked_for_the_value_that_the_register_will_show(tmp_path):

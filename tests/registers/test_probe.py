@@ -6,7 +6,7 @@ import asyncio
 
 from igrow.edge.probe import Answers, decoded, probe, scan
 from igrow.edge.registers.codec import encode_raw
-from igrow.edge.registers.model import BusSettings, ByteOrder, DataType, Function, Transport
+from igrow.edge.registers.model import BusSettings, ByteOrder, DataType, Device, Function, Identity, Transport
 from igrow.edge.virtual_plc.modbus_server import ModbusServer
 from tests.bus.coded_unit import CodedUnit
 from tests.bus.simulated_loop import run
@@ -40,6 +40,22 @@ def test_raw_content_comes_with_its_bits_and_both_whole_numbers() -> None:
     assert lines[0].split() == ["7", "0xfffe", "bits", "1111111111111110"]
     assert "ABCD -2" in lines[1]
     assert "ABCD 65534" in lines[2]
+
+
+def test_a_unit_of_a_map_is_asked_who_it_is() -> None:
+    async def main() -> list[str]:
+        unit = CodedUnit(1)
+        shown = tuple(unit.read(Function.HOLDING, 2, 2))
+        server = ModbusServer({1: unit, 2: CodedUnit(2)})
+        await server.listen("127.0.0.1", 5020)
+        identity = Identity(Function.HOLDING, 2, shown)
+        devices = [Device(name, "net", number, identity=identity) for number, name in ((1, "plc"), (2, "other"))]
+        return (await probe(SETTINGS, [1], devices=devices)).lines[-2:]
+
+    right, wrong = run(main())
+    assert right.startswith("unit plc shows its identity: ")
+    assert wrong.startswith("unit other shows ")
+    assert "but its `identity` in the map is" in wrong
 
 
 def test_a_silent_unit_and_an_answering_one_are_told_apart() -> None:

@@ -11,12 +11,13 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from igrow.edge.registers.codec import decode
 from igrow.edge.registers.loading import parse_register_map
 from igrow.edge.registers.model import Function
-from igrow.edge.virtual_plc.memory import AnswerWithExceptionError, DeviceMemory
+from igrow.edge.virtual_plc.memory import ILLEGAL_ADDRESS, AnswerWithExceptionError, DeviceMemory
 from igrow.edge.virtual_plc.modbus_server import ModbusServer
 from tests.patience import PATIENCE
 from tests.service.running_daemon import COMMAND, ROOT
@@ -67,8 +68,9 @@ SAFE = {"heating_setpoint": 18.0, "co2_setpoint": 400.0}
 class AttackedPlc(DeviceMemory):
     """Registers that a test looks at and changes; `refuses` answers requests to read or write with an exception."""
 
-    def __init__(self, text: str = MAP) -> None:
-        super().__init__(parse_register_map(text.format(host="127.0.0.1", port=502)), "plc")
+    def __init__(self, text: str = MAP, device: str = "plc") -> None:
+        super().__init__(parse_register_map(text.format(host="127.0.0.1", port=502)), device)
+        self.device = device
         self.lock = threading.RLock()
         self.received: list[tuple[float, str, float]] = []
         """When what was written to which point."""
@@ -90,7 +92,10 @@ class AttackedPlc(DeviceMemory):
         with self.lock:
             if code := self.refuses.get("write"):
                 raise AnswerWithExceptionError(code)
-            name = next(n for n, p in self.points.items() if (p.function, p.address) == (function, address))
+            place = function, address
+            name = next((name for name, point in self.points.items() if (point.function, point.address) == place), None)
+            if name is None:
+                raise AnswerWithExceptionError(ILLEGAL_ADDRESS)
             value = decode(self.points[name], tuple(values))
             assert value is not None
             self.before_write(name, value)
@@ -113,11 +118,21 @@ class AttackedPlc(DeviceMemory):
 class AttackedDaemon:
     """A daemon in a folder of its own, and the server of its PLC in a thread."""
 
-    def __init__(self, folder: Path, *, text: str = MAP, host: str = "127.0.0.1", extra: str = "") -> None:
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        text: str = MAP,
+        host: str = "127.0.0.1",
+        extra: str = "",
+        units: Mapping[int, str] = MappingProxyType({1: "plc"}),
+    ) -> None:
+        """`units` are the devices of the map by their numbers; the first is `plc`, and a test may move them."""
         self.folder, self.state = folder, folder / "state"
-        self.plc = AttackedPlc(text)
+        self.units = {number: AttackedPlc(text, device) for number, device in units.items()}
+        self.plc = next(iter(self.units.values()))
         self.loop = asyncio.new_event_loop()
-        self.server = ModbusServer({1: self.plc})
+        self.server = ModbusServer(self.units)
         self._thread = threading.Thread(target=self.loop.run_forever, daemon=True)
         self._thread.start()
         self.port = self.do(self.server.listen("127.0.0.1", 0))
