@@ -46,8 +46,8 @@ FORMS = {
 CHANGES: Mapping[str, tuple[float, tuple[str, ...]]] = {
     "cover_transmission": (0.7, ("transmissivity",)),
     "rail_exchange": (0.7, ("rail_pipe_heat_transfer",)),
-    "vent_area": (0.6, ("vent_wind", "vent_stack")),
-    "leakage": (3.0, ("leakage_still", "leakage_wind", "wind_infiltration")),
+    "vent_area": (0.6, ("ventilation", "vent_wind", "vent_stack")),
+    "leakage": (3.0, ("leakage", "leakage_still", "leakage_wind", "wind_infiltration")),
 }
 """A parameter of the plant, what it is over before, and what is right to say of it."""
 REACHABLE = 1.5

@@ -22,7 +22,7 @@ from benchmarks.jobs import Jobs
 from benchmarks.provenance import provenance
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import prepare_log
-from igrow.trainer.diagnosis import change, drift, history, linear, search, sharing
+from igrow.trainer.diagnosis import change, drift, history, linear, parameter_change, search, sharing
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.drift import Drift, Pair
 from igrow.trainer.diagnosis.freerun import log_days
@@ -91,7 +91,7 @@ def gains_under(log: NullLog, learned: Drift) -> dict[str, float]:
 
 def parameter_gains(log: NullLog) -> dict[str, float]:
     """Return the same of every parameter where all else changes by physics alone."""
-    return _gains(_under(log, Drift({}, BETWEEN)), search.score_parameters)
+    return _gains(parameter_change.joined(_under(log, Drift({}, BETWEEN))), parameter_change.score)
 
 
 def _gains(design: Design, score: Callable[..., list[search.Hypothesis]]) -> dict[str, float]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,13 +16,16 @@ from igrow.trainer.diagnosis.correction import (
     Corrected,
     corrected_model,
     is_proven_change,
+    may_give_way,
     same_in_all_regimes,
     stands,
+    with_parameter,
 )
 from igrow.trainer.diagnosis.estimate import Estimated, OnsetInterval
-from igrow.trainer.diagnosis.freerun import Stage
-from igrow.trainer.diagnosis.knowledge import ActiveTerm
+from igrow.trainer.diagnosis.freerun import FreeRuns, Stage
+from igrow.trainer.diagnosis.knowledge import ActiveTerm, knowledge_of
 from igrow.trainer.diagnosis.linear import Term
+from igrow.trainer.diagnosis.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.diagnosis.wording import discrepancy, finding
@@ -117,7 +122,7 @@ def test_the_corrected_model_keeps_correlations_adds_causes_and_remembers_where_
         discrepancy([Hypothesis(Pattern("heat", "rain", ("rain",)), Term(1), 50.0, 0.5, 4.0, 0.001)], DEFAULT),
     )
     errors = {"air_temperature": {"24_h": {"deployed": 2.0, "recalibrated": 1.0, "corrected": 0.5}}}
-    result = Corrected({"corrected": Stage(posterior, ())}, (), ())
+    result = Corrected({"corrected": Stage(posterior, ())}, ())
     corrected = corrected_model(model, result, found, errors, {}, (DAY, DAY + np.timedelta64(28, "D")), CROP)
     assert corrected.posterior.correlation[0, 1] == pytest.approx(0.5)
     assert [one.name for one in corrected.effects] == ["lamp_heat", "co2_valve_leak"]
@@ -128,3 +133,67 @@ def test_the_corrected_model_keeps_correlations_adds_causes_and_remembers_where_
     assert corrected.calibrated_on == model.site.name
     assert corrected.discrepancy == {}
     assert [(one.before, one.after) for one in corrected.errors] == [(2.0, 0.5)]
+
+
+def of(effect: str) -> Estimated:
+    hypothesis = Hypothesis(Candidate(effect, ()), Term(0), 40.0, 1.0, 5.0, 0.001)
+    return replace(cause(), hypothesis=hypothesis)
+
+
+def test_no_parameter_takes_the_place_of_a_cause_in_a_balance_whose_twin_it_may_be() -> None:
+    assert may_give_way([])
+    assert may_give_way([of("humidity_offset")])
+    assert not may_give_way([of("wind_infiltration")])
+    assert not may_give_way([of("humidity_offset"), of("wind_infiltration")])
+
+
+class DaysThatErr:
+    """Unseen days on which each model errs as told: by physics, with a parameter free, with a sensor's fault."""
+
+    def __init__(self, plain: float, freed: float, faulty: float) -> None:
+        self.errors = plain, freed, faulty
+
+    def fit(self, prior: Gaussian, _terms: Sequence[ActiveTerm]) -> Gaussian:
+        """Half of the light comes through the cover, where that may be."""
+        here = np.array([name == "transmissivity" for name in prior.names])
+        return prior.moved(prior.mean * (1.0 - 0.5 * here)) if self._is_free(prior) else prior
+
+    def run(self, stage: Stage) -> FreeRuns:
+        plain, freed, faulty = self.errors
+        error = faulty if stage.terms else freed if self._is_free(stage.posterior) else plain
+        return FreeRuns({}, {"air_humidity": np.full((96, 4), error)}, np.arange(4))
+
+    def _is_free(self, known: Gaussian) -> bool:
+        return known.deviations["transmissivity"] > 0.5 * known.values["transmissivity"]
+
+
+@pytest.mark.parametrize(
+    ("plain", "freed", "faulty", "kept", "named"),
+    [
+        (3.0, 1.0, 2.0, True, True),
+        (3.0, 1.0, 4.0, True, True),
+        (3.0, 2.0, 1.0, True, False),
+        (3.0, 2.0, 2.0, True, False),
+        (3.0, 3.0, 4.0, True, False),
+        (3.0, 2.0, 1.0, False, True),
+        (3.0, 3.0, 1.0, False, False),
+    ],
+)
+def test_a_parameter_takes_the_place_of_a_sensors_fault_where_unseen_days_ask_for_it(
+    plain: float, freed: float, faulty: float, kept: bool, named: bool
+) -> None:
+    model = model_in_force()
+    knowledge = knowledge_of(model, model.site, DEFAULT)
+    fault = replace(cause(), term=ActiveTerm("humidity_offset", -5.0, {}))
+    causes = (fault,) if kept else ()
+    stages = {name: Stage(knowledge.prior, ()) for name in ("deployed", "recalibrated")}
+    stages["corrected"] = Stage(knowledge.prior, tuple(one.term for one in causes))
+    change = ParameterChange("transmissivity", Estimate(-0.7, -0.8, -0.6, "1"), None, 0.001, ("transmissivity",), False)
+    days: Any = DaysThatErr(plain, freed, faulty)
+    rivals = [one.term for one in causes]
+    told = with_parameter(days, knowledge, Corrected(stages, causes), change, rivals, DEFAULT)
+    assert (told.parameter is not None) is named
+    if told.parameter is not None:
+        assert told.parameter.share.value == pytest.approx(-0.5)
+    assert told.kept == (() if named else causes)
+    assert told.stages["corrected"].terms == (() if named else stages["corrected"].terms)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +19,8 @@ from igrow.trainer.data import Log, prepare_log
 from igrow.trainer.diagnosis import DEFAULT, Diagnosis, Finding, amplitudes, diagnose, history
 from igrow.trainer.diagnosis.design import Design, History
 from igrow.trainer.diagnosis.drift import Drift
-from igrow.trainer.diagnosis.parameter_change import VISIBLE, find
+from igrow.trainer.diagnosis.parameter_change import find
+from igrow.trainer.diagnosis.visible_parameters import VISIBLE, members
 from igrow.trainer.fit import FittedModel
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.report import sentences
@@ -30,14 +32,14 @@ NAMES = ("transmissivity", "mass_heat_capacity", "leakage_wind")
 STEP, DAYS, KNOWN = 900.0, 44, 24
 
 
-def with_parameters(truth: Truth, seed: int, **null_gains: float) -> Design:
+def with_parameters(truth: Truth, seed: int, *, names: Sequence[str] = NAMES, **null_gains: float) -> Design:
     """A design of parameters of the simulator, one of which nobody can look at; columns are in a tenth of the value."""
     design = make_design(truth, seed=seed)
-    block = replace(design.block("parameter"), labels=NAMES)
-    values = np.array([PARAMETERS[name].value for name in NAMES])
+    block = replace(design.block("parameter"), labels=tuple(names))
+    values = np.array([PARAMETERS[name].value for name in names])
     design = replace(
         design,
-        prior=Gaussian(NAMES, values, np.diag((0.1 * values) ** 2)),
+        prior=Gaussian(tuple(names), values, np.diag((0.1 * values) ** 2)),
         blocks={**design.blocks, "parameter": block},
     )
     columns = list(block.columns)
@@ -66,6 +68,16 @@ def test_the_parameter_that_has_changed_is_named_with_its_size() -> None:
     assert abs(found.share.value + 0.3) < 0.03
 
 
+def test_parameters_that_one_thing_changes_together_are_named_as_one() -> None:
+    names = ("vent_stack", "vent_wind", "mass_heat_capacity")
+    found = find(with_parameters(Truth({}, {}, (-6.0, -6.0, 0.0)), 1, names=names), np.random.default_rng(0))
+    assert found is not None and found.leads
+    assert (found.parameter, found.confounded) == ("ventilation", ("ventilation",))
+    assert found.share.low < -0.6 < found.share.high
+    alone = find(with_parameters(Truth({}, {}, (-6.0, 0.0, 0.0)), 1, names=names), np.random.default_rng(0))
+    assert alone is not None and alone.parameter == "vent_stack"
+
+
 def test_nothing_is_named_where_nothing_has_changed() -> None:
     for seed in range(5):
         assert find(with_parameters(Truth({}, {}), 10 + seed), np.random.default_rng(0)) is None
@@ -92,7 +104,7 @@ def test_an_effect_that_explains_more_goes_before_a_parameter() -> None:
 def test_every_parameter_that_may_be_named_has_words_in_every_language() -> None:
     english = speak("en", SITE.time_zone)
     for name, visible in VISIBLE.items():
-        assert name in PARAMETERS and visible.balances
+        assert set(members(name)) <= set(PARAMETERS) and visible.balances
         assert sentences.title(name, english) == visible.title
         for code in ("nl", "de", "es", "zh"):
             assert sentences.title(name, speak(code, SITE.time_zone)) != visible.title
@@ -121,11 +133,11 @@ def model(log: tuple[Telemetry, Telemetry]) -> FittedModel:
 
 
 def later(log: tuple[Telemetry, Telemetry], begins: int) -> Log:
-    """The weeks after the calibration, the cover painted from a day on."""
-    plain, painted = log
-    first = plain.time[0] + np.timedelta64(KNOWN, "D")
+    """The weeks after the calibration, as they were until a day and as they are from it on."""
+    before, after = log
+    first = before.time[0] + np.timedelta64(KNOWN, "D")
     cut = first + np.timedelta64(begins, "D")
-    return prepare_log(concatenate([plain.select(first, cut), painted.select(start=cut)]), SITE)
+    return prepare_log(concatenate([before.select(first, cut), after.select(start=cut)]), SITE)
 
 
 def costs(told: Diagnosis, finding: Finding) -> None:

@@ -14,26 +14,30 @@ from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator.crop import CropStages
 from igrow.trainer.diagnosis import freerun
 from igrow.trainer.diagnosis.candidates import Pattern, pattern_fluxes
-from igrow.trainer.diagnosis.estimate import Estimated
+from igrow.trainer.diagnosis.estimate import Estimated, normal_quantile
 from igrow.trainer.diagnosis.freerun import LogDays, Stage
-from igrow.trainer.diagnosis.knowledge import Knowledge, drift, home_drift
+from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, home_drift
 from igrow.trainer.diagnosis.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.refit import REGIMES
 from igrow.trainer.diagnosis.result import Finding
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.diagnosis.visible_parameters import members
+from igrow.trainer.fit.climate import bounds
+from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.model import FittedModel
 from igrow.trainer.fit.solver import DivergenceError
+
+_AT_BOUND = 1e-3
+"""Share of its range within which a parameter lies on its bound."""
 
 
 @dataclass(frozen=True)
 class Corrected:
-    """The stages of a correction, and what became of each cause."""
+    """The stages of a correction, and the causes that stand."""
 
     stages: Mapping[str, Stage]
     kept: tuple[Estimated, ...]
-    estimates: tuple[Estimated, ...]
-    """All causes with their size and skill on unseen days, kept or not."""
     parameter: ParameterChange | None = None
     """One that has changed, where no effect is missing."""
 
@@ -58,7 +62,6 @@ def correct(
     """
     current = recalibrated = Stage(log.fit(knowledge.prior, knowledge.terms), knowledge.terms)
     kept: list[Estimated] = []
-    estimates: list[Estimated] = []
     for one in found:
         # Where the effect takes over what recalibration had put into the parameters, the fit starts there.
         begin = {name: value + one.shift.get(name, 0.0) for name, value in current.posterior.values.items()}
@@ -66,10 +69,8 @@ def correct(
         try:
             trial = Stage(log.fit(knowledge.prior, terms, begin), terms)
         except DivergenceError:
-            estimates.append(one)
             continue
         judged = _judged(log, one, current, trial)
-        estimates.append(judged)
         proven = stands if knowledge.history is None else is_proven_change
         if proven(judged, kept, rules):
             kept.append(judged)
@@ -81,7 +82,7 @@ def correct(
         "recalibrated": recalibrated,
         "corrected": current,
     }
-    return Corrected(stages, tuple(kept), tuple(estimates))
+    return Corrected(stages, tuple(kept))
 
 
 def stands(one: Estimated, kept: Sequence[Estimated], rules: DecisionRules) -> bool:
@@ -119,6 +120,14 @@ def _adds_to(one: Estimated, kept: Sequence[Estimated], rules: DecisionRules) ->
     return one.bootstrap_p <= rules.further_bootstrap_p and one.gain >= rules.further_gain_share * gained
 
 
+def may_give_way(kept: Sequence[Estimated]) -> bool:
+    """Tell whether a parameter may be told in the place of causes: of faults of sensors, or none.
+
+    A cause in a balance has twins among the parameters, which follow it nearly as well: it stays.
+    """
+    return all(EFFECTS[one.effect].kind == "sensor" for one in kept)
+
+
 def same_in_all_regimes(regimes: Mapping[str, Estimate], rules: DecisionRules) -> bool:
     """Tell whether a cause's size is about the same by day and by night, in calm and in wind, and so on.
 
@@ -138,29 +147,74 @@ def _judged(log: LogDays, one: Estimated, current: Stage, trial: Stage) -> Estim
 
 
 def with_parameter(
-    log: LogDays, knowledge: Knowledge, result: Corrected, parameter: ParameterChange, rules: DecisionRules
+    log: LogDays,
+    knowledge: Knowledge,
+    result: Corrected,
+    parameter: ParameterChange,
+    rivals: Sequence[ActiveTerm],
+    rules: DecisionRules,
 ) -> Corrected:
     """Return a correction with a parameter that has changed, where it alone makes unseen days better.
 
     Recalibration may have followed the change: it stays where freeing the parameter beside it adds nothing.
+
+    Args:
+        log: of the diagnosis.
+        knowledge: of the model in force.
+        result: so far; faults of sensors are all that may have been kept.
+        parameter: by the search.
+        rivals: faults of sensors that explain the log as well. They go where the parameter alone makes unseen days
+            clearly better than they do: the search is linear, and much of a large change looks to it like a sensor
+            that reads by a share too little.
+        rules: what must be shown.
     """
-    values, recalibrated = knowledge.posterior.values, result.stages["corrected"]
-    free = drift(values, 1.0, rules) * np.array([name == parameter.parameter for name in knowledge.prior.names])
-    by_physics = knowledge.posterior.widened(home_drift(values, rules))
+    known, recalibrated = knowledge.posterior, result.stages["recalibrated"]
+    changed = np.array([name in members(parameter.parameter) for name in known.names])
+    by_physics = known.widened(home_drift(known.values, rules))
+    faults = (*recalibrated.terms, *rivals)
     try:
-        without, alone, beside = (
-            Stage(log.fit(prior, recalibrated.terms), recalibrated.terms)
-            for prior in (by_physics, by_physics.widened(free), knowledge.prior.widened(free))
+        without, faulty, alone, beside = (
+            Stage(log.fit(prior, terms), terms)
+            for prior, terms in (
+                (by_physics, recalibrated.terms),
+                (by_physics, faults),
+                (by_physics.widened_along(known.mean * changed), recalibrated.terms),
+                (knowledge.prior.widened_along(known.mean * changed), recalibrated.terms),
+            )
         )
     except DivergenceError:
         return result
-    old, new, before, after = (log.run(one) for one in (without, alone, recalibrated, beside))
-    if old is None or new is None or before is None or after is None:
-        return replace(result, parameter=parameter)
-    if freerun.skill(old, new) < rules.least_skill:
+    old, rival, new, before, after = (log.run(one) for one in (without, faulty, alone, recalibrated, beside))
+    if old is None or rival is None or new is None or before is None or after is None:
+        return result if rivals else replace(result, parameter=parameter)
+    if min(freerun.skill(old, new), freerun.skill(rival, new)) < rules.least_skill:
+        return result
+    fitted = _sized(parameter, known, alone.posterior, rules)
+    if fitted is None:
         return result
     corrected = beside if freerun.skill(before, after) >= 0.0 else recalibrated
-    return replace(result, stages={**result.stages, "corrected": corrected}, parameter=parameter)
+    return replace(result, stages={**result.stages, "corrected": corrected}, kept=(), parameter=fitted)
+
+
+def _sized(change: ParameterChange, before: Gaussian, after: Gaussian, rules: DecisionRules) -> ParameterChange | None:
+    """Return a change with its size by a fit, the search being linear; None where it is too small or at a bound.
+
+    Args:
+        change: as the search saw it.
+        before: the parameters at the calibration.
+        after: fitted to the log, those that have changed free.
+        rules: the least change.
+    """
+    now, names = after.marginal(members(change.parameter)), members(change.parameter)
+    was, (low, high) = before.marginal(names).mean, bounds(names)
+    edge = _AT_BOUND * (high - low)
+    share = float(np.mean(now.mean / was - 1.0))
+    if np.any((now.mean <= low + edge) | (now.mean >= high - edge)) or abs(share) < rules.least_parameter_change:
+        return None
+    weights = 1.0 / (len(names) * was)
+    deviation = float(np.sqrt(weights @ now.covariance @ weights))
+    wide = max(normal_quantile(rules) * deviation, 0.5 * (change.share.high - change.share.low))
+    return replace(change, share=Estimate(share, share - wide, share + wide, change.share.unit))
 
 
 def _with_patterns(

@@ -10,9 +10,8 @@ diagnosed by themselves.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
-from functools import partial
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,13 +21,13 @@ from igrow.trainer.data.log import Log
 from igrow.trainer.diagnosis import history, wording
 from igrow.trainer.diagnosis.actuators import REPLACEABLE, Completed, complete
 from igrow.trainer.diagnosis.candidates import hidden_by_missing_weather
-from igrow.trainer.diagnosis.correction import Corrected, correct, corrected_model, with_parameter
+from igrow.trainer.diagnosis.correction import Corrected, correct, corrected_model, may_give_way, with_parameter
 from igrow.trainer.diagnosis.diagnosed_days import newest_weeks, since_calibration
 from igrow.trainer.diagnosis.drift import Drift
 from igrow.trainer.diagnosis.estimate import normal_quantile
 from igrow.trainer.diagnosis.evidence import Evidence
 from igrow.trainer.diagnosis.freerun import HORIZONS, FreeRuns, LogDays, Stage, log_days, mean_absolute_errors
-from igrow.trainer.diagnosis.knowledge import knowledge_of
+from igrow.trainer.diagnosis.knowledge import ActiveTerm, knowledge_of
 from igrow.trainer.diagnosis.nuisance import NuisanceSubspace
 from igrow.trainer.diagnosis.open_vents import under_open_vents
 from igrow.trainer.diagnosis.parameter_change import ParameterChange
@@ -36,6 +35,7 @@ from igrow.trainer.diagnosis.result import Diagnosis, Finding, Verdict
 from igrow.trainer.diagnosis.rounds import search_of
 from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules
 from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.diagnosis.visible_parameters import members
 from igrow.trainer.fit.growth import built_in_crop, growth_since
 from igrow.trainer.fit.model import FittedModel
 from igrow.trainer.given import MADE, READ, must_be
@@ -75,122 +75,152 @@ def diagnose(
     for name in without:
         if name not in EFFECTS:
             raise IgrowError(f"no effect is called {name!r}; there are {', '.join(EFFECTS)}")
-    site = log.known_site
     if log.faults:
         return _data_fault(log, model)
     log.require("a diagnosis", rules.least_days)
-    knowledge = knowledge_of(model, site, rules)
-    since, notes = since_calibration(log, model, rules)
-    log = newest_weeks(since, knowledge, rules)
-    progress("completing the log")
-    logged, rng = log_days(log, model), np.random.default_rng(seed)
-    completed = complete(log, logged, model, knowledge, rules)
-    days, opened = completed.days, under_open_vents(logged.record, rules)
-    off = opened is not None and opened.is_offset(rules)
-    hidden = frozenset(without) | (frozenset({"co2_drift"}) if off else frozenset())
-    search = search_of(days, site, knowledge, hidden, rules, nuisance, drift)
-    progress("searching for causes")
-    first, last, found = search.run(rng)
-    rivals = hidden_by_missing_weather(first.design.line)
-    found = [replace(one, confounded=(*one.confounded, *rivals)) for one in found]
-    # A parameter can stand in for an actuator that the log lacks, found or not.
-    lacking = not set(REPLACEABLE).isdisjoint(logged.record.missing)
-    parameter = None if lacking else search.changed_parameter(rng)
-    patterns = last.patterns
-    if parameter is not None and parameter.onset is not None:
-        if parameter.leads or not (found or patterns):
-            again = partial(
-                diagnose, model=model, without=without, seed=seed, rules=rules, nuisance=nuisance, drift=drift,
-                progress=progress,
-            )  # fmt: skip
-            told = _since(parameter, log.select(parameter.onset.time), again, rules)
-            if told is not None:
-                return replace(told, notes=tuple(dict.fromkeys((*notes, *told.notes))))
-        # What the days since then alone do not bear out, or are too few to, is left to a later log.
-        parameter = None
-    if parameter is not None and parameter.leads:
-        found, patterns = [], ()
-    progress("correcting the model")
-    result = correct(days, knowledge, found, patterns, site.longitude, rules)
-    if parameter is not None and not (result.kept or patterns):
-        result = with_parameter(days, knowledge, result, parameter, rules)
-    verdict, findings = _verdict(completed, result, patterns, rules)
-    stages = _stages(result, completed, logged)
-    progress("predicting unseen days")
-    runs = _runs(stages)
-    errors = _errors(runs)
-    start, end = log.telemetry.time[0], log.telemetry.time[-1]
-    moved = model.posterior.values, result.stages["corrected"].posterior.values
-    crop = growth_since(log, days.record, moved, model.crop or built_in_crop())
-    corrected = corrected_model(model, result, findings, errors, knowledge.discrepancy, (start, end), crop)
-    notes = (
-        *notes,
-        *((wording.NOT_CALIBRATED,) if knowledge.transferred else ()),
-        *((wording.NEWEST,) if log is not since else ()),
-        *wording.thin_air(site),
-        *((opened.sentence,) if opened is not None and off else ()),
-    )
-    possible = {name for one in findings for name in one.confounded}
-    return Diagnosis(
-        site=site.name,
-        verdict=verdict,
-        start=start,
-        end=end,
-        fit_days=int(days.split.fit.sum()),
-        held_out_days=int((~days.split.fit).sum()),
-        findings=findings,
-        errors=errors,
-        screened=log.screened,
-        model=model,
-        corrected=remembering(corrected, result.parameter, rules),
-        # What a cause may as well be is told already.
-        untestable=tuple(name for name in first.design.untestable if name not in possible),
-        missing=logged.record.missing,
-        notes=notes,
-        evidence=Evidence(
-            days, knowledge, first, result.estimates, {name: stage for name, (stage, _) in stages.items()}, runs["24_h"]
-        ),
-        log=log,
-    )
+    return _Question(model, frozenset(without), seed, rules, nuisance, drift, progress).answer(log)
 
 
-def _since(
-    change: ParameterChange, later: Log, again: Callable[[Log], Diagnosis], rules: DecisionRules
-) -> Diagnosis | None:
-    """Return the diagnosis of the days since a parameter has changed; None where these alone do not bear it out.
+@dataclass(frozen=True)
+class _Question:
+    """What is asked of a log, and of the days since something began in it; fields as the arguments of `diagnose`."""
 
-    One set of parameters is none for a log of two greenhouses: the one that is there now counts.
+    model: FittedModel
+    without: frozenset[str]
+    seed: int
+    rules: DecisionRules
+    nuisance: NuisanceSubspace | None
+    drift: Drift | None
+    progress: Progress
 
-    Args:
-        change: with its beginning, by the whole log.
-        later: the days since.
-        again: the diagnosis of them.
-        rules: how many they must be.
-    """
-    if later.days < rules.least_days:
-        return None
-    told = again(later)
-    return begun(told, change) if any(one.effect == change.parameter for one in told.findings) else None
+    def answer(self, log: Log, asked: ParameterChange | None = None, rivals: Sequence[ActiveTerm] = ()) -> Diagnosis:
+        """Return the diagnosis of a log.
+
+        Args:
+            log: of a week or more.
+            asked: what a longer log tells to have changed before this one, where this one alone tells nothing.
+            rivals: faults of sensors that explain it there as well.
+        """
+        model, rules, progress, site = self.model, self.rules, self.progress, log.known_site
+        knowledge = knowledge_of(model, site, rules)
+        since, notes = since_calibration(log, model, rules)
+        log = newest_weeks(since, knowledge, rules)
+        progress("completing the log")
+        logged, rng = log_days(log, model), np.random.default_rng(self.seed)
+        completed = complete(log, logged, model, knowledge, rules)
+        days, opened = completed.days, under_open_vents(logged.record, rules)
+        off = opened is not None and opened.is_offset(rules)
+        hidden = self.without | (frozenset({"co2_drift"}) if off else frozenset())
+        search = search_of(days, site, knowledge, hidden, rules, self.nuisance, self.drift)
+        progress("searching for causes")
+        first, last, found = search.run(rng)
+        unseen = hidden_by_missing_weather(first.design.line)
+        found = [replace(one, confounded=(*one.confounded, *unseen)) for one in found]
+        # A parameter can stand in for an actuator that the log lacks, found or not.
+        lacking = not set(REPLACEABLE).isdisjoint(logged.record.missing)
+        parameter = None if lacking else search.changed_parameter(rng) or asked
+        if parameter is not None and parameter.leads and parameter.onset is not None:
+            if (told := self._since(parameter, parameter.onset.time, log, notes)) is not None:
+                return told
+            # What the days since then alone do not bear out, or are too few to, is left to a later log.
+            parameter = None
+        leads = parameter is not None and parameter.leads
+        progress("correcting the model")
+        found, patterns = ([], ()) if leads else (found, last.patterns)
+        result = correct(days, knowledge, found, patterns, site.longitude, rules)
+        if parameter is not None and not patterns and may_give_way(result.kept):
+            faults = [one.term for one in result.kept] or rivals
+            if parameter.onset is None:
+                result = with_parameter(days, knowledge, result, parameter, faults, rules)
+            elif (told := self._since(parameter, parameter.onset.time, log, notes, faults)) is not None:
+                return told
+        verdict, findings = _verdict(completed, result, patterns, rules)
+        stages = _stages(result, completed, logged)
+        progress("predicting unseen days")
+        runs = _runs(stages)
+        errors = _errors(runs)
+        start, end = log.telemetry.time[0], log.telemetry.time[-1]
+        moved = model.posterior.values, result.stages["corrected"].posterior.values
+        crop = growth_since(log, days.record, moved, model.crop or built_in_crop())
+        corrected = corrected_model(model, result, findings, errors, knowledge.discrepancy, (start, end), crop)
+        notes = (
+            *notes,
+            *((wording.NOT_CALIBRATED,) if knowledge.transferred else ()),
+            *((wording.NEWEST,) if log is not since else ()),
+            *wording.thin_air(site),
+            *((opened.sentence,) if opened is not None and off else ()),
+        )
+        possible = {name for one in findings for name in one.confounded}
+        return Diagnosis(
+            site=site.name,
+            verdict=verdict,
+            start=start,
+            end=end,
+            fit_days=int(days.split.fit.sum()),
+            held_out_days=int((~days.split.fit).sum()),
+            findings=findings,
+            errors=errors,
+            screened=log.screened,
+            model=model,
+            corrected=remembering(corrected, result.parameter, rules),
+            # What a cause may as well be is told already.
+            untestable=tuple(name for name in first.design.untestable if name not in possible),
+            missing=logged.record.missing,
+            notes=notes,
+            evidence=Evidence(
+                days, knowledge, first, {name: stage for name, (stage, _) in stages.items()}, runs["24_h"]
+            ),
+            log=log,
+        )
+
+    def _since(
+        self,
+        change: ParameterChange,
+        begin: np.datetime64,
+        log: Log,
+        notes: Sequence[str],
+        rivals: Sequence[ActiveTerm] = (),
+    ) -> Diagnosis | None:
+        """Return the diagnosis of the days since a parameter has changed; None where these alone do not bear it out.
+
+        One set of parameters is none for a log of two greenhouses: the one that is there now counts.
+
+        Args:
+            change: by the whole log.
+            begin: of it.
+            log: whole.
+            notes: of the whole log, which stay.
+            rivals: faults of sensors that the whole log tells as well: these days tell which of both it is.
+        """
+        later = log.select(begin)
+        if later.days < self.rules.least_days:
+            return None
+        always = [replace(one, onset=None) for one in rivals]
+        told = self.answer(later, replace(change, onset=None, leads=False) if rivals else None, always)
+        findings = tuple(begun(one, change) if is_same(one, change) else one for one in told.findings)
+        if findings == told.findings:
+            return None
+        return replace(told, findings=findings, notes=tuple(dict.fromkeys((*notes, *told.notes, wording.SINCE))))
 
 
-def begun(later: Diagnosis, change: ParameterChange) -> Diagnosis:
-    """Return the diagnosis of the days since a parameter has changed, with the beginning that the whole log tells."""
-    findings = tuple(
-        wording.parameter(replace(change, share=one.parameters["change"], confounded=one.confounded))
-        if one.effect == change.parameter
-        else one
-        for one in later.findings
-    )
-    return replace(later, findings=findings, notes=(*later.notes, wording.SINCE))
+def is_same(later: Finding, change: ParameterChange) -> bool:
+    """Tell whether the days since a parameter has changed tell it, or one that explains as much."""
+    return later.kind == "parameter" and (later.effect in change.confounded or change.parameter in later.confounded)
+
+
+def begun(later: Finding, change: ParameterChange) -> Finding:
+    """Return what the days since a change tell, with the beginning that the whole log tells."""
+    share = later.parameters["change"]
+    return wording.parameter(replace(change, parameter=later.effect, share=share, confounded=later.confounded))
 
 
 def remembering(model: FittedModel, change: ParameterChange | None, rules: DecisionRules) -> FittedModel:
     """Return a model whose history knows that a parameter has changed, so that it is no news in the next log."""
     if change is None or model.history is None:
         return model
-    value, share = model.history.parameters[change.parameter], change.share
-    deviation = 0.5 * (share.high - share.low) / normal_quantile(rules) * abs(value)
-    return replace(model, history=history.followed(model.history, change.parameter, share.value * value, deviation))
+    share = change.share
+    deviation = 0.5 * (share.high - share.low) / normal_quantile(rules)
+    return replace(model, history=history.followed(model.history, members(change.parameter), share.value, deviation))
 
 
 def _verdict(

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from igrow.core.arrays import Floats
 from igrow.trainer.diagnosis.compare import Round
-from igrow.trainer.diagnosis.estimate import Estimated
 from igrow.trainer.diagnosis.freerun import FreeRuns, LogDays, Stage, mean_absolute_errors
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge
 
@@ -21,8 +20,6 @@ class Evidence:
     """Of the greenhouse before this log."""
     first: Round
     """What the search found first."""
-    estimates: tuple[Estimated, ...]
-    """Every cause with its size and skill on unseen days, kept or not."""
     stages: Mapping[str, Stage]
     runs: Mapping[str, FreeRuns]
     """24 h free runs on held-out days by stage."""

@@ -205,17 +205,18 @@ def drifted(known: Discrepancy, plain: Design, learned: Drift) -> Gaussian:
     return Gaussian(wanted, np.zeros(len(wanted)), covariance).widened(change_of(known, plain, learned))
 
 
-def followed(known: Discrepancy, parameter: str, change: float, deviation: float) -> Discrepancy:
-    """Return a history in which a parameter has changed: what is expected of the greenhouse from then on.
+def followed(known: Discrepancy, parameters: Collection[str], share: float, deviation: float) -> Discrepancy:
+    """Return a history in which parameters have changed: what is expected of the greenhouse from then on.
 
     Args:
         known: so far.
-        parameter: by name.
-        change: in its unit.
+        parameters: by name, changed by the same share.
+        share: of their values at the calibration.
         deviation: standard deviation of it.
     """
-    here = np.array([name == PARAMETER_PREFIX + parameter for name in known.amplitudes.names])
-    moved = known.amplitudes.moved(known.amplitudes.mean + change * here).widened(deviation * here)
+    values = {PARAMETER_PREFIX + name: known.parameters[name] for name in parameters}
+    here = np.array([values.get(name, 0.0) for name in known.amplitudes.names])
+    moved = known.amplitudes.moved(known.amplitudes.mean + share * here).widened(deviation * np.abs(here))
     return replace(known, amplitudes=moved)
 
 

@@ -8,62 +8,19 @@ expect, and must gain more than it did in any greenhouse in which nothing had ch
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from igrow.core.bundle import Estimate
-from igrow.core.language import N_
 from igrow.trainer.diagnosis import change, linear, search
-from igrow.trainer.diagnosis.design import Design
+from igrow.trainer.diagnosis.design import Block, Design
 from igrow.trainer.diagnosis.estimate import OnsetInterval, onset_interval, reach
+from igrow.trainer.diagnosis.linear import Fit
 from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.diagnosis.visible_parameters import TOGETHER, VISIBLE, members
 from igrow.trainer.fit.climate import bounds
-
-_COVER = N_("compare the light above the cover and below it; look for dirt, shading paint and wet glass")
-_GAPS = N_("look for open panes, doors, gaps and vents that do not close, and compare a calm night with a windy one")
-_SCREEN = N_("close the screen by day and look for gaps, tears and light at its edges")
-_PIPES = N_("feel the pipes along their length; check pump, valve and air in the pipes")
-_LAMPS = N_("count the lamps that burn, and compare their power and their light with those of the weeks before")
-_VENTS = N_("look whether the vents open as far as the climate computer says")
-_DOSING = N_("check the dosing lines and what the CO2 meter counts")
-_CROP = N_("look at the crop: leaf area, water, pests and disease")
-
-
-@dataclass(frozen=True)
-class Visible:
-    """A parameter that a grower can look at."""
-
-    title: str
-    balances: tuple[str, ...]
-    """That it moves."""
-    check: str
-    """What to look at."""
-
-
-_AIR = ("heat", "vapour", "co2")
-VISIBLE: Mapping[str, Visible] = {
-    "transmissivity": Visible(N_("light through the cover"), ("light", "heat"), _COVER),
-    "cover_heat_transfer": Visible(N_("heat that the cover loses"), ("heat",), _GAPS),
-    "leakage_still": Visible(N_("air that leaks in calm weather"), _AIR, _GAPS),
-    "leakage_wind": Visible(N_("air that leaks in with the wind"), _AIR, _GAPS),
-    "energy_screen_saving": Visible(N_("heat that the energy screen saves"), ("heat",), _SCREEN),
-    "blackout_screen_saving": Visible(N_("heat that the blackout screen saves"), ("heat",), _SCREEN),
-    "rail_pipe_heat_transfer": Visible(N_("heat that the rail pipes give off"), ("heat",), _PIPES),
-    "grow_pipe_heat_transfer": Visible(N_("heat that the grow pipes give off"), ("heat",), _PIPES),
-    "lamp_heat_share": Visible(N_("heat of the lamps"), ("heat",), _LAMPS),
-    "lamp_radiation_share": Visible(N_("light of the lamps"), ("light", "heat"), _LAMPS),
-    "vent_wind": Visible(N_("air through the vents in the wind"), _AIR, _VENTS),
-    "vent_stack": Visible(N_("air through the vents in calm weather"), _AIR, _VENTS),
-    "dosing_share": Visible(N_("CO2 that arrives of what is dosed"), ("co2",), _DOSING),
-    "assimilation_maximum": Visible(N_("CO2 that the crop takes up in strong light"), ("co2",), _CROP),
-    "assimilation_light": Visible(N_("CO2 that the crop takes up in weak light"), ("co2",), _CROP),
-    "respiration": Visible(N_("CO2 that crop and soil give off"), ("co2",), _CROP),
-    "transpiration_radiation": Visible(N_("water that the crop transpires in the sun"), ("vapour", "heat"), _CROP),
-    "transpiration_deficit": Visible(N_("water that the crop transpires in dry air"), ("vapour", "heat"), _CROP),
-}
-"""By parameter. The others (masses, shares of the model's own) have no name in a greenhouse."""
 
 
 @dataclass(frozen=True)
@@ -82,34 +39,41 @@ class ParameterChange:
 
 
 def find(design: Design, rng: np.random.Generator) -> ParameterChange | None:
-    """Return the parameter that has changed; None where none stands out, or one that nobody can look at.
+    """Return the parameter that has changed; None where none stands out, or clearly one that nobody can look at.
 
     Args:
         design: of the log, in a greenhouse that changes by physics alone.
         rng: for the flips.
     """
-    rules, null = design.rules, linear.fit(design.grams, design.null_model())
-    scored = search.score_parameters(design, null, search.onset_days(design), rng)
+    rules, design = design.rules, joined(design)
+    null, onsets = linear.fit(design.grams, design.null_model()), search.onset_days(design)
+    scored = score(design, null, onsets, rng)
     net = {one.parameter: change.proven_gain(design, one) - _needed_gain(design, one) for one in scored}
-    best = max(scored, key=lambda one: net[one.parameter], default=None)
-    if best is None or net[best.parameter] < 0.0 or best.parameter not in VISIBLE:
+    visible = (one for one in scored if one.parameter in VISIBLE)
+    best = max(visible, key=lambda one: net[one.parameter], default=None)
+    if best is None or net[best.parameter] < 0.0:
+        return None
+    margin = max(rules.confounded_gain, rules.confounded_share * best.gain)
+    if max(net.values()) > net[best.parameter] + margin:
+        # One that nobody can look at explains it clearly better.
         return None
     named = linear.fit(design.grams, null.model.with_term(best.term))
-    value = design.prior.values[best.parameter]
+    value, low, high = _range(design, best.parameter)
     wide = reach(rules) * linear.deviation_by_day(design.grams, named)
     size = float(named.amplitudes[0])
-    low, high = (float(one[0]) for one in bounds([best.parameter]))
-    if abs(size) < rules.least_parameter_change * abs(value) or not low < value + size < high:
+    beyond = rules.beyond_bound
+    if abs(size) < rules.least_parameter_change * value or not beyond * (low - value) < size < beyond * (high - value):
         # What asks for more than there can be is something else.
         return None
     least, most = sorted(((size - wide) / value, (size + wide) / value))
-    effects = search.score_candidates(design, null, search.onset_days(design), rng)
+    effects = search.score_candidates(design, null, onsets, rng)
     largest = max((change.net_gain(design, one) for one in effects), default=0.0)
-    margin = max(rules.confounded_gain, rules.confounded_share * best.gain)
     as_good = [
         one.parameter
         for one in scored
-        if one is not best and one.parameter in VISIBLE and net[one.parameter] >= max(0.0, net[best.parameter] - margin)
+        if one.parameter in VISIBLE
+        and not set(members(one.parameter)) & set(members(best.parameter))
+        and net[one.parameter] >= max(0.0, net[best.parameter] - margin)
     ]
     return ParameterChange(
         best.parameter,
@@ -119,6 +83,54 @@ def find(design: Design, rng: np.random.Generator) -> ParameterChange | None:
         (best.parameter, *as_good),
         best.gain >= rules.parameter_over_effect * largest,
     )
+
+
+def joined(design: Design) -> Design:
+    """Return a design with a further block, `together`: of parameters that change by the same share, by that share."""
+    block, products = design.block("parameter"), design.grams.products
+    values, size = design.prior.values, products.shape[1]
+    names = [name for name in TOGETHER if all(values.get(one) for one in members(name))]
+    weights = np.array([[values[one] * (one in members(name)) for one in block.labels] for name in names])
+    weights = weights.reshape(len(names), len(block))
+    crossed = np.einsum("dqp,gp->dqg", products[:, :, block.columns], weights)
+    own = np.einsum("gp,dph->dgh", weights, crossed[:, block.columns, :])
+    together = Block(tuple(names), range(size, size + len(names)), np.zeros(len(names)), None)
+    return replace(
+        design,
+        blocks={**design.blocks, "together": together},
+        values=np.concatenate([design.values, np.tensordot(weights, design.values[block.columns], axes=1)]),
+        grams=replace(design.grams, products=np.block([[products, crossed], [crossed.transpose(0, 2, 1), own]])),
+    )
+
+
+def score(design: Design, current: Fit, onsets: Sequence[int | None], rng: np.random.Generator) -> list[Hypothesis]:
+    """Return every parameter, and those that change together, as a hypothesis within its bounds, the likeliest first.
+
+    Args:
+        design: of `joined`.
+        current: the fit so far.
+        onsets: days of beginning that are tried; None is always.
+        rng: for the flips.
+    """
+    blocks = [design.block(name) for name in ("parameter", "together")]
+    labels = [name for block in blocks for name in block.labels]
+    columns = [column for block in blocks for column in block.columns]
+    reaches = np.array([_range(design, name) for name in labels])
+    none: list[int | None] = [None] * len(labels)
+    limits = reaches[:, 1:] - reaches[:, :1]
+    scanned = search.scan(design.grams, current, columns, none, onsets, limits, rng, design.rules.flips)
+    return search.best_of_each(scanned, labels, none, labels, design.onset_price)
+
+
+def _range(design: Design, name: str) -> tuple[float, float, float]:
+    """Return the value of a parameter and its bounds; of those that change together in shares of what they are."""
+    values, names = design.prior.values, members(name)
+    low, high = bounds(names)
+    if name not in TOGETHER:
+        return values[name], float(low[0]), float(high[0])
+    now = np.array([values[one] for one in names])
+    ends = np.sort(np.stack([low / now, high / now]), axis=0)
+    return 1.0, float(ends[0].max()), float(ends[1].min())
 
 
 def _needed_gain(design: Design, one: Hypothesis) -> float:

@@ -19,7 +19,6 @@ from igrow.trainer.diagnosis.candidates import Candidate, Pattern
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX
 from igrow.trainer.diagnosis.linear import RESIDUAL, DailyGrams, Fit, Term
-from igrow.trainer.fit.climate import bounds as physical_bounds
 
 _EXPLAINED = 1e-6
 """Share of a column's curvature below which the null explains it altogether."""
@@ -204,7 +203,9 @@ def score_candidates(
     bounds = np.array([[known[one.effect, onset] for one in design.candidates] for onset in onsets])
     columns, rules = design.block("effect").columns, design.rules
     scanned = scan(design.grams, current, columns, ageing, onsets, bounds, rng, rules.flips)
-    return _best(scanned, design.candidates, ageing, [one.effect for one in design.candidates], design.onset_price)
+    return best_of_each(
+        scanned, design.candidates, ageing, [one.effect for one in design.candidates], design.onset_price
+    )
 
 
 def middle_of_best(gains: Floats) -> int:
@@ -224,22 +225,10 @@ def score_patterns(
     bounds = np.tile([-_UNBOUNDED, _UNBOUNDED], (count, 1))
     none: list[int | None] = [None] * count
     scanned = scan(design.grams, current, design.block("pattern").columns, none, onsets, bounds, rng, rules.flips)
-    return _best(scanned, design.patterns, none, list(range(count)), design.onset_price)
+    return best_of_each(scanned, design.patterns, none, list(range(count)), design.onset_price)
 
 
-def score_parameters(
-    design: Design, current: Fit, onsets: Sequence[int | None], rng: np.random.Generator
-) -> list[Hypothesis]:
-    """Return every parameter as a hypothesis, free within its bounds, the likeliest first."""
-    block = design.block("parameter")
-    values = np.array([design.prior.values[name] for name in block.labels])
-    bounds = np.stack(physical_bounds(block.labels), axis=1) - values[:, None]
-    none: list[int | None] = [None] * len(block)
-    scanned = scan(design.grams, current, block.columns, none, onsets, bounds, rng, design.rules.flips)
-    return _best(scanned, block.labels, none, list(block.labels), design.onset_price)
-
-
-def _best(
+def best_of_each(
     scanned: Scan,
     causes: Sequence[Candidate] | Sequence[Pattern] | Sequence[str],
     ageing: Sequence[int | None],

@@ -14,10 +14,11 @@ from igrow.core.site import Site
 from igrow.trainer.diagnosis.actuators import Replaced
 from igrow.trainer.diagnosis.candidates import UNIT_FLUX, Pattern
 from igrow.trainer.diagnosis.estimate import Estimated, OnsetInterval, normal_quantile
-from igrow.trainer.diagnosis.parameter_change import VISIBLE, ParameterChange
+from igrow.trainer.diagnosis.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.result import DISCREPANCY, Finding, plain
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.diagnosis.visible_parameters import VISIBLE
 
 NOT_CALIBRATED = N_(
     "What the model misses of this greenhouse when all is well is not known, so only large causes can be told from a "

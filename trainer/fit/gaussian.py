@@ -82,6 +82,10 @@ class Gaussian:
         change = np.broadcast_to(np.asarray(deviation, dtype=np.float64), self.mean.shape)
         return Gaussian(self.names, self.mean, self.covariance + np.diag(change**2))
 
+    def widened_along(self, direction: Floats) -> Gaussian:
+        """Return the distribution after one change of all parameters together, of standard deviations (p,)."""
+        return Gaussian(self.names, self.mean, self.covariance + np.outer(direction, direction))
+
     def sample(self, generator: np.random.Generator, count: int, low: Floats, high: Floats) -> dict[str, Floats]:
         """Return `count` draws by name, (count, 1) each, held within bounds `low` and `high`, (p,)."""
         drawn = generator.multivariate_normal(self.mean, self.covariance, size=count, method="eigh")

@@ -20,8 +20,8 @@ from igrow.core.simulator.hybrid.record import Record, observe
 from igrow.core.site import Site
 from igrow.trainer.diagnosis.freerun import Stage
 from igrow.trainer.diagnosis.knowledge import activate
-from igrow.trainer.diagnosis.parameter_change import VISIBLE
 from igrow.trainer.diagnosis.result import DISCREPANCY, Diagnosis, Finding
+from igrow.trainer.diagnosis.visible_parameters import VISIBLE, members
 
 _WEEK = 604_800.0
 _PAID: Mapping[str, str] = {"heating_valve_leak": "heat", "co2_valve_leak": "co2"}
@@ -92,7 +92,8 @@ def _without(stage: Stage, finding: Finding) -> Stage | None:
         return replace(stage, terms=tuple(term for term in stage.terms if term.effect != finding.effect))
     if finding.kind != "parameter" or finding.effect in OF_THE_CROP:
         return None
-    posterior, here = stage.posterior, np.array([name == finding.effect for name in stage.posterior.names])
+    posterior, changed = stage.posterior, members(finding.effect)
+    here = np.array([name in changed for name in posterior.names])
     before = posterior.mean / (1.0 + here * finding.parameters["change"].value)
     return replace(stage, posterior=posterior.moved(before))
 
