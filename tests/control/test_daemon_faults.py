@@ -296,7 +296,7 @@ async def test_a_planner_that_hangs_delays_no_cycle_and_the_recipe_rules(tmp_pat
         )
         # A day of log is asked for before a first plan; this test has no day.
         monkeypatch.setattr("igrow.edge.planning_schedule.LEAST_HISTORY", 0.0)
-        plan_at_once(daemon, planner, tmp_path)
+        await plan_at_once(daemon, planner, tmp_path)
         await until(lambda: planner.busy)
         cycles = daemon.cycles
         await until(lambda: daemon.cycles >= cycles + 3)
@@ -361,7 +361,7 @@ async def test_a_reload_while_a_plan_is_made_holds_nothing_up_and_the_next_plan_
     async with running(path) as daemon:
         await until(lambda: daemon.cycles >= 2)
         planner = SlowPlanner(daemon.configuration.site)
-        plan_at_once(daemon, planner, tmp_path)
+        await plan_at_once(daemon, planner, tmp_path)
         await until(lambda: planner.busy)
         site = tmp_path / "site.yaml"
         site.write_text(site.read_text().replace("high: 1000", "high: 900"))

@@ -106,7 +106,7 @@ async def test_a_forecast_on_a_share_that_hangs(bench: Bench, monkeypatch: pytes
         planner = PlanningProcess(
             daemon.configuration.site, daemon.services.graphs, planner=f"{FUNCTIONS}:wait_for_the_forecast"
         )
-        plan_at_once(daemon, planner, bench.folder)
+        await plan_at_once(daemon, planner, bench.folder)
         await until(lambda: planner.busy, PATIENCE)
         await bench.controls()
         await bench.goes_on()
@@ -121,7 +121,7 @@ async def test_a_planning_process_that_was_stopped(bench: Bench, monkeypatch: py
         assert graphs.pid is not None
         os.kill(graphs.pid, signal.SIGSTOP)
         planner = PlanningProcess(daemon.configuration.site, graphs, planner=f"{FUNCTIONS}:nothing")
-        plan_at_once(daemon, planner, bench.folder)
+        await plan_at_once(daemon, planner, bench.folder)
         await until(lambda: planner.busy, PATIENCE)
         await bench.controls()
         await bench.goes_on()

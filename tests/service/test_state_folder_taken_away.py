@@ -98,7 +98,7 @@ def test_a_folder_that_became_a_file_holds_nothing_and_all_is_kept_once_it_is_on
     store.unlink()
     attacked.signal(signal.SIGHUP)
     attacked.until(lambda: attacked.log().count("written anew") == 2)
-    assert events(attacked).count("reloaded") == 2
+    attacked.until(lambda: events(attacked).count("reloaded") == 2)
     assert "started" in events(attacked)
 
 
