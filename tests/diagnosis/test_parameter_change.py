@@ -199,6 +199,21 @@ def test_a_cover_that_is_painted_within_the_log_has_a_date(
     assert finding.parameters["change"].low < -0.33 < finding.parameters["change"].high
 
 
+def test_leaves_that_wilt_within_the_log_have_a_date_and_are_no_sensor(
+    log: tuple[Telemetry, Telemetry], model: FittedModel
+) -> None:
+    plain, values = log[0], nominal(SITE)
+    wilted = values | {name: 0.4 * values[name] for name in members("transpiration")}
+    after = virtual_log(DAYS, seed=5, step=STEP, added=disturbances(DAYS, STEP, seed=5), parameters=wilted)
+    told = diagnose(later((plain, after), 9), model)
+    (finding,) = told.findings
+    assert finding.effect == "transpiration" and finding.onset is not None
+    assert abs(finding.onset.time - plain.time[0] - np.timedelta64(KNOWN + 9, "D")) <= np.timedelta64(2, "D")
+    assert finding.parameters["change"].low < -0.6 < finding.parameters["change"].high
+    assert "transpires" in finding.sentence
+    assert worth(told, finding) is None
+
+
 def test_a_cover_that_was_painted_some_days_ago_waits_for_a_later_log(
     log: tuple[Telemetry, Telemetry], model: FittedModel
 ) -> None:

@@ -195,8 +195,9 @@ class _Question:
         later = log.select(begin)
         if later.days < self.rules.least_days:
             return None
-        always = [replace(one, onset=None) for one in rivals]
-        told = self.answer(later, replace(change, onset=None, leads=False) if rivals else None, always)
+        # A sensor that drifts has drifted since the whole log began.
+        rivals = [one if one.onset is not None else replace(one, onset=log.telemetry.time[0]) for one in rivals]
+        told = self.answer(later, replace(change, onset=None, leads=False) if rivals else None, rivals)
         findings = tuple(begun(one, change) if is_same(one, change) else one for one in told.findings)
         if findings == told.findings:
             return None
