@@ -15,6 +15,7 @@ from igrow.core.simulator.hybrid import record as records
 from igrow.core.simulator.hybrid.nominal import nominal, site_record
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
+from tests.made_once import made_once
 
 SITE = Site(name="virtual", latitude=52.0, longitude=4.5)
 START = np.datetime64("2020-02-01T00:00:00", "s")
@@ -65,6 +66,7 @@ def disturbances(days: int, step: float, seed: int, size: float = 1.0) -> dict[s
     }
 
 
+@made_once
 def virtual_log(
     days: int,
     *,

@@ -12,6 +12,7 @@ from scipy.signal import lfilter
 from igrow.core.simulator.hybrid.nominal import nominal
 from igrow.trainer.data import Log, prepare_log
 from igrow.trainer.fit import FittedModel, Gaussian
+from tests.made_once import made_once
 from tests.virtual_log import SITE, virtual_log, weather
 
 Floats = NDArray[np.float64]
@@ -31,6 +32,7 @@ def disturbances(days: int, step: float, seed: int) -> dict[str, Floats]:
     }
 
 
+@made_once
 def greenhouse_log(
     seed: int,
     added: Mapping[str, Floats] | None = None,

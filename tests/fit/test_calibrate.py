@@ -18,6 +18,7 @@ from igrow.trainer import calibrate, calibration, export, prepare_log, read_mode
 from igrow.trainer.cli import main
 from igrow.trainer.fit import FittedModel
 from igrow.trainer.fit.model import training_envelope, united
+from tests.made_once import made_once
 from tests.virtual_log import SITE, disturbances, virtual_log
 
 DAYS, STEP = 30, 900.0
@@ -43,6 +44,7 @@ def telemetry() -> Telemetry:
 
 
 @pytest.fixture(scope="module")
+@made_once
 def model(telemetry: Telemetry) -> FittedModel:
     return calibrate(prepare_log(telemetry, SITE))
 
@@ -53,6 +55,7 @@ def short() -> Telemetry:
 
 
 @pytest.fixture(scope="module")
+@made_once
 def clean(short: Telemetry) -> FittedModel:
     return calibrate(prepare_log(short, SITE))
 

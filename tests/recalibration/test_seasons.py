@@ -17,12 +17,13 @@ from igrow.core.planner.season import SeasonPlan
 from igrow.core.site import Crop, Site
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.exporting import read_model
+from igrow.trainer.fit import FittedModel
 from igrow.trainer.season import plan_season
 from igrow.trainer.service import recalibration, seasons
 from igrow.trainer.service.archive import Archive
 from igrow.trainer.service.recalibration import Diagnosed, recalibrate
 
-CROP = Crop(planting_date=datetime.date(2020, 2, 10), end_date=datetime.date(2020, 4, 25))
+CROP = Crop(planting_date=datetime.date(2020, 2, 10), end_date=datetime.date(2020, 4, 5))
 SITE = Site(name="house", latitude=52.0, longitude=4.5, crop=CROP)
 NOON = datetime.datetime(2020, 3, 1, 12, tzinfo=datetime.UTC)
 
@@ -30,6 +31,16 @@ NOON = datetime.datetime(2020, 3, 1, 12, tzinfo=datetime.UTC)
 @pytest.fixture(autouse=True)
 def _a_short_search(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(seasons, "plan_season", partial(plan_season, generations=3))
+
+
+@pytest.fixture(scope="module")
+def planned() -> FittedModel:
+    """The built-in simulator with the season of a young crop."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(seasons, "plan_season", partial(plan_season, generations=3))
+        model, notes = seasons.with_season(read_model(read_bundle(default_bundle_folder()), SITE), NOON)
+    assert notes == ()
+    return model
 
 
 def with_crop(**changed: Any) -> Site:
@@ -52,11 +63,8 @@ def test_no_season_is_lacking_where_none_can_be_planned(changed: dict[str, datet
     assert not seasons.lacking(built_in, with_crop(**changed), NOON)
 
 
-def test_a_season_that_cannot_be_planned_is_said_and_the_one_before_stays() -> None:
-    built_in = read_bundle(default_bundle_folder())
-    model = read_model(built_in, SITE)
-    planned, notes = seasons.with_season(model, NOON)
-    assert notes == () and planned.season is not None
+def test_a_season_that_cannot_be_planned_is_said_and_the_one_before_stays(planned: FittedModel) -> None:
+    assert planned.season is not None
     endless = replace(planned, site=with_crop(end_date=None))
     same, notes = seasons.with_season(endless, NOON)
     assert same.season is planned.season
@@ -65,11 +73,11 @@ def test_a_season_that_cannot_be_planned_is_said_and_the_one_before_stays() -> N
     )
 
 
-def test_the_season_of_a_crop_that_bears_begins_today_and_that_of_a_young_one_with_its_planting() -> None:
-    model = read_model(read_bundle(default_bundle_folder()), SITE)
-    young, _ = seasons.with_season(model, NOON)
-    assert young.season is not None and young.season.start == np.datetime64("2020-02-10T00:00:00")
-    old = replace(model, site=with_crop(planting_date=datetime.date(2019, 12, 1)))
+def test_the_season_of_a_crop_that_bears_begins_today_and_that_of_a_young_one_with_its_planting(
+    planned: FittedModel,
+) -> None:
+    assert planned.season is not None and planned.season.start == np.datetime64("2020-02-10T00:00:00")
+    old = replace(planned, season=None, site=with_crop(planting_date=datetime.date(2019, 12, 1)))
     bearing, _ = seasons.with_season(old, NOON)
     assert bearing.season is not None and bearing.season.start == np.datetime64("2020-03-01T00:00:00")
     assert bearing.season.covers(np.datetime64("2020-03-01T12:00:00"))

@@ -11,12 +11,14 @@ from igrow.trainer.data import Log, prepare_log
 from igrow.trainer.diagnosis import Diagnosis, diagnose
 from igrow.trainer.report import render_report
 from tests.diagnosis.conftest import DAYS, STEP, greenhouse_log, model_in_force
+from tests.made_once import made_once
 from tests.virtual_log import SITE, weather
 
 HOME = replace(SITE, time_zone="Europe/Amsterdam")
 
 
 @pytest.fixture(scope="session")
+@made_once
 def leak() -> Diagnosis:
     """Wind presses 0.12 air changes per hour and m/s in; a night of humidity is stuck."""
     wind = weather(DAYS, STEP, 2)["wind_speed"]
