@@ -72,7 +72,8 @@ def messages() -> list[str]:
     for texts in yaml.safe_load((_TRAINER / "report" / "texts.yaml").read_text(encoding="utf-8")).values():
         found += texts.values()
     for effect in EFFECTS.values():
-        found += [effect.title, effect.sentence, effect.separating_test, *filter(None, [effect.opposite])]
+        texts = (effect.title, effect.sentence, effect.separating_test, effect.signature, effect.opposite)
+        found += filter(None, texts)
     return list(dict.fromkeys([*found, *sentences()]))
 
 

@@ -24,7 +24,7 @@ from igrow.trainer.data.plot import plot_log
 from igrow.trainer.diagnosis import Diagnosis, plots
 from igrow.trainer.diagnosis.open_vents import OpenVents
 from igrow.trainer.diagnosis.persistence import persistence_errors
-from igrow.trainer.report import render_report, sentences, write_diagnosis
+from igrow.trainer.report import render_report, sentences, verdicts, write_diagnosis
 from igrow.trainer.report.page import error_rows
 from igrow.trainer.report.worth import Worth, worth
 from tests.diagnosis.conftest import greenhouse_log
@@ -72,7 +72,7 @@ def test_no_verdict_says_that_a_model_fits_where_its_errors_say_that_it_does_not
     assert [one.quantity for one in bad.misfits if verdict != "nothing" or one.quantity == "air_humidity"] == [
         "air_humidity"
     ]
-    assert "does not fit" in sentences.verdict(bad, speak("en")) or "none makes it fit" in sentences.verdict(
+    assert "does not fit" in verdicts.verdict(bad, speak("en")) or "none makes it fit" in verdicts.verdict(
         bad, speak("en")
     )
     told = list(sentences.warnings(bad, speak("en")))

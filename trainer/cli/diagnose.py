@@ -12,7 +12,7 @@ from igrow.core.greenhouse import HiddenEffect
 from igrow.core.greenhouse.described import parse_effect
 from igrow.core.language import LANGUAGES
 from igrow.trainer.cli.common import replace_bundle
-from igrow.trainer.cli.log_arguments import add_log_arguments, log_of
+from igrow.trainer.cli.log_arguments import add_log_arguments, log_of, typed
 from igrow.trainer.cli.progress import progress
 from igrow.trainer.diagnosis import diagnose
 from igrow.trainer.diagnosis.drift import read_drift
@@ -62,14 +62,14 @@ def run(arguments: argparse.Namespace) -> int:
             log, model, without=arguments.without, seed=arguments.seed, drift=read_drift(arguments.drift), progress=say
         )
         say("writing the report")
-        write_diagnosis(arguments.out, result, arguments.language)
+        write_diagnosis(arguments.out, result, arguments.language, typed(arguments))
         if result.findings:
             say("writing the corrected bundle")
             replace_bundle(arguments.out / "bundle", result.corrected)
     if truth and result.evidence is not None:
         errors = errors_with(result.evidence, [known_term(one) for one in truth])
         (arguments.out / "truth.json").write_text(json.dumps({"errors_24_h": errors}), encoding="utf-8")
-    print(result.summary())
+    print(result.summary(typed(arguments)))
     print(f"written to {arguments.out}", file=sys.stderr)
     return result.exit_code
 

@@ -36,3 +36,12 @@ def log_of(arguments: argparse.Namespace) -> Log:
         print(f"note: {note}", file=sys.stderr)
     assert log.known_site  # raises where the site is not known
     return log
+
+
+def typed(arguments: argparse.Namespace) -> list[str]:
+    """Return the words by which a command was told of its log, for another command to take."""
+    options = {"site": arguments.site, "compartment": arguments.compartment, "mapping": arguments.mapping}
+    words = [*map(str, arguments.log)]
+    for name, value in options.items():
+        words += [f"--{name}", str(value)] if value is not None else []
+    return [*words, *(word for kind in arguments.accept for word in ("--accept", kind))]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -13,6 +13,7 @@ from igrow.core.language import Language, speak
 from igrow.core.quantities import QUANTITIES
 from igrow.trainer.data.screening import Screened
 from igrow.trainer.diagnosis.persistence import persistence_errors
+from igrow.trainer.diagnosis.uncalibrated import FIRST, NO_NAME, how_to_calibrate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -106,7 +107,17 @@ class Diagnosis:
     @property
     def exit_code(self) -> int:
         """Of the command."""
-        return EXIT_CODES[self.verdict]
+        return EXIT_CODES[self.told]
+
+    @property
+    def uncalibrated(self) -> bool:
+        """The model was never calibrated on this greenhouse: what was found tells two greenhouses apart."""
+        return self.verdict != "data_fault" and self.model.calibrated_on != self.site
+
+    @property
+    def told(self) -> Verdict:
+        """The verdict that is told: a model of another greenhouse that does not fit this one is sure of no name."""
+        return "ambiguous" if self.verdict == "named" and self.uncalibrated and self.misfits else self.verdict
 
     @property
     def worsened(self) -> tuple[str, ...]:
@@ -132,11 +143,15 @@ class Diagnosis:
 
     def __repr__(self) -> str:
         causes = ", ".join(one.effect for one in self.findings)
-        return f"Diagnosis({self.site!r}, {self.verdict}{': ' if causes else ''}{causes})"
+        return f"Diagnosis({self.site!r}, {self.told}{': ' if causes else ''}{causes})"
 
-    def summary(self) -> str:
-        """Return the verdict in a few lines for people."""
-        lines = [f"{self.site}: {self.verdict}"]
+    def summary(self, typed: Sequence[str] = ()) -> str:
+        """Return the verdict in a few lines for people; `typed` are the words of a command that read the log."""
+        lines = [f"{self.site}: {self.told}"]
+        if self.uncalibrated:
+            text, command = how_to_calibrate(self.log.days if self.log is not None else 0.0, typed)
+            lines = [FIRST, text.format(command=command), *lines]
+            lines += [f"  {NO_NAME}"] if self.told != self.verdict else []
         lines += [f"  {one.sentence}" for one in self.findings]
         lines += [
             f"  as well it could be {', '.join(one.confounded[1:])}" for one in self.findings if one.confounded[1:]
@@ -198,7 +213,8 @@ class Diagnosis:
     def to_json(self) -> dict[str, Any]:
         """Return the document of `diagnosis.json`."""
         return {
-            "verdict": self.verdict,
+            "verdict": self.told,
+            "calibrated_here": not self.uncalibrated,
             "span": {
                 "start": _time(self.start),
                 "end": _time(self.end),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,8 +17,8 @@ from igrow.core.quantities import QUANTITIES
 from igrow.trainer.diagnosis.freerun import HORIZONS
 from igrow.trainer.diagnosis.result import STAGES, Diagnosis, Finding
 from igrow.trainer.figure_style import COLOURS, DARK
-from igrow.trainer.report import figures, sentences
-from igrow.trainer.report.worth import worth
+from igrow.trainer.report import figures, sentences, verdicts
+from igrow.trainer.report.worth import Worth, worth
 
 MOVED = 0.05
 """Relative change from which on a recalibrated parameter is shown."""
@@ -36,6 +36,8 @@ class Cause:
     rivals: list[str]
     checks: list[str]
     costs: list[str]
+    signature: str
+    """How an effect shows in the log; empty for what is none."""
 
 
 @dataclass(frozen=True)
@@ -49,13 +51,15 @@ class ErrorRow:
     unit: str
 
 
-def write_diagnosis(folder: Path, result: Diagnosis, language: str = "en") -> None:
+def write_diagnosis(folder: Path, result: Diagnosis, language: str = "en", typed: Sequence[str] = ()) -> None:
     """Write ``diagnosis.json`` and ``report.html`` into a folder, which is made where it is not there.
+
+    `typed` are the words of a command that read the log.
 
     Raises:
         IgrowError: the folder cannot be written, or the language is not known.
     """
-    page = render_report(result, language)
+    page = render_report(result, language, typed)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         text = json.dumps(priced(result), indent=2, allow_nan=False) + "\n"
@@ -70,12 +74,17 @@ def priced(result: Diagnosis) -> dict[str, Any]:
     document = result.to_json()
     area = result.model.site.greenhouse.floor_area
     for told, finding in zip(document["findings"], result.findings, strict=True):
-        found = worth(result, finding)
+        found = priced_at(result, finding)
         told["eur_per_week"] = None if found is None else round(area * found.money, 2)
     return document
 
 
-def render_report(result: Diagnosis, language: str = "en") -> str:
+def priced_at(result: Diagnosis, finding: Finding) -> Worth | None:
+    """Return what a finding takes; None where nothing does, such as of a difference between two greenhouses."""
+    return None if result.uncalibrated else worth(result, finding)
+
+
+def render_report(result: Diagnosis, language: str = "en", typed: Sequence[str] = ()) -> str:
     """Return the page's HTML in a language (`igrow.core.language.LANGUAGES`), by the greenhouse's clock.
 
     Raises:
@@ -97,7 +106,8 @@ def render_report(result: Diagnosis, language: str = "en") -> str:
         language=spoken,
         diagnosis=result,
         time_zone=site.time_zone,
-        verdict=sentences.verdict(result, spoken),
+        first=verdicts.first(result, typed, spoken),
+        verdict=verdicts.verdict(result, spoken),
         causes=[_cause(result, one, spoken) for one in result.findings],
         faults=[sentences.fault(one, spoken) for one in faults],
         gains=list(sentences.gains(result, spoken)),
@@ -129,7 +139,8 @@ def _cause(result: Diagnosis, finding: Finding, language: Language) -> Cause:
         sentences.cause(finding, language),
         sentences.rivals(finding, language),
         sentences.checks(finding, language),
-        sentences.costs(finding, worth(result, finding), site.greenhouse.floor_area, language),
+        sentences.costs(finding, priced_at(result, finding), site.greenhouse.floor_area, language),
+        sentences.signature(finding, language),
     )
 
 

@@ -20,7 +20,7 @@ from igrow.trainer.diagnosis.visible_parameters import VISIBLE
 from igrow.trainer.fit.omission import Omission
 from igrow.trainer.report.worth import Worth
 
-_TEXTS: Mapping[str, Mapping[str, str]] = yaml.safe_load(
+TEXTS: Mapping[str, Mapping[str, str]] = yaml.safe_load(
     files("igrow.trainer.report").joinpath("texts.yaml").read_text(encoding="utf-8")
 )
 _MORE, _LESS = N_("{channel}: more, {when}"), N_("{channel}: less, {when}")
@@ -29,17 +29,9 @@ _LEAST = {"heat": 0.05, "co2": 0.001, "lamp_light": 0.02}
 """MJ, kg and kWh per m2 and week from which on they are told."""
 
 
-def verdict(result: Diagnosis, language: Language) -> str:
-    """Return the first sentence; it never says that a model fits where its own errors say that it does not."""
-    kind = result.verdict
-    wrong = kind in _TEXTS["no_fit"] and result.misfits
-    told = _TEXTS["no_fit"] if wrong else _TEXTS["verdicts"]
-    return language.text(told[kind])
-
-
 def fault(one: DataFault, language: Language) -> tuple[str, str]:
     """Return what a fault of the data is, and what was seen and how to mend it."""
-    known = _TEXTS["faults"].get(one.kind)
+    known = TEXTS["faults"].get(one.kind)
     quantity = language.listed([language.name(name) for name in one.quantity.split(", ")])
     # How to mend it may be a piece of YAML, whose names and numbers stay as they are.
     seen, mend = language.told(one.sentence, language.values), language.told(one.mend)
@@ -118,7 +110,7 @@ def _course(course: str, language: Language) -> str:
         if day in WEEKDAYS:
             name = language.locale.weekdays[WEEKDAYS.index(day)]
             return language.text("on {weekday}", weekday=name)
-        told = _TEXTS["when"].get(course)
+        told = TEXTS["when"].get(course)
         return course if told is None else language.text(told)
     hours = language.text("{first} to {last} h", first=found["first"], last=found["last"])
     parts = [_course(found["before"], language)] if found["before"] else []
@@ -150,8 +142,17 @@ def checks(finding: Finding, language: Language) -> list[str]:
         tests = [VISIBLE[name].check for name in finding.confounded]
     if not tests:
         tests = [N_("look at what happens in the greenhouse at these times and in this weather, and write it down")]
-    told = (language.in_units(language.text(one)) for one in dict.fromkeys(tests))
-    return [f"{one[0].upper()}{one[1:]}." if language.code != "zh" else f"{one}。" for one in told]
+    return [_whole(language.in_units(language.text(one)), language) for one in dict.fromkeys(tests)]
+
+
+def signature(finding: Finding, language: Language) -> str:
+    """Return how an effect shows in the log; empty for what is none."""
+    return _whole(language.text(EFFECTS[finding.effect].signature), language) if finding.effect in EFFECTS else ""
+
+
+def _whole(told: str, language: Language) -> str:
+    """Return words as a sentence of their own."""
+    return f"{told[0].upper()}{told[1:]}." if language.code != "zh" else f"{told}。"
 
 
 def costs(finding: Finding, one: Worth | None, area: float, language: Language) -> list[str]:
