@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import json
 import shutil
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
 
 from igrow.edge.updates import SignedSource, UpdateError
 from igrow.trainer.cli import main
+from igrow.trainer.fleet.work import publish_site
 from igrow.trainer.publishing import PublishingError, create_keys, publish_in, refresh
 from igrow.trainer.publishing.keys import renew_root, replace_key, status, take_offline
+from igrow.trainer.publishing.repository import targets_hold_until
 from tests.tiny_bundle import write_tiny_bundle
 
 
@@ -90,6 +93,67 @@ def test_a_root_can_be_renewed_years_later(fleet: Fleet) -> None:
     renew_root(fleet.keys, [fleet.keys])
     assert status(fleet.keys)[2] == 2
     assert fleet.publish(6.0) == fleet.fetched()
+
+
+def test_a_bundle_that_stays_in_force_for_a_year_is_told_to_be_published_again(fleet: Fleet) -> None:
+    """Refreshed month after month, it was said to be signed, and no gateway took it."""
+    bundle, now = write_tiny_bundle(fleet.folder / "made"), datetime.now(UTC)
+    long_ago = now - timedelta(days=340)
+    publish_in(bundle.folder, fleet.repository, fleet.keys, now=long_ago)
+    until = refresh(fleet.repository, fleet.keys)
+    assert timedelta(days=24) < until - now < timedelta(days=26)
+    assert fleet.fetched() == bundle.identity
+    publish_in(bundle.folder, fleet.repository, fleet.keys, now=now - timedelta(days=366))
+    with pytest.raises(PublishingError, match=r"has expired on .*, and only publishing the bundle again renews it"):
+        refresh(fleet.repository, fleet.keys)
+    publish_in(bundle.folder, fleet.repository, fleet.keys)
+    assert fleet.fetched() == bundle.identity
+
+
+def test_a_root_that_has_expired_signs_nothing_before_it_is_renewed(fleet: Fleet, monkeypatch) -> None:
+    monkeypatch.setattr("igrow.trainer.publishing.keys.ROOT_LIFETIME", timedelta(days=-1))
+    renew_root(fleet.keys, [fleet.keys])
+    fleet.publish(5.0)
+    with pytest.raises(UpdateError, match="signatures have expired"):
+        fleet.source.fetch("demo", ())
+    with pytest.raises(PublishingError, match=r"2.root.json: has expired.*`igrow-trainer keys renew "):
+        refresh(fleet.repository, fleet.keys)
+    monkeypatch.undo()
+    assert main(["keys", "renew", str(fleet.keys)]) == 0
+    refresh(fleet.repository, fleet.keys)
+    assert fleet.fetched()
+
+
+@pytest.mark.parametrize("action", ["replace", "renew"])
+def test_the_fleet_hands_on_a_new_root_and_renews_what_names_a_bundle(
+    fleet: Fleet, tmp_path: Path, monkeypatch, action: str
+) -> None:
+    """It waited until the other signatures were about to expire: for a month a stolen key went on to sign."""
+    exchange: dict[str, str | None] = {
+        "url": str(tmp_path / "exchange"),
+        "base": ".",
+        "known_hosts": None,
+        "identity": None,
+    }
+    repository = tmp_path / "exchange" / "demo" / "bundles"
+    source = SignedSource(repository, tmp_path / "gateway", tmp_path / "root.json")
+    bundle, now = write_tiny_bundle(tmp_path / "made"), datetime.now(UTC)
+    publish_in(bundle.folder, repository, fleet.keys)
+
+    def published() -> str:
+        given = ("demo", str(tmp_path / "state"), exchange, str(fleet.keys), now.timestamp())
+        return str(publish_site(*given, again=False)["note"])
+
+    assert published().startswith("signed until")
+    said = ["keys", action, str(fleet.keys), *(["timestamp"] if action == "replace" else [])]
+    assert main(said) == 0
+    assert published() == "signed again"
+    assert (repository / "metadata" / "2.root.json").exists()
+    assert source.fetch("demo", ()) is not None
+    monkeypatch.setattr("igrow.trainer.fleet.work.bundle_in_force", lambda *_: (bundle, ()))
+    publish_in(bundle.folder, repository, fleet.keys, now=now - timedelta(days=340))
+    assert published() == f"published {bundle.label} again"
+    assert targets_hold_until(repository, fleet.keys) > now + timedelta(days=360)
 
 
 def test_what_others_write_into_the_exchange_is_not_built_upon(fleet: Fleet) -> None:

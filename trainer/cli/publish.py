@@ -31,8 +31,8 @@ def run(arguments: argparse.Namespace) -> int:
         raise IgrowError("name the bundle to publish, or the site to --refresh")
     place = exchange_of(arguments)
     for site in arguments.refresh:
-        refresh(repository_of(place, site), arguments.keys)
-        print(f"signed the bundles of {site} again")
+        until = refresh(repository_of(place, site), arguments.keys)
+        print(f"signed the bundles of {site} again: gateways take them until {until:%Y-%m-%d}")
     if arguments.bundle is not None:
         bundle = publish(arguments.bundle, place, arguments.keys)
         print(f"published {bundle.label} for site {bundle.manifest.site} in {arguments.exchange}")

@@ -164,11 +164,13 @@ def publish_site(
 ) -> dict[str, Any]:
     """Sign a site's bundles again where the signatures expire soon; with `again` publish its bundle once more."""
     from igrow.trainer.publishing import publish_in, refresh  # noqa: PLC0415
+    from igrow.trainer.publishing.repository import lacks_root, targets_hold_until  # noqa: PLC0415
 
     repository, moment = _repository(exchange, site), datetime.fromtimestamp(now, UTC)
     folder = site_folder(Path(state), site)
     stamp = repository.get("metadata/timestamp.json", LARGEST_DOCUMENT)
-    if again:
+    # What names the bundle holds for a year, and only publishing the bundle again renews it.
+    if again or (stamp is not None and targets_hold_until(repository, Path(keys)) - moment <= REFRESH_BEFORE):
         reports, _ = Archive(Path(state) / "archive").reports(site)
         bundle, _ = bundle_in_force(folder, reports)
         if bundle.manifest.site != site:
@@ -178,7 +180,7 @@ def publish_site(
     if stamp is None:
         return {"site": site, "note": "nothing was published for it yet"}
     expires = datetime.fromisoformat(str(parse_object(stamp, "timestamp.json").get("signed", {}).get("expires", "")))
-    if expires - moment > REFRESH_BEFORE:
+    if expires - moment > REFRESH_BEFORE and not lacks_root(repository, Path(keys)):
         return {"site": site, "note": f"signed until {expires:%Y-%m-%d}"}
     refresh(repository, Path(keys), now=moment)
     return {"site": site, "note": "signed again"}

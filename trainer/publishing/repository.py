@@ -82,15 +82,39 @@ def publish_in(bundle: Path, repository: Place | Path, keys: Path, *, now: datet
     return read
 
 
-def refresh(repository: Place | Path, keys: Path, *, now: datetime | None = None) -> None:
+def refresh(repository: Place | Path, keys: Path, *, now: datetime | None = None) -> datetime:
     """Sign snapshot and timestamp again with a new expiry; needs these two keys only.
 
-    Raises PublishingError where the present key did not sign the newest bundle: it must be published again.
+    Returns until when gateways take all that is signed: what names the bundle holds as long as it did.
+
+    Raises PublishingError where the present key did not sign the newest bundle, or signed it too long ago: it must be
+    published again.
     """
     place = _place(repository)
     now = now or datetime.now(UTC)
     _write_roots(place, keys)
-    _write_chain(place, keys, _load_targets(place, keys).version, now)
+    targets, root = _load_targets(place, keys), load_root(keys).signed
+    if root.expires <= now:
+        name = f"{keys}/{root.version}.root.json"
+        raise PublishingError(f"{name}: has expired, and gateways take nothing: `igrow-trainer keys renew {keys}`")
+    if targets.expires <= now:
+        raise PublishingError(
+            f"{place}/metadata/{targets.version}.targets.json: has expired on {targets.expires:%Y-%m-%d}, and only "
+            "publishing the bundle again renews it"
+        )
+    _write_chain(place, keys, targets.version, now)
+    return min(targets.expires, root.expires, _expiry(now, "timestamp"))
+
+
+def targets_hold_until(repository: Place | Path, keys: Path) -> datetime:
+    """Return until when what names a site's bundle holds, which no refresh prolongs; raises PublishingError."""
+    return _load_targets(_place(repository), keys).expires
+
+
+def lacks_root(repository: Place | Path, keys: Path) -> bool:
+    """Tell whether keys were replaced or the root was renewed since a repository was signed."""
+    newest = max(root_versions(keys), default=0)
+    return bool(newest) and _place(repository).get(f"metadata/{newest}.root.json", LARGEST_DOCUMENT) is None
 
 
 def _write_roots(place: Place, keys: Path) -> None:
