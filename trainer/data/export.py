@@ -20,7 +20,7 @@ from igrow.trainer.data.mapping import ColumnMapping, ExportMapping, TimeColumn
 from igrow.trainer.data.number_texts import number
 from igrow.trainer.data.rows import Merged, joined, merge
 from igrow.trainer.data.timestamps import ZONE, dates_alone, to_utc, wall_parser
-from igrow.trainer.data.vocabulary import folded, words_of, zones_called
+from igrow.trainer.data.vocabulary import folded, is_total, words_of, zones_called
 from igrow.trainer.data.zone_abbreviations import split
 
 MOST_UNREADABLE = 0.02
@@ -88,7 +88,8 @@ def read_tables(tables: Sequence[ExportTable], mapping: ExportMapping) -> Merged
 def readings(table: ExportTable, time: TimeColumn) -> tuple[ExportTable, tuple[str, ...]]:
     """Return the rows that are readings, with notes on the others.
 
-    A text without any digit is no time: a line of sums below the table, or its header once more; nor are the few that
+    A text without any digit is no time: a line of sums below the table, or its header once more; nor is one that begins
+    with a word for a sum or a mean (`is_total`); nor are the few that
     cannot be read as one, such as a month with its means, and dates alone among times of day. A day that stands on the
     first of its rows alone holds for those below it.
     """
@@ -101,7 +102,7 @@ def readings(table: ExportTable, time: TimeColumn) -> tuple[ExportTable, tuple[s
             notes.append(f"{column!r} is empty on some rows: the day above holds there")
             table = ExportTable(table.path, {**table.columns, column: filled}, table.lines)
     texts = table[column]
-    strange = [row for row, text in enumerate(texts) if text and not any(map(str.isdigit, text))]
+    strange = [row for row, text in enumerate(texts) if text and (is_total(text) or not any(map(str.isdigit, text)))]
     strange += dates_alone(texts) if time_of_day is None else ()
     strange = sorted({*strange, *_unreadable(table, time, set(strange))})
     if not strange:

@@ -11,6 +11,7 @@ import numpy as np
 from igrow.core.arrays import Floats, Times
 from igrow.core.telemetry import Telemetry, concatenate, from_rows
 from igrow.trainer.data.fault import DataFault
+from igrow.trainer.data.grid import HOUR, own_step
 
 COMPARED = {
     "air_temperature": 0.1,
@@ -24,6 +25,8 @@ LARGEST_RATIO = 3.0
 """How much further than the next row a repeated row may lie, in medians of each, before it contradicts the first."""
 FAR_DAYS, FEW = 60, 0.01
 """Rows so many days away from all others, and fewer than such a share of them, are a clock's mistake."""
+LEAST_STEP = 240.0
+"""Seconds between rows from which on one row a day that stands between them is told from a clock that is uneven."""
 LEAST_REPEATED = 12
 """Rows that stand twice from which on a contradiction is judged."""
 
@@ -49,14 +52,13 @@ def merge(time: Times, columns: Mapping[str, Floats]) -> Merged:
     """
     known = ~np.isnat(time)
     time, columns = time[known], {name: values[known] for name, values in columns.items()}
-    table = from_rows(time, columns)
-    notes: list[str] = []
+    table, notes = _without_rows_of_days(from_rows(time, columns))
     back = np.diff(time.astype(np.int64)) < 0
     if len(time) > 1 and back.all():
         notes.append("the rows stand in the order of time from the newest to the oldest: turned round")
     elif back.any() and back.mean() > 0.01:
         notes.append(f"{int(back.sum())} rows stand before an earlier one: put in the order of time")
-    repeated = len(time) - len(table)
+    repeated = len(time) - len(np.unique(time))
     faults = []
     if repeated:
         sentence = _contradiction(time, columns, table) if repeated >= LEAST_REPEATED else None
@@ -95,6 +97,25 @@ def joined(parts: Sequence[Merged]) -> Merged:
             faults[DataFault("repeated_times", "", seen, mend)] = None
     notes = dict.fromkeys(note for one in parts for note in one.notes)
     return Merged(table, tuple(notes), tuple(faults))
+
+
+def _without_rows_of_days(table: Telemetry) -> tuple[Telemetry, list[str]]:
+    """Return a table without one row a day that stands between the times of all others, and a note on them.
+
+    It is the day's sum or mean, under the last second of the day.
+    """
+    step, seconds = own_step(table.time), table.time.astype(np.int64)
+    if not LEAST_STEP <= step <= HOUR:
+        return table, []
+    phases, counts = np.unique(seconds % int(step), return_counts=True)
+    off = seconds % int(step) != phases[np.argmax(counts)]
+    days = len(np.unique(seconds // 86_400))
+    clock = np.unique(seconds[off] % 86_400)
+    if not 3 <= off.sum() <= days + 1 or off.sum() < 0.8 * (days - 1) or len(clock) > 2 or len(table) < 8 * days:
+        return table, []
+    kept = Telemetry(table.time[~off], {name: values[~off] for name, values in table.columns.items()})
+    when = f"{clock[0] // 3600:02d}:{clock[0] % 3600 // 60:02d}"
+    return kept, [f"{off.sum()} rows, one a day at {when} UTC, stand between the times of all others: set aside"]
 
 
 def without_strays(telemetry: Telemetry) -> tuple[Telemetry, tuple[str, ...]]:

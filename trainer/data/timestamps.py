@@ -182,4 +182,5 @@ def _after_midnight(text: str) -> tuple[str, datetime.timedelta]:
 
 
 def _number(text: str) -> float:
-    return float(text.replace(",", "."))
+    """Return a number, or the sum of a day and of its part that stand beside each other."""
+    return sum(map(float, text.replace(",", ".").split(" ")))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
 from typing import Any, cast
@@ -16,6 +16,8 @@ from igrow.trainer.data.mapping import Amount
 
 _FOLDED = str.maketrans({"æ": "ae", "ø": "o", "œ": "oe", "ł": "l", "ß": "ss", "−": "-", "–": "-", "’": "'"})
 OPENINGS, CLOSURES = ("vent_lee", "vent_wind"), ("energy_screen", "blackout_screen")
+_TENTHS = re.compile(r"(?:0,1|01|1/10|x0,1|x01)([^\d/].*)")
+"""A unit of which each whole number is a tenth, compact: ``0,1 °C``."""
 _BRACKETS = re.compile(r"[(\[{]([^()\[\]{}]*)[)\]}]")
 
 
@@ -160,6 +162,12 @@ def time_words(kind: str) -> Sequence[tuple[str, bool]]:
     return [(folded(word.removeprefix("=")), word.startswith("=")) for word in _table()["time"][kind]]
 
 
+def is_total(text: str) -> bool:
+    """Tell whether a text begins with a word for a sum, a mean or an extreme, such as ``Totaal 01-02-2020``."""
+    word = re.match(r"[^\W\d_]+", text)
+    return word is not None and folded(word[0]) in _table()["totals"]
+
+
 def compact(text: str) -> str:
     """Return a unit's text without blanks, dots, carets and brackets."""
     return re.sub(r"[\s.^*·()\[\]{}]", "", folded(text))
@@ -191,8 +199,17 @@ def _symbols() -> frozenset[str]:
     return frozenset(compact(symbol) for symbol in _table()["symbols"])
 
 
+@cache
+def _foreign() -> Sequence[str]:
+    return [folded(text) for text in _table()["foreign"]]
+
+
 def unknown_unit(name: str) -> str:
-    """Return the unit in brackets in a column's name that `units` lacks, such as ``g/kg``; empty without one."""
+    """Return the unit in a column's name that `units` lacks: ``g/kg`` in brackets, or ``Bft``; empty without one."""
+    told = [text for part in _BRACKETS.findall(name) + _BRACKETS.sub(" ", name).split() for text in part.split()]
+    foreign = next((text for text in told if folded(text).strip(".,;:") in _foreign()), "")
+    if foreign:
+        return foreign
     for text in _BRACKETS.findall(name):
         parts = compact(text).split("/")
         if len(parts) > 1 and all(part in _symbols() for part in parts) and not find_units([compact(text)]):
@@ -212,9 +229,13 @@ def find_units(texts: Sequence[str]) -> dict[str, Unit]:
     """Return the unit of each dimension that one of some compact texts may be."""
     found: dict[str, Unit] = {}
     for text in texts:
+        tenths = _TENTHS.fullmatch(text)
         for dimension, table in units().items():
             if text in table:
                 found.setdefault(dimension, table[text])
+            elif tenths is not None and tenths[1] in table:
+                whole = table[tenths[1]]
+                found.setdefault(dimension, replace(whole, name=f"0.1 {whole.name}", scale=0.1 * whole.scale))
     return found
 
 

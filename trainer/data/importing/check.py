@@ -16,6 +16,7 @@ from igrow.trainer.data.importing.told_units import BY_SIZE, like_the_others, te
 from igrow.trainer.data.importing.zone import fixed
 from igrow.trainer.data.mapping import ColumnMapping, ExportMapping
 from igrow.trainer.data.plausibility import find_faults
+from igrow.trainer.data.plausibility.sums import running_sum
 from igrow.trainer.data.plausibility.sunlight import CLOCK, noon_is_late
 from igrow.trainer.data.rows import Merged
 from igrow.trainer.data.timestamps import ZONE
@@ -145,6 +146,13 @@ def _remedied(
     like_the_air = {name for name, rule in changed.items() if rule != columns[name]}
     for fault in faults:
         if fault.quantity in like_the_air:
+            continue
+        if fault.kind == "radiation_sum" and changed[fault.quantity].amount == "interval":
+            # The unit is told; that it is of the sum, and not of each row, is seen.
+            kind = running_sum(merged.telemetry.time, merged.telemetry[fault.quantity])
+            assert kind is not None
+            changed[fault.quantity] = replace(changed[fault.quantity], amount=kind)
+            mended.append(f"{fault.quantity} is a running sum in {units[fault.quantity]}, not an amount a row")
             continue
         if fault.kind == "swapped_columns":
             one, other = fault.quantity.split(", ")

@@ -83,11 +83,17 @@ def of_unknown_unit(columns: Iterable[str], unit_line: Mapping[str, str]) -> dic
         named = any(
             words.issuperset(one) and not words & rule.excluded.difference(one)
             for rule in vocabulary.rules().values()
-            for one in rule.needed
+            for one in (*rule.needed, *rule.by_unit)
         )
         if own and named and _exact(column) is None:
             found[column] = own
     return found
+
+
+def of_other_humidity(columns: Iterable[str]) -> list[str]:
+    """Return the columns of air that tell its humidity as a deficit, a content, or a dew point."""
+    other = {"outside", "setpoint", "ground", "plant", "sky", "co2"}
+    return [name for name in columns if "absolute" in (words := vocabulary.words_in(name)) and not words & other]
 
 
 def _exact(column: str) -> str | None:

@@ -89,6 +89,11 @@ def times_have_no_day(cells: Cells) -> bool:
     )
 
 
+def _has_week(cell: str) -> bool:
+    words = {vocabulary.folded(word) for word in re.findall(r"[^\W\d_]+", cell)}
+    return any(word in words for word, _ in vocabulary.time_words("week")) and any(map(str.isdigit, cell))
+
+
 def _why_none(rows: Sequence[Sequence[str]], sheet: str) -> str:
     """Return why no row of a table is a reading, and what would be right."""
     parts = next((found for row in rows if len(found := parts_of_time(row)) > 2), ())
@@ -101,6 +106,9 @@ def _why_none(rows: Sequence[Sequence[str]], sheet: str) -> str:
             if clock is not None:
                 return f"its times, such as {clock!r}, have no date: {how_to_date(sheet)}"
             dated = next((cell for cell in first if _WITHOUT_YEAR.fullmatch(cell)), None)
+            week = next(filter(_has_week, first), None)
+            if week is not None:
+                return f"its times, such as {week!r}, tell the week and no date: write them as 2020-02-01 13:30"
             if dated is not None:
                 return f"its times, such as {dated!r}, have no year: write it in, such as 2020-02-01 13:30"
     return (

@@ -8,7 +8,7 @@ from igrow.trainer.data import vocabulary
 from igrow.trainer.data.day_halves import is_half
 from igrow.trainer.data.importing.time_format import TimeForm, has_clock, is_clock, looks_like_time
 
-_PARTS = ("year", "month", "day", "day_of_year", "hour", "minute")
+_PARTS = ("year", "month", "day", "day_of_year", "week", "hour", "minute")
 
 
 def what_is_odd(columns: Mapping[str, Sequence[str]], time: TimeForm | None) -> str | None:

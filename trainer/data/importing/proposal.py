@@ -27,7 +27,7 @@ from igrow.trainer.data.importing.time_format import TimeForm, find_time
 from igrow.trainer.data.importing.told_units import like_the_others, unit_of_cells
 from igrow.trainer.data.importing.zone import find_zone, zones_asked
 from igrow.trainer.data.mapping import MISSING, ColumnMapping, ExportMapping, LongTable, TimeColumn
-from igrow.trainer.data.vocabulary import Unit
+from igrow.trainer.data.vocabulary import CLOSURES, OPENINGS, Unit
 
 ORDERS = {"dmy": ("%d", "%m"), "mdy": ("%m", "%d"), "ymd": ("%Y", "%m")}
 MUST_BE_RIGHT = ("air_temperature", "outdoor_temperature", "air_humidity", "air_co2", "global_radiation")
@@ -142,6 +142,11 @@ def propose(
         draft.questions.append(Question("time_zone", text, choices, f"--time-zone {choices[0]}", blocks=True))
     if why:
         draft.notes.append(why)
+    if "air_humidity" not in mapped:
+        draft.notes += [
+            f"{column!r} tells the humidity in another way, which is not read: export the relative humidity in %"
+            for column in names.of_other_humidity(labels)
+        ]
     draft.notes += [
         f"{column!r} is in {unit!r}, which is not known: left out (--column QUANTITY={column!r} takes it as it is)"
         for column, unit in names.of_unknown_unit(labels, unit_line).items()
@@ -234,6 +239,9 @@ def _mapped(
             if quantity == "global_radiation" and "sum" in vocabulary.words_in(match.column) and amount == "interval":
                 amount = "day"
             rule = replace(rule, scale=scale, offset=offset, amount=amount)
+        elif quantity in (*OPENINGS, *CLOSURES) and texts.steps:
+            _ask_unit(quantity, match.column, draft, ("percent", f"0-{texts.highest:.0f}"))
+            continue
         elif names.dimension(quantity) in ("dose", "water", "power"):
             rescued = by_capacity(quantity, rule, texts.highest, site)
             if rescued is None:
@@ -262,8 +270,8 @@ def _mapped(
     return rules, units
 
 
-def _ask_unit(quantity: str, column: str, draft: _Draft) -> None:
-    known = tuple(dict.fromkeys(unit.name for unit in vocabulary.units()[names.dimension(quantity)].values()))
+def _ask_unit(quantity: str, column: str, draft: _Draft, known: tuple[str, ...] = ()) -> None:
+    known = known or tuple(dict.fromkeys(unit.name for unit in vocabulary.units()[names.dimension(quantity)].values()))
     option = f"--unit {quantity}={known[0]!r}"
     draft.questions.append(Question(f"units:{quantity}", f"in which unit is {column!r} ({quantity})?", known, option))
 

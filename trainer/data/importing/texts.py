@@ -10,6 +10,9 @@ from igrow.trainer.data import vocabulary
 from igrow.trainer.data.mapping import MISSING
 from igrow.trainer.data.number_texts import number, unit_behind
 
+MOST_STEPS, LEAST_AT_END = 10.0, 0.05
+"""Steps that a vent's motor has at most, and share of the rows in which it is at its end, where it counts them."""
+
 
 @dataclass(frozen=True)
 class ColumnTexts:
@@ -27,6 +30,8 @@ class ColumnTexts:
     """Largest number, nan without any."""
     unit: str
     """What stands behind most of the numbers; empty for nothing."""
+    steps: bool = False
+    """All numbers are whole, few, and often the largest of them: steps of a motor, and no per cent."""
 
 
 def column_texts(cells: Sequence[str], decimal: str, known: Mapping[str, float] | None = None) -> ColumnTexts:
@@ -47,4 +52,12 @@ def column_texts(cells: Sequence[str], decimal: str, known: Mapping[str, float] 
         tuple(text for text in rest if text not in words),
         max(values.values(), default=float("nan")),
         behind.most_common(1)[0][0] if behind else "",
+        _are_steps({values[text]: count[text] for text in values}),
     )
+
+
+def _are_steps(count: Mapping[float, int]) -> bool:
+    """Tell whether numbers, by how often each is there, are steps of a motor: only such a vent rests at its end."""
+    top = max(count, default=0.0)
+    whole = all(value >= 0.0 and value == int(value) for value in count)
+    return whole and 2.0 < top <= MOST_STEPS and count[top] >= LEAST_AT_END * sum(count.values())

@@ -35,6 +35,8 @@ _DATE = re.compile(
     r"(\d{1,4}[-/.年]\s?\d{1,2}[-/.月]\s?\d{1,4}日?|\d{8}|(?:19|20)\d\d-[0-3]\d\d|\d{1,2}[-\s.]+[^\W\d_]{3,}\.?[-\s]+\d{2,4}|"
     r"[^\W\d_]{3,}\.?\s+\d{1,2},?\s+\d{4})(\D.*)?"
 )
+_DAY_AND_PART = re.compile(r"[3-7]\d{4} ([01]|0?[.,]\d+)")
+"""Excel's day and its part, from two columns."""
 _COMPACT = re.compile(r"(19|20)\d\d(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])([01]\d|2[0-4])[0-5]\d([0-5]\d)?")
 """Year to minute or second without a sign between them."""
 _TOKEN = re.compile(r"\d+|[^\W\d_]+|[^\w]+|_")
@@ -107,7 +109,7 @@ def find_time(columns: dict[str, Sequence[str]]) -> TimeForm | None:
 def _sample(texts: Sequence[str]) -> list[str]:
     """Return texts from the beginning, in their order (so that midnight is passed), and some from all along."""
     alone = dates_alone(texts)
-    filled = [text for row, text in enumerate(texts) if text and row not in alone]
+    filled = [text for row, text in enumerate(texts) if text and row not in alone and not vocabulary.is_total(text)]
     # The header once more, or a line of sums.
     dated = [text for text in filled if any(map(str.isdigit, text))]
     kept = dated if len(dated) >= _LEAST_DATED * len(filled) else filled
@@ -125,7 +127,9 @@ def _clock_column(columns: dict[str, Sequence[str]], names: Sequence[str], date:
     clocks = [
         name
         for name in names
-        if name != date and (texts := _sample(columns[name])) and (_is_clock(texts) or _is_hour(name, texts))
+        if name != date
+        and (texts := _sample(columns[name]))
+        and (_is_clock(texts) or _is_hour(name, texts) or _is_part_of_day(texts))
     ]
     return min(
         clocks,
@@ -144,8 +148,19 @@ def _is_hour(name: str, texts: Sequence[str]) -> bool:
     return whole and len(set(texts)) in (23, 24, 25) and bool(_named(name, "time_of_day"))
 
 
+def _is_part_of_day(texts: Sequence[str]) -> bool:
+    """Tell whether a column goes from 0 to 1 day after day, in even steps, as a spreadsheet keeps times of day."""
+    if not all(re.fullmatch(r"[01]|0?[.,]\d+", text) for text in texts):
+        return False
+    parts = np.array([float(text.replace(",", ".")) for text in texts])
+    forwards = np.diff(parts)[np.diff(parts) > 0.0]
+    return len(forwards) > 2 and bool(np.ptp(forwards) < 1e-3) and float(np.ptp(parts)) > 0.5
+
+
 def _forms(texts: Sequence[str]) -> list[str]:
     """Return the forms that read (nearly) all texts."""
+    if all(_DAY_AND_PART.fullmatch(text) for text in texts[:50]):
+        return [EXCEL]
     if split(texts[0])[1]:
         return [f"{form} {ZONE}" for form in _forms([split(text)[0] for text in texts])]
     if all(_COMPACT.fullmatch(text) for text in texts[:50]):

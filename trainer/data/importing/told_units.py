@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 
+from igrow.core.quantities import QUANTITIES
 from igrow.trainer.data import vocabulary
 from igrow.trainer.data.importing import columns as names
 from igrow.trainer.data.mapping import ColumnMapping
@@ -19,11 +20,20 @@ _AMERICAN = {"temperature": "degF", "speed": "mph"}
 BY_SIZE = ("air_temperature", "heating_setpoint", "rail_pipe_temperature", "grow_pipe_temperature")
 """Temperatures of the greenhouse, whose own size tells degF: what is 20 there is never degF, whatever stands beside."""
 
+LIKE_THE_AIR = (
+    "outdoor_temperature",
+    "sky_temperature",
+    "rail_pipe_temperature",
+    "grow_pipe_temperature",
+    "wind_speed",
+)
+"""Quantities that are whole tenths where the air temperature is, and of which the size alone says nothing."""
+
 
 def tenths_like_the_air(
     rules: Mapping[str, ColumnMapping], units: Mapping[str, str], whole: Collection[str]
 ) -> tuple[dict[str, ColumnMapping], list[str]]:
-    """Take the temperatures of the weather for tenths of degC as well, where those of the greenhouse are.
+    """Take pipes, wind and the temperatures of the weather for tenths as well, where those of the greenhouse are.
 
     Args:
         rules: of the quantities, by name.
@@ -34,12 +44,12 @@ def tenths_like_the_air(
         The rules, changed, and what was changed in sentences.
     """
     changed, notes = dict(rules), list[str]()
-    for name in ("outdoor_temperature", "sky_temperature"):
+    for name in LIKE_THE_AIR:
         if name in rules and name in whole and not units.get(name) and rules[name].scale == 1.0:
             changed[name] = replace(rules[name], scale=0.1)
             notes.append(
-                f"{rules[name].column!r} has no unit: taken for tenths of degC, as those of the greenhouse are "
-                f"(--unit {name}='degC' says otherwise)"
+                f"{rules[name].column!r} has no unit: taken for tenths of {QUANTITIES[name].unit}, as those of the "
+                f"greenhouse are (--unit {name}={QUANTITIES[name].unit!r} says otherwise)"
             )
     return changed, notes
 

@@ -21,6 +21,9 @@ HOTTEST_MEDIAN = 42.0
 """degC: no greenhouse and no place on earth has a higher median."""
 LEAST_VALUES = 24
 
+DRIEST = 0.5
+"""Of a relative humidity from 0 to 1: the median of no greenhouse is less."""
+
 RELATIVE_IN_PER_CENT = "take the column of relative humidity in %, not g m-3 or kPa"
 FAHRENHEIT = Remedy(5.0 / 9.0, -160.0 / 9.0)
 _KELVIN = Remedy(1.0, -273.15)
@@ -96,7 +99,12 @@ def _pipe(name: str, values: Floats) -> DataFault | None:
 
 def _humidity(name: str, values: Floats) -> DataFault | None:
     middle, high = (float(one) for one in np.quantile(values, (0.5, 0.995)))
-    if high <= 1.05 and middle > 0.1:
+    if middle > 100.5 and high <= 1005.0:
+        return in_another_unit(
+            "tenths", name, f"{name} has a median of {middle:.4g}, so it is in tenths of %", Remedy(0.1)
+        )
+    # A deficit in kPa lies there too, and is small where the air is damp.
+    if high <= 1.05 and middle > (DRIEST if name == "air_humidity" else 0.1):
         percent = Remedy(100.0)
         seen = f"{name} lies between 0 and 1 (median {middle:.2f}), so it is a fraction"
         return in_another_unit("fraction", name, seen, percent)
