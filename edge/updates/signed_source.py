@@ -130,7 +130,11 @@ def _reason(error: Exception) -> str:
     """Say in the words of an operator what the library refused."""
     text = (str(error).strip().splitlines() or [""])[0][:160]
     kinds: tuple[tuple[type[Exception] | tuple[type[Exception], ...], str], ...] = (
-        (ExpiredMetadataError, "the signatures have expired: the trainer publishes no more, or news is held back"),
+        (
+            ExpiredMetadataError,
+            "the signatures have expired: `igrow-trainer publish --refresh` at the trainer renews them, or news "
+            "is held back",
+        ),
         (BadVersionNumberError, "older than what this gateway has already seen (rollback)"),
         (UnsignedMetadataError, "not signed by the keys that this gateway trusts"),
         (LengthOrHashMismatchError, "a file is not the one that was signed (tampered with or cut short)"),

@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from igrow.core import air
+from igrow.core.arrays import Floats
 from igrow.core.local_time import to_local
 from igrow.core.telemetry import Telemetry, to_grid
 from igrow.trainer.data import read_log
@@ -148,8 +149,8 @@ def test_a_sum_since_midnight_keeps_the_unit_that_its_name_tells(
     assert_reads_as(tmp_path, log)
 
 
-def deficit(log: Telemetry) -> np.ndarray:
-    saturated = air.saturation_pressure(np, log["air_temperature"])
+def deficit(log: Telemetry) -> Floats:
+    saturated: Floats = air.saturation_pressure(np, log["air_temperature"])
     return saturated * (1.0 - 0.01 * log["air_humidity"]) / 1000.0
 
 
