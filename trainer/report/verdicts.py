@@ -13,10 +13,10 @@ from igrow.trainer.report.sentences import TEXTS
 def verdict(result: Diagnosis, language: Language) -> str:
     """Return the first sentence; it never says that a model fits where its own errors say that it does not."""
     kind = result.told
-    if result.uncalibrated:
-        return language.text(TEXTS["elsewhere"][kind] if kind == result.verdict else NO_NAME)
+    if kind != result.verdict:
+        return language.text(NO_NAME)
     wrong = kind in TEXTS["no_fit"] and result.misfits
-    told = TEXTS["no_fit"] if wrong else TEXTS["verdicts"]
+    told = TEXTS["elsewhere"] if result.uncalibrated else TEXTS["no_fit"] if wrong else TEXTS["verdicts"]
     return language.text(told[kind])
 
 
