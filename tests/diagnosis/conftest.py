@@ -11,6 +11,7 @@ from scipy.signal import lfilter
 
 from igrow.core.simulator.hybrid.nominal import nominal
 from igrow.trainer.data import Log, prepare_log
+from igrow.trainer.diagnosis import Diagnosis, diagnose
 from igrow.trainer.fit import FittedModel, Gaussian
 from tests.made_once import made_once
 from tests.virtual_log import SITE, virtual_log, weather
@@ -57,6 +58,13 @@ def model_in_force() -> FittedModel:
 def quiet_log() -> Log:
     """Nothing is missing."""
     return greenhouse_log(1)
+
+
+@pytest.fixture(scope="session")
+@made_once
+def quiet_diagnosis() -> Diagnosis:
+    """What is said of a log in which nothing is missing."""
+    return diagnose(greenhouse_log(1), model_in_force())
 
 
 @pytest.fixture(scope="session")

@@ -13,10 +13,12 @@ from igrow.trainer.diagnosis import DEFAULT, Diagnosis, actuators, diagnose
 from igrow.trainer.diagnosis.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import knowledge_of
 from tests.diagnosis.conftest import DAYS, STEP, greenhouse_log, model_in_force
+from tests.made_once import made_once
 from tests.virtual_log import SITE
 
 
 @pytest.fixture(scope="module")
+@made_once
 def unlit(quiet_log: Log) -> Diagnosis:
     return diagnose(quiet_log.without("lamp_power"), model_in_force())
 
@@ -32,8 +34,10 @@ def test_lamps_that_the_log_lacks_are_named_as_such(unlit: Diagnosis, quiet_log:
     assert unlit.corrected.effects == ()
 
 
-def test_errors_are_those_of_the_log_as_it_is_until_the_correction(unlit: Diagnosis, quiet_log: Log) -> None:
-    whole = diagnose(quiet_log, model_in_force()).errors["air_temperature"]["24_h"]
+def test_errors_are_those_of_the_log_as_it_is_until_the_correction(
+    unlit: Diagnosis, quiet_diagnosis: Diagnosis
+) -> None:
+    whole = quiet_diagnosis.errors["air_temperature"]["24_h"]
     day = unlit.errors["air_temperature"]["24_h"]
     assert day["deployed"] > 1.2 * whole["deployed"]
     assert day["recalibrated"] > 1.2 * whole["recalibrated"]

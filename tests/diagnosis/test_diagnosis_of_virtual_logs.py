@@ -25,6 +25,7 @@ from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.report import render_report, write_diagnosis
 from tests.diagnosis.conftest import DAYS, STEP, greenhouse_log, model_in_force
+from tests.made_once import made_once
 from tests.virtual_log import SITE
 
 LEAK = 0.12
@@ -32,18 +33,18 @@ LEAK = 0.12
 
 
 @pytest.fixture(scope="module")
+@made_once
 def leak(leaky_log: Log) -> Diagnosis:
     return diagnose(leaky_log, model_in_force())
 
 
-def test_nothing_is_claimed_where_nothing_is_missing(quiet_log: Log) -> None:
-    result = diagnose(quiet_log, model_in_force())
-    assert result.verdict == "nothing"
-    assert result.findings == ()
-    assert result.exit_code == 0
+def test_nothing_is_claimed_where_nothing_is_missing(quiet_diagnosis: Diagnosis) -> None:
+    assert quiet_diagnosis.verdict == "nothing"
+    assert quiet_diagnosis.findings == ()
+    assert quiet_diagnosis.exit_code == 0
     # The recalibrated model is there to ship nevertheless.
-    assert result.corrected.effects == ()
-    assert result.corrected.posterior.values != result.model.posterior.values
+    assert quiet_diagnosis.corrected.effects == ()
+    assert quiet_diagnosis.corrected.posterior.values != quiet_diagnosis.model.posterior.values
 
 
 def test_a_leak_is_named_with_its_size_and_form(leak: Diagnosis) -> None:
