@@ -18,7 +18,7 @@ INTERVAL = 300
 class RunningDaemon:
     """A daemon in lock-step with a simulated greenhouse: a cycle is 300 s of plant time."""
 
-    def __init__(self, folder: Path, *, days: int = 90, extra: str = "") -> None:
+    def __init__(self, folder: Path, *, days: int = 90, extra: str = "", begin: str = "2020-01-15") -> None:
         self.folder = folder
         self.state = folder / "state"
         self.daemon: subprocess.Popen[bytes] | None = None
@@ -28,7 +28,7 @@ class RunningDaemon:
         register_map = ROOT / "config" / "register-maps" / "virtual-plc.yaml"
         command = [*COMMAND, "simulate-plc", "--map", str(register_map), "--port", "0"]
         self.plc = subprocess.Popen(
-            [*command, "--pace", f"lockstep={INTERVAL}", "--days", str(days)],
+            [*command, "--pace", f"lockstep={INTERVAL}", "--days", str(days), "--start", begin],
             stdout=subprocess.PIPE,
             env=self._environment,
         )
