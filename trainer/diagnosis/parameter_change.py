@@ -49,7 +49,8 @@ def find(design: Design, rng: np.random.Generator) -> ParameterChange | None:
     null, onsets = linear.fit(design.grams, design.null_model()), search.onset_days(design)
     scored = score(design, null, onsets, rng)
     net = {one.parameter: change.proven_gain(design, one) - _needed_gain(design, one) for one in scored}
-    visible = (one for one in scored if one.parameter in VISIBLE)
+    # Of what is none at the calibration there is no share.
+    visible = (one for one in scored if one.parameter in VISIBLE and _range(design, one.parameter)[0] > 0.0)
     best = max(visible, key=lambda one: net[one.parameter], default=None)
     if best is None or net[best.parameter] < 0.0:
         return None
