@@ -80,7 +80,9 @@ def test_the_same_log_and_seed_give_the_same_answer(leak: Diagnosis, leaky_log: 
 
 def test_the_document_has_the_fields_that_are_promised(leak: Diagnosis) -> None:
     document = json.loads(json.dumps(leak.to_json(), allow_nan=False))
-    assert set(document) == {"verdict", "span", "findings", "errors", "worsened", "missing", "screened"}
+    assert set(document) == {
+        "verdict", "calibrated_here", "span", "findings", "errors", "worsened", "missing", "screened",
+    }  # fmt: skip
     assert set(document["span"]) == {"start", "end", "fit_days", "held_out_days"}
     finding = document["findings"][0]
     assert set(finding) == {
