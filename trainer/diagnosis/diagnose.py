@@ -171,7 +171,7 @@ class _Question:
                 days, knowledge, first, {name: stage for name, (stage, _) in stages.items()}, runs["24_h"]
             ),
             log=log,
-        )
+        ).settled()
 
     def _since(
         self,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -107,7 +107,7 @@ class Diagnosis:
     @property
     def exit_code(self) -> int:
         """Of the command."""
-        return EXIT_CODES[self.told]
+        return EXIT_CODES[self.verdict]
 
     @property
     def uncalibrated(self) -> bool:
@@ -115,9 +115,13 @@ class Diagnosis:
         return self.verdict != "data_fault" and self.model.calibrated_on != self.site
 
     @property
-    def told(self) -> Verdict:
-        """The verdict that is told: a model of another greenhouse that does not fit this one is sure of no name."""
-        return "ambiguous" if self.verdict == "named" and self.uncalibrated and self.misfits else self.verdict
+    def unsure(self) -> bool:
+        """The model is of another greenhouse and does not fit this one: no name that it gives is certain."""
+        return self.verdict in ("named", "ambiguous") and self.uncalibrated and bool(self.misfits)
+
+    def settled(self) -> Diagnosis:
+        """Return the diagnosis with no more certainty than its own errors allow."""
+        return replace(self, verdict="ambiguous") if self.unsure else self
 
     @property
     def worsened(self) -> tuple[str, ...]:
@@ -143,15 +147,15 @@ class Diagnosis:
 
     def __repr__(self) -> str:
         causes = ", ".join(one.effect for one in self.findings)
-        return f"Diagnosis({self.site!r}, {self.told}{': ' if causes else ''}{causes})"
+        return f"Diagnosis({self.site!r}, {self.verdict}{': ' if causes else ''}{causes})"
 
     def summary(self, typed: Sequence[str] = ()) -> str:
         """Return the verdict in a few lines for people; `typed` are the words of a command that read the log."""
-        lines = [f"{self.site}: {self.told}"]
+        lines = [f"{self.site}: {self.verdict}"]
         if self.uncalibrated:
             text, command = how_to_calibrate(self.log.days if self.log is not None else 0.0, typed)
             lines = [FIRST, text.format(command=command), *lines]
-            lines += [f"  {NO_NAME}"] if self.told != self.verdict else []
+            lines += [f"  {NO_NAME}"] if self.unsure else []
         lines += [f"  {one.sentence}" for one in self.findings]
         lines += [
             f"  as well it could be {', '.join(one.confounded[1:])}" for one in self.findings if one.confounded[1:]
@@ -213,7 +217,7 @@ class Diagnosis:
     def to_json(self) -> dict[str, Any]:
         """Return the document of `diagnosis.json`."""
         return {
-            "verdict": self.told,
+            "verdict": self.verdict,
             "calibrated_here": not self.uncalibrated,
             "span": {
                 "start": _time(self.start),

@@ -12,8 +12,8 @@ from igrow.trainer.report.sentences import TEXTS
 
 def verdict(result: Diagnosis, language: Language) -> str:
     """Return the first sentence; it never says that a model fits where its own errors say that it does not."""
-    kind = result.told
-    if kind != result.verdict:
+    kind = result.verdict
+    if result.unsure:
         return language.text(NO_NAME)
     wrong = kind in TEXTS["no_fit"] and result.misfits
     told = TEXTS["elsewhere"] if result.uncalibrated else TEXTS["no_fit"] if wrong else TEXTS["verdicts"]

@@ -139,7 +139,7 @@ def _diagnose(site: Site, log: SiteLog, bundle: Bundle, target: Path, now: datet
     sound = diagnosis.verdict != "data_fault"
     write_bundle = partial(seasons.export_planned, diagnosis.corrected, now) if sound else None
     causes = tuple(one.effect for one in diagnosis.findings)
-    return Diagnosed(diagnosis.told, causes, relative_gain(diagnosis.errors), tuple(diagnosis.notes), write_bundle)
+    return Diagnosed(diagnosis.verdict, causes, relative_gain(diagnosis.errors), tuple(diagnosis.notes), write_bundle)
 
 
 def relative_gain(errors: Mapping[str, Mapping[str, Mapping[str, float]]]) -> float:
