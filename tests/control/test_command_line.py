@@ -26,6 +26,8 @@ from igrow.edge.ports import Plan
 from igrow.edge.sources.override import read_leases
 from igrow.edge.state_lock import StateLock
 from tests.control.daemon_bench import Plant, free_port, running, status_port, until, write_files
+from tests.service.attacked_daemon import DAEMON, SITE
+from tests.service.test_exchanged_units import MAP as TWO_UNITS
 
 
 def call(capsys, *arguments: object) -> tuple[int, str, str]:
@@ -65,6 +67,26 @@ def test_check_config_says_what_a_configuration_means(tmp_path, capsys):
     assert "heating_setpoint: 12 to 28, safe 18, 4 per hour" in out
     assert re.search(r"bus line is busy \d+ % of the time", out)
     assert "interlock wind: NOT AT WORK, as nothing that it moves can be written (vent_" in out
+
+
+@pytest.mark.parametrize(
+    ("heating", "dosing", "identities"),
+    [("", "", 0), ("11", "", 1), ("11", "12", 2)],
+)
+def test_check_config_says_which_units_can_be_told_apart(tmp_path, capsys, heating, dosing, identities):
+    shown = {"heating": heating, "dosing": dosing}
+    text = TWO_UNITS.replace("{{", "{").replace("}}", "}").replace("{host}", "127.0.0.1").replace("{port}", "5020")
+    for unit, content in shown.items():
+        identity = f", identity: {{function: input, address: 2, content: [{content}]}}" if content else ""
+        text = text.replace(f"{{{unit}}}", identity)
+    for name, content in {"map.yaml": text, "site.yaml": SITE, "daemon.yaml": DAEMON}.items():
+        (tmp_path / name).write_text(content)
+    code, out, _ = call(capsys, "check-config", tmp_path / "daemon.yaml")
+    assert code == 0
+    assert [line for line in out.splitlines() if line.startswith("  identity")] == [
+        f"  identity  {unit}: {content} in input 2" for unit, content in shown.items() if content
+    ]
+    assert ("dosing and heating have their setpoints in the same registers" in out) == (identities == 0)
 
 
 def test_check_config_names_files_that_are_not_there_and_a_crop_that_is_described_as_another(tmp_path, capsys):
