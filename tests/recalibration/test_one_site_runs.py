@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from datetime import UTC, datetime, timedelta
+from dataclasses import replace
+from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.service import first_calibration, history, recalibration
-from igrow.trainer.service.archive import Archive
+from igrow.trainer.service.archive import Archive, SiteLog
 from igrow.trainer.service.recalibration import Diagnosed, recalibrate, relative_gain
 from igrow.trainer.service.site_memory import bundle_in_force, forget_old
 from tests.tiny_bundle import write_tiny_bundle
@@ -211,3 +212,30 @@ def test_the_command_goes_on_after_a_bad_site_and_its_exit_code_tells(tmp_path: 
         lines = capsys.readouterr().out.splitlines()
         assert lines[0].startswith("bad: error; ")
         assert lines[1].startswith("empty: error; no telemetry of site empty")
+
+
+def test_a_new_crop_is_calibrated_on_its_own_weeks(tmp_path: Path, monkeypatch) -> None:
+    """Ten days before the planting, thirty since; the bundle of before was calibrated on the site itself."""
+    default, seen = read_bundle(default_bundle_folder()), list[SiteLog]()
+    own = replace(default, manifest=replace(default.manifest, calibrated_on="house"))
+    end = history.Turn("calibrate", "house", NOON, "calibrated", False, "calibrated on the new crop")
+
+    def calibrate(_site: Site, log: SiteLog, *_: object) -> history.Turn:
+        seen.append(log)
+        return end
+
+    monkeypatch.setattr(first_calibration, "_calibrate", calibrate)
+    monkeypatch.setattr(first_calibration, "_has_new_crop", lambda site, *_: site.crop.planting_date.year == 2020)
+    monkeypatch.setattr(first_calibration, "bundle_in_force", lambda *_: (own, ()))
+    weeks = Archive(tmp_path / "archive")
+    time = np.datetime64("2020-01-20T00:00:00") + np.arange(0, 40 * 86_400, 3600).astype("timedelta64[s]")
+    weeks.add_telemetry("house", Telemetry(time, {"air_temperature": np.full(len(time), 20.0)}))
+
+    def turn(day: date) -> str:
+        site = replace(SITE, crop=replace(SITE.crop, planting_date=day))
+        return first_calibration.calibrate_first(site, weeks, tmp_path / "state", refuse, now=NOON, days=60).note
+
+    assert "was calibrated on it already" in turn(date(2019, 12, 1))
+    assert turn(date(2020, 2, 10)).endswith("days of log are there, 28 are needed")
+    assert turn(date(2020, 1, 30)) == end.note
+    assert seen[0].telemetry.time[0] == np.datetime64("2020-01-30T00:00:00")

@@ -182,6 +182,16 @@ def test_a_log_without_leaf_area_gets_the_crops_usual_course_and_says_so() -> No
     assert (np.diff(curve) >= 0.0).all()
 
 
+def test_before_a_planting_an_older_crop_stands() -> None:
+    site = Site(name="replanted", latitude=0, longitude=0, crop=Crop(planting_date=date(2020, 2, 1)))
+    days = np.datetime64("2020-02-01T00:00:00", "s") + np.arange(-40, 80) * np.timedelta64(1, "D")
+    curve = leaf_area_curve(site, days)
+    assert (curve[:40] == 3.0).all()
+    assert curve[40] < 0.2
+    assert curve[-1] > 2.9
+    assert (leaf_area_curve(site, days[20:])[:20] < 0.2).all()
+
+
 def test_a_coarser_record_keeps_what_was_measured_and_the_means_of_what_drove_it() -> None:
     record = site_record(virtual_log(1), SITE, 300.0)
     coarse = record.coarser(3)

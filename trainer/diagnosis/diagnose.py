@@ -22,7 +22,7 @@ from igrow.trainer.diagnosis import history, wording
 from igrow.trainer.diagnosis.actuators import REPLACEABLE, Completed, complete
 from igrow.trainer.diagnosis.candidates import hidden_by_missing_weather
 from igrow.trainer.diagnosis.correction import Corrected, correct, corrected_model, may_give_way, with_parameter
-from igrow.trainer.diagnosis.diagnosed_days import newest_weeks, since_calibration
+from igrow.trainer.diagnosis.diagnosed_days import has_new_crop, newest_weeks, of_one_crop, since_calibration
 from igrow.trainer.diagnosis.drift import Drift
 from igrow.trainer.diagnosis.estimate import normal_quantile
 from igrow.trainer.diagnosis.evidence import Evidence
@@ -102,8 +102,11 @@ class _Question:
             rivals: faults of sensors that explain it there as well.
         """
         model, rules, progress, site = self.model, self.rules, self.progress, log.known_site
-        knowledge = knowledge_of(model, site, rules)
         since, notes = since_calibration(log, model, rules)
+        since, left_out = of_one_crop(since, rules)
+        new_crop = has_new_crop(since.telemetry.time, site, model)
+        rules = rules.for_new_crop() if new_crop else rules
+        knowledge = knowledge_of(model, site, rules)
         log = newest_weeks(since, knowledge, rules)
         progress("completing the log")
         logged, rng = log_days(log, model), np.random.default_rng(self.seed)
@@ -118,7 +121,7 @@ class _Question:
         found = [replace(one, confounded=(*one.confounded, *unseen)) for one in found]
         # A parameter can stand in for an actuator that the log lacks, found or not.
         lacking = not set(REPLACEABLE).isdisjoint(logged.record.missing)
-        parameter = None if lacking else search.changed_parameter(rng) or asked
+        parameter = None if lacking or new_crop else search.changed_parameter(rng) or asked
         if parameter is not None and parameter.leads and parameter.onset is not None:
             if (told := self._since(parameter, parameter.onset.time, log, notes)) is not None:
                 return told
@@ -126,7 +129,7 @@ class _Question:
             parameter = None
         leads = parameter is not None and parameter.leads
         progress("correcting the model")
-        found, patterns = ([], ()) if leads else (found, last.patterns)
+        found, patterns = ([], ()) if leads or new_crop else (found, last.patterns)
         result = correct(days, knowledge, found, patterns, site.longitude, rules)
         if parameter is not None and not patterns and may_give_way(result.kept):
             faults = [one.term for one in result.kept] or rivals
@@ -145,6 +148,8 @@ class _Question:
         corrected = corrected_model(model, result, findings, errors, knowledge.discrepancy, (start, end), crop)
         notes = (
             *notes,
+            *left_out,
+            *((wording.NEW_CROP,) if new_crop else ()),
             *((wording.NOT_CALIBRATED,) if knowledge.transferred else ()),
             *((wording.NEWEST,) if log is not since else ()),
             *wording.thin_air(site),

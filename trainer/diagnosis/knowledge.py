@@ -73,7 +73,8 @@ def knowledge_of(model: FittedModel, site: Site, rules: DecisionRules) -> Knowle
     if not at_home:
         posterior = posterior.widened(drift(posterior.values, rules.transferred_drift, rules))
     # Fits to free runs may move further than a greenhouse changes: a parameter also stands in for what has no name.
-    prior = posterior.widened(drift(posterior.values, rules.parameter_drift, rules))
+    usual = drift(posterior.values, rules.parameter_drift, rules)
+    prior = posterior.widened(np.maximum(usual, home_drift(posterior.values, rules)))
     history = model.history if at_home and rules.history else None
     low, high = bounds(prior.names)
     shift = np.array([discrepancy.get(PARAMETER_PREFIX + name, 0.0) for name in prior.names])

@@ -28,6 +28,10 @@ NEWEST = N_(
     "Within more than six weeks a crop changes: what has changed since the calibration was looked for in the newest "
     "six."
 )
+NEW_CROP = N_(
+    "A new crop was planted since the calibration: what it does otherwise cannot be told from a fault, so that none is "
+    "looked for. Calibrate once four weeks of the new crop are there (igrow-trainer calibrate)."
+)
 THIN_AIR = N_(
     "This greenhouse lies high, and the simulator counts with air as it is at the sea: amounts of CO2, and of heat "
     "that goes with the air, are told too large, by 13 % at 1000 m, 27 % at 2000 m and 43 % at 3000 m."

@@ -1,11 +1,12 @@
-"""The first bundle of a site's own: calibrated on its log once four weeks of it are there.
+"""The first bundle of a site's own, or of its new crop: calibrated on its log once four weeks of it are there.
 
 A new gateway plans with the built-in bundle, which knows its greenhouse by description alone. From the first bundle on
-that was calibrated on the site itself, `recalibration.py` goes on.
+that was calibrated on the site itself, `recalibration.py` goes on, until a new crop is planted.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import datetime, timedelta
 from functools import partial
 from pathlib import Path
@@ -40,7 +41,7 @@ def calibrate_first(
     days: int,
     population: Path | None = None,
 ) -> Turn:
-    """Calibrate a site that has no bundle of its own, and publish it where it is better than the built-in one.
+    """Calibrate a site that has no bundle of its own, or of its crop, and publish it where it is better.
 
     Never raises for what the site sent: an error is a line of its history. Raises as `history.keep` does.
 
@@ -56,8 +57,10 @@ def calibrate_first(
     log = archive.read(site.name, (now - timedelta(days=days)).date(), now.date() + timedelta(days=2))
     bundle, notes = bundle_in_force(folder, log.reports)
     if bundle.manifest.calibrated_on == site.name:
-        note = f"{bundle.label} was calibrated on it already; recalibrate corrects it"
-        return Turn(COMMAND, site.name, now, "waiting", False, note, notes=notes)
+        if not _has_new_crop(site, log, bundle):
+            note = f"{bundle.label} was calibrated on it already; recalibrate corrects it"
+            return Turn(COMMAND, site.name, now, "waiting", False, note, notes=notes)
+        log = replace(log, telemetry=log.telemetry.select(np.datetime64(site.crop.planting_date, "s")))
     time = log.telemetry.time
     length = 0.0 if len(time) == 0 else float((time[-1] - time[0]) / np.timedelta64(1, "D"))
     if length < LEAST_DAYS:
@@ -65,6 +68,13 @@ def calibrate_first(
         return Turn(COMMAND, site.name, now, "waiting", False, note, notes=notes)
     work = partial(_calibrate, site, log, bundle, folder, publish_bundle, now, population)
     return history.keep(folder, COMMAND, site.name, now, work)
+
+
+def _has_new_crop(site: Site, log: SiteLog, bundle: Bundle) -> bool:
+    from igrow.trainer.diagnosis.diagnosed_days import has_new_crop  # noqa: PLC0415  (scipy is slow to import)
+    from igrow.trainer.exporting import read_model  # noqa: PLC0415
+
+    return has_new_crop(log.telemetry.time, site, read_model(bundle, site))
 
 
 def _calibrate(

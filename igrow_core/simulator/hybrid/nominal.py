@@ -23,6 +23,9 @@ _CANOPIES = {"tomato": (3.0, 35.0, 9.0), "cucumber": (3.2, 20.0, 6.0)}
 Usual figures of Dutch practice; the transpiration and assimilation parameters of a site absorb their error.
 """
 
+_EMPTY_DAYS = 30.0
+"""Longest time that a greenhouse stands empty before a planting."""
+
 
 def nominal(site: Site) -> dict[str, float]:
     """Return the physical parameters of a site by name, from its description alone, within their bounds.
@@ -70,13 +73,12 @@ def _within_bounds(values: Mapping[str, float]) -> dict[str, float]:
 def leaf_area_curve(site: Site, time: Times) -> Floats:
     """Return an estimate of the leaf area index over time, (n,), from the species and the planting date.
 
-    A logistic rise; a planting date that the log does not follow within a year counts as a full canopy.
+    A logistic rise. Before the planting an older crop stands, with a full canopy, where the log began long before it.
     """
     full, half, width = _CANOPIES.get(site.crop.species.lower(), _CANOPIES["tomato"])
     days = (time - np.datetime64(site.crop.planting_date, "s")).astype(np.float64) / 86_400.0
-    if len(days) == 0 or days[0] < -30.0 or days[0] > 365.0:
-        return np.full(len(time), full)
-    curve: Floats = full / (1.0 + np.exp(-(days - half) / width))
+    older = (days < 0.0) & np.any(days[:1] < -_EMPTY_DAYS)
+    curve: Floats = full / (1.0 + np.exp(-(np.where(older, np.inf, days) - half) / width))
     return curve
 
 

@@ -1,0 +1,85 @@
+"""A crop that was planted since the calibration: what it does otherwise than the one before is no fault."""
+
+from __future__ import annotations
+
+import datetime
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.data import Log
+from igrow.trainer.diagnosis import diagnose, wording
+from igrow.trainer.diagnosis.diagnosed_days import has_new_crop, of_one_crop
+from igrow.trainer.diagnosis.knowledge import knowledge_of
+from igrow.trainer.diagnosis.rules import DEFAULT
+from igrow.trainer.fit import FittedModel
+from igrow.trainer.fit.discrepancy import Discrepancy
+from igrow.trainer.fit.gaussian import Gaussian
+from tests.diagnosis.conftest import STEP, model_in_force
+
+PLANTED = np.datetime64("2020-03-10T00:00:00", "s")
+
+
+def log_of(log: Log, first: int, last: int) -> Log:
+    """An hourly log from so many days after the planting to so many."""
+    time = PLANTED + np.arange(24 * first, 24 * last) * np.timedelta64(1, "h")
+    site = log.known_site
+    crop = replace(site.crop, planting_date=PLANTED.astype("datetime64[D]").item())
+    return replace(log, telemetry=Telemetry(time, {}), site=replace(site, crop=crop))
+
+
+def calibrated(middle: np.datetime64) -> FittedModel:
+    """A model whose history was learned from weeks about a time, at other steps than these logs have."""
+    model = model_in_force()
+    learned = Discrepancy(model.posterior.values, Gaussian((), np.zeros(0), np.zeros((0, 0))), {}, STEP, {}, middle)
+    return replace(model, history=learned)
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "kept", "said"),
+    [
+        (-20, 10, (0, 10), "the days before are left out"),
+        (-20, 5, (-20, 0), "less than a week ago"),
+        (-4, 4, (-4, 4), ""),
+        (1, 20, (1, 20), ""),
+        (-20, -1, (-20, -1), ""),
+    ],
+)
+def test_a_log_is_of_one_crop(quiet_log: Log, first: int, last: int, kept: tuple[int, int], said: str) -> None:
+    found, notes = of_one_crop(log_of(quiet_log, first, last), DEFAULT)
+    assert (found.telemetry.time == log_of(quiet_log, *kept).telemetry.time).all()
+    assert said in "".join(notes)
+    assert bool(notes) is bool(said)
+
+
+def test_a_crop_is_new_where_the_calibration_was_mostly_of_another(quiet_log: Log) -> None:
+    before, after = (calibrated(PLANTED + np.timedelta64(days, "D")) for days in (-30, 30))
+    later, earlier = log_of(quiet_log, 1, 20), log_of(quiet_log, -20, -1)
+    for log, model, new in ((later, before, True), (later, after, False), (earlier, before, False)):
+        assert has_new_crop(log.telemetry.time, log.known_site, model) is new
+    assert not has_new_crop(later.telemetry.time, later.known_site, model_in_force())
+
+
+def test_of_a_new_crop_nothing_is_named_and_the_model_follows_it(leaky_log: Log) -> None:
+    site = leaky_log.known_site
+    planted = leaky_log.telemetry.time[0].astype("datetime64[D]").item() - datetime.timedelta(days=100)
+    crop = replace(site.crop, planting_date=planted)
+    log = replace(leaky_log, site=replace(site, crop=crop))
+    model = calibrated(np.datetime64(f"{planted}T00:00:00") - np.timedelta64(60, "D"))
+    result = diagnose(log, model)
+    assert (result.verdict, result.findings) == ("nothing", ())
+    assert wording.NEW_CROP in result.notes
+    day = result.errors["air_humidity"]["24_h"]
+    assert day["corrected"] == day["recalibrated"] < day["deployed"]
+
+
+def test_another_crop_may_differ_more_than_the_walls() -> None:
+    model = model_in_force()
+    usual, new = (
+        knowledge_of(model, model.site, rules).prior.standard_deviation for rules in (DEFAULT, DEFAULT.for_new_crop())
+    )
+    wider = {name for name, one, two in zip(model.posterior.names, usual, new, strict=True) if two > 2.0 * one}
+    assert {"transpiration_radiation", "transpiration_deficit", "assimilation_light", "respiration"} <= wider
+    assert not {"transmissivity", "leakage_wind", "vent_wind", "cover_heat_transfer"} & wider
