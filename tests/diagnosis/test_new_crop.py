@@ -11,7 +11,7 @@ import pytest
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import Log
 from igrow.trainer.diagnosis import diagnose, wording
-from igrow.trainer.diagnosis.diagnosed_days import has_new_crop, of_one_crop
+from igrow.trainer.diagnosis.crop import has_new_crop, of_one_crop, with_its_drift
 from igrow.trainer.diagnosis.knowledge import knowledge_of
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.fit import FittedModel
@@ -75,11 +75,22 @@ def test_of_a_new_crop_nothing_is_named_and_the_model_follows_it(leaky_log: Log)
     assert day["corrected"] == day["recalibrated"] < day["deployed"]
 
 
-def test_another_crop_may_differ_more_than_the_walls() -> None:
+def test_a_crop_that_grew_unmeasured_may_differ_as_far_as_its_usual_course_says(quiet_log: Log) -> None:
+    log = log_of(quiet_log, 56, 84)
+    measured = replace(log, telemetry=Telemetry(log.telemetry.time, {"leaf_area_index": np.full(28 * 24, 3.0)}))
+    young, grown, other = (calibrated(PLANTED + np.timedelta64(days, "D")) for days in (28, 100, -60))
+    drifts = [with_its_drift(DEFAULT, log, one).crop_drift for one in (other, young, grown)]
+    assert drifts[0] == DEFAULT.new_crop_drift
+    assert DEFAULT.new_crop_drift > drifts[1] > 5.0 * DEFAULT.crop_drift
+    assert drifts[2] == DEFAULT.crop_drift
+    assert with_its_drift(DEFAULT, measured, young) == DEFAULT
+    assert with_its_drift(DEFAULT, log, model_in_force()) == DEFAULT
+
+
+def test_a_crop_may_differ_more_than_the_walls() -> None:
     model = model_in_force()
-    usual, new = (
-        knowledge_of(model, model.site, rules).prior.standard_deviation for rules in (DEFAULT, DEFAULT.for_new_crop())
-    )
+    another = replace(DEFAULT, crop_drift=DEFAULT.new_crop_drift)
+    usual, new = (knowledge_of(model, model.site, one).prior.standard_deviation for one in (DEFAULT, another))
     wider = {name for name, one, two in zip(model.posterior.names, usual, new, strict=True) if two > 2.0 * one}
     assert {"transpiration_radiation", "transpiration_deficit", "assimilation_light", "respiration"} <= wider
     assert not {"transmissivity", "leakage_wind", "vent_wind", "cover_heat_transfer"} & wider

@@ -22,7 +22,8 @@ from igrow.trainer.diagnosis import history, wording
 from igrow.trainer.diagnosis.actuators import REPLACEABLE, Completed, complete
 from igrow.trainer.diagnosis.candidates import hidden_by_missing_weather
 from igrow.trainer.diagnosis.correction import Corrected, correct, corrected_model, may_give_way, with_parameter
-from igrow.trainer.diagnosis.diagnosed_days import has_new_crop, newest_weeks, of_one_crop, since_calibration
+from igrow.trainer.diagnosis.crop import has_new_crop, of_one_crop, with_its_drift
+from igrow.trainer.diagnosis.diagnosed_days import newest_weeks, since_calibration
 from igrow.trainer.diagnosis.drift import Drift
 from igrow.trainer.diagnosis.estimate import normal_quantile
 from igrow.trainer.diagnosis.evidence import Evidence
@@ -104,8 +105,7 @@ class _Question:
         model, rules, progress, site = self.model, self.rules, self.progress, log.known_site
         since, notes = since_calibration(log, model, rules)
         since, left_out = of_one_crop(since, rules)
-        new_crop = has_new_crop(since.telemetry.time, site, model)
-        rules = rules.for_new_crop() if new_crop else rules
+        new_crop, rules = has_new_crop(since.telemetry.time, site, model), with_its_drift(rules, since, model)
         knowledge = knowledge_of(model, site, rules)
         log = newest_weeks(since, knowledge, rules)
         progress("completing the log")

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from igrow.core.arrays import Times
-from igrow.core.site import Site
 from igrow.trainer.data.log import Log
 from igrow.trainer.diagnosis.knowledge import Knowledge
 from igrow.trainer.diagnosis.rules import DecisionRules
@@ -32,29 +30,3 @@ def newest_weeks(log: Log, knowledge: Knowledge, rules: DecisionRules) -> Log:
         return log
     # So many local days at most, the first and the last of them cut.
     return log.select(log.telemetry.time[-1] - np.timedelta64(round((rules.long_days - 1.0) * 86_400.0), "s"))
-
-
-def of_one_crop(log: Log, rules: DecisionRules) -> tuple[Log, tuple[str, ...]]:
-    """Return the days of a log since its crop was planted, with a note; those before where that is less than a week."""
-    planted, time = log.known_site.crop.planting_date, log.telemetry.time
-    first = np.datetime64(planted, "s")
-    if not time[0] < first <= time[-1]:
-        return log, ()
-    since, before = log.select(first), log.select(end=first)
-    if since.days >= rules.least_days:
-        return since, (f"The crop was planted on {planted}: the days before are left out.",)
-    if before.days >= rules.least_days:
-        return before, (f"The crop was planted on {planted}, less than a week ago: the days since are left out.",)
-    return log, ()
-
-
-def has_new_crop(time: Times, site: Site, model: FittedModel) -> bool:
-    """Tell whether the crop in which a log ends is none that its model was calibrated on, or only in the later half.
-
-    Args:
-        time: of the log, UTC, (n,).
-        site: as it is described now.
-        model: in force.
-    """
-    known, planted = model.history, np.datetime64(site.crop.planting_date, "s")
-    return known is not None and bool(np.any(time[-1:] >= planted)) and bool(known.middle < planted)

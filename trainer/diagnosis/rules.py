@@ -7,7 +7,7 @@ which the command that fits them writes together with where they come from.
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib.resources import files
 from typing import Any
 
@@ -59,7 +59,7 @@ class DecisionRules:
     least_omission_fall: float = _chosen(0.02, "share of the error of unseen weeks that an omitted term must remove")
     wall_drift: float = _tuned(0.015, "relative change of a parameter within some weeks, by physics")
     crop_drift: float = _tuned(0.05, "the same of a parameter of the crop")
-    new_crop_drift: float = _chosen(0.5, "the same of another crop, planted since the calibration")
+    new_crop_drift: float = _chosen(0.5, "the same of a crop that the calibration has not seen, or of so much of it")
     effect_drift: float = _tuned(0.02, "change of an effect in the discrepancy, in typical amplitudes")
     pattern_drift: float = _tuned(0.005, "the same of a pattern, in its units")
     change_onset_price: float = _tuned(12.0, "gain that a beginning of a change must add")
@@ -159,10 +159,6 @@ class DecisionRules:
     def learns_history(self, days: float) -> bool:
         """Tell whether a calibration log of so many days is to teach what is missing in this greenhouse."""
         return self.history and days >= self.least_history_days
-
-    def for_new_crop(self) -> DecisionRules:
-        """Return the rules for a log of another crop than that of the calibration."""
-        return replace(self, crop_drift=self.new_crop_drift)
 
     def gain_of_cause(self, *, time_steps: bool, transferred: bool) -> float:
         """Return what a cause must gain."""

@@ -71,7 +71,7 @@ def calibrate_first(
 
 
 def _has_new_crop(site: Site, log: SiteLog, bundle: Bundle) -> bool:
-    from igrow.trainer.diagnosis.diagnosed_days import has_new_crop  # noqa: PLC0415  (scipy is slow to import)
+    from igrow.trainer.diagnosis.crop import has_new_crop  # noqa: PLC0415  (scipy is slow to import)
     from igrow.trainer.exporting import read_model  # noqa: PLC0415
 
     return has_new_crop(log.telemetry.time, site, read_model(bundle, site))

@@ -82,6 +82,11 @@ def leaf_area_curve(site: Site, time: Times) -> Floats:
     return curve
 
 
+def measures_leaf_area(telemetry: Telemetry) -> bool:
+    """Tell whether a log has a leaf area."""
+    return "leaf_area_index" in telemetry and bool(np.isfinite(telemetry["leaf_area_index"]).any())
+
+
 def site_record(telemetry: Telemetry, site: Site, step: float) -> Record:
     """Return the record of a site's log on a grid of `step` seconds.
 
@@ -90,7 +95,7 @@ def site_record(telemetry: Telemetry, site: Site, step: float) -> Record:
     Raises:
         TelemetryError: the log has no outdoor_temperature or no air_temperature.
     """
-    estimated = "leaf_area_index" not in telemetry or not np.isfinite(telemetry["leaf_area_index"]).any()
+    estimated = not measures_leaf_area(telemetry)
     if estimated:
         telemetry = telemetry.with_columns({"leaf_area_index": leaf_area_curve(site, telemetry.time)})
     record = make_record(
