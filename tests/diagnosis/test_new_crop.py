@@ -12,7 +12,7 @@ from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import Log
 from igrow.trainer.diagnosis import diagnose, wording
 from igrow.trainer.diagnosis.crop import has_new_crop, of_one_crop, with_its_drift
-from igrow.trainer.diagnosis.knowledge import knowledge_of
+from igrow.trainer.diagnosis.knowledge import OF_CROP, knowledge_of
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.fit import FittedModel
 from igrow.trainer.fit.discrepancy import Discrepancy
@@ -71,6 +71,7 @@ def test_of_a_new_crop_nothing_is_named_and_the_model_follows_it(leaky_log: Log)
     result = diagnose(log, model)
     assert (result.verdict, result.findings) == ("nothing", ())
     assert wording.NEW_CROP in result.notes
+    assert {"leaf_area_transpiration", "night_transpiration", "photosynthesis_decline"} <= set(result.untestable)
     day = result.errors["air_humidity"]["24_h"]
     assert day["corrected"] == day["recalibrated"] < day["deployed"]
 
@@ -94,3 +95,9 @@ def test_a_crop_may_differ_more_than_the_walls() -> None:
     wider = {name for name, one, two in zip(model.posterior.names, usual, new, strict=True) if two > 2.0 * one}
     assert {"transpiration_radiation", "transpiration_deficit", "assimilation_light", "respiration"} <= wider
     assert not {"transmissivity", "leakage_wind", "vent_wind", "cover_heat_transfer"} & wider
+
+
+def test_of_a_crop_that_may_be_another_no_parameter_of_its_own_is_told() -> None:
+    known = {"transpiration_deficit", "assimilation_light", "respiration", "deficit_stomata_closure"}
+    assert known <= OF_CROP
+    assert not {"humidity_offset", "wind_infiltration", "soil_respiration", "transmissivity"} & OF_CROP

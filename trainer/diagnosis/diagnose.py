@@ -28,7 +28,7 @@ from igrow.trainer.diagnosis.drift import Drift
 from igrow.trainer.diagnosis.estimate import normal_quantile
 from igrow.trainer.diagnosis.evidence import Evidence
 from igrow.trainer.diagnosis.freerun import HORIZONS, FreeRuns, LogDays, Stage, log_days, mean_absolute_errors
-from igrow.trainer.diagnosis.knowledge import ActiveTerm, knowledge_of
+from igrow.trainer.diagnosis.knowledge import OF_CROP, ActiveTerm, knowledge_of
 from igrow.trainer.diagnosis.nuisance import NuisanceSubspace
 from igrow.trainer.diagnosis.open_vents import under_open_vents
 from igrow.trainer.diagnosis.parameter_change import ParameterChange
@@ -113,7 +113,9 @@ class _Question:
         completed = complete(log, logged, model, knowledge, rules)
         days, opened = completed.days, under_open_vents(logged.record, rules)
         off = opened is not None and opened.is_offset(rules)
-        hidden = self.without | (frozenset({"co2_drift"}) if off else frozenset())
+        # Of a crop that may be another by now nothing is asked.
+        of_crop = OF_CROP if rules.crop_drift > self.rules.crop_drift else frozenset[str]()
+        hidden = self.without | (frozenset({"co2_drift"}) if off else frozenset()) | of_crop
         search = search_of(days, site, knowledge, hidden, rules, self.nuisance, self.drift)
         progress("searching for causes")
         first, last, found = search.run(rng)
@@ -169,7 +171,9 @@ class _Question:
             model=model,
             corrected=remembering(corrected, result.parameter, rules),
             # What a cause may as well be is told already.
-            untestable=tuple(name for name in first.design.untestable if name not in possible),
+            untestable=tuple(
+                name for name in EFFECTS if name in {*first.design.untestable, *of_crop} and name not in possible
+            ),
             missing=logged.record.missing,
             notes=notes,
             evidence=Evidence(

@@ -45,12 +45,19 @@ def find(design: Design, rng: np.random.Generator) -> ParameterChange | None:
         design: of the log, in a greenhouse that changes by physics alone.
         rng: for the flips.
     """
-    rules, design = design.rules, joined(design)
+    assert design.history is not None
+    rules, unasked, design = design.rules, design.history.without, joined(design)
     null, onsets = linear.fit(design.grams, design.null_model()), search.onset_days(design)
     scored = score(design, null, onsets, rng)
     net = {one.parameter: change.proven_gain(design, one) - _needed_gain(design, one) for one in scored}
     # Of what is none at the calibration there is no share.
-    visible = (one for one in scored if one.parameter in VISIBLE and _range(design, one.parameter)[0] > 0.0)
+    visible = (
+        one
+        for one in scored
+        if one.parameter in VISIBLE
+        and unasked.isdisjoint(members(one.parameter))
+        and _range(design, one.parameter)[0] > 0.0
+    )
     best = max(visible, key=lambda one: net[one.parameter], default=None)
     if best is None or net[best.parameter] < 0.0:
         return None
