@@ -100,7 +100,7 @@ def test_a_short_training_writes_a_bundle_that_evaluates_to_the_same_scores(data
     result = table1.run(few, tmp_path / "out", layouts=quick)
     assert set(result.scores) == set(SCORED)
     assert all(np.isfinite(value.mean) for value in result.scores.values())
-    again = seasons.evaluate(tmp_path / "out", few, tmp_path / "scores.json")
+    again = seasons.run(tmp_path / "out", few, tmp_path / "scores.json")
     names = sorted(table.trajectory.unique())[:5]
     row = names.index(result.held_out[0])
     assert again["air_temperature"].seasons[row] == pytest.approx(result.scores["air_temperature"].seasons[0], abs=1e-6)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from inspect import signature
 
 from igrow.trainer.research.paper import figure3, harvests, incremental, pilot, seasons, table1
 
@@ -24,10 +25,11 @@ def add_arguments(parser: ArgumentParser) -> None:
     for name, (module, summary) in PARTS.items():
         part = parts.add_parser(name, help=summary, description=summary)
         module.add_arguments(part)
-        part.set_defaults(part_run=module.run_command)
 
 
 def run(arguments: Namespace) -> int:
-    """Run one part."""
-    arguments.part_run(arguments)
+    """Run one part, which takes its arguments by the names that they have on the command line."""
+    part, _ = PARTS[arguments.part]
+    given = vars(arguments)
+    part.run(**{name: given[name] for name in signature(part.run).parameters if name in given})
     return 0

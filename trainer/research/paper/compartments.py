@@ -60,19 +60,15 @@ def _held(day: Times, known_day: Times, values: Floats) -> Floats:
     return np.asarray(values[good][np.maximum(row, 0)])
 
 
-def _filled(values: Floats) -> Floats:
-    if not np.isfinite(values).any():
-        raise IgrowError("a driver of the harvest has no value on any day")
-    return gaps.interpolated(values)
-
-
 def _by_day(time: Times, values: Floats, day: Times) -> Floats:
     """Return the mean of the finite values of each local day, gaps filled between days."""
     row = (time.astype("datetime64[D]") - day[0]).astype(np.int64)
     good = np.isfinite(values) & (row >= 0) & (row < day.size)
     count = np.bincount(row[good], minlength=day.size)
+    if not good.any():
+        raise IgrowError("a driver of the harvest has no value on any day")
     total = np.bincount(row[good], weights=values[good], minlength=day.size)
-    return _filled(np.where(count > 0, total / np.maximum(count, 1), np.nan))
+    return gaps.interpolated(np.where(count > 0, total / np.maximum(count, 1), np.nan))
 
 
 def read_2019(folder: Path) -> list[Compartment]:

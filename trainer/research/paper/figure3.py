@@ -9,7 +9,7 @@ CO2 or quality enters. The distance is the sum over the days of the absolute dif
 from __future__ import annotations
 
 import json
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -68,9 +68,9 @@ def distances(folder: Path, books: Path) -> tuple[Champion, dict[str, Floats]]:
     return measured, curves
 
 
-def run(folder: Path, books: Path, out: Path) -> dict[str, float]:
+def run(agc2019: Path, books: Path, out: Path) -> dict[str, float]:
     """Print the distances; write figure3.json and figure3.svg to `out`. Returns the distance of each predictor."""
-    measured, curves = distances(folder, books)
+    measured, curves = distances(agc2019, books)
     result = {name: float(np.abs(curve - measured.measured).sum()) for name, curve in curves.items()}
     print("| predictor | sum of absolute daily differences, EUR m-2 | net profit at the end, EUR m-2 |")
     print("|---|---|---|")
@@ -109,8 +109,3 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--agc2019", type=Path, required=True, help="folder of the second challenge")
     parser.add_argument("--books", type=Path, required=True, help="folder with the champion's workbook")
     parser.add_argument("--out", type=Path, required=True, help="folder for figure3.json and figure3.svg")
-
-
-def run_command(arguments: Namespace) -> None:
-    """Run `reproduce figure3`."""
-    run(arguments.agc2019, arguments.books, arguments.out)

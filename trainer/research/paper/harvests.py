@@ -7,7 +7,7 @@ is the one that any model has to beat: the mean harvest of the other compartment
 from __future__ import annotations
 
 import json
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import lru_cache
@@ -192,17 +192,13 @@ def as_text(title: str, errors: Sequence[HarvestError]) -> str:
     return "\n".join(rows)
 
 
-def run(
-    folder_2019: Path | None,
-    folder_2018: Path | None,
-    out: Path,
-) -> dict[str, list[HarvestError]]:
+def run(agc2019: Path | None, agc2018: Path | None, out: Path) -> dict[str, list[HarvestError]]:
     """Print both tables and write harvests.json to `out`."""
     results: dict[str, list[HarvestError]] = {}
-    if folder_2019 is not None:
-        results["agc2019, cherry tomato"] = leave_one_out(read_2019(folder_2019))
-    if folder_2018 is not None:
-        results["agc2018, cucumber"] = leave_one_out(read_2018(folder_2018))
+    if agc2019 is not None:
+        results["agc2019, cherry tomato"] = leave_one_out(read_2019(agc2019))
+    if agc2018 is not None:
+        results["agc2018, cucumber"] = leave_one_out(read_2018(agc2018))
     for title, errors in results.items():
         print(as_text(title, errors))
     out.mkdir(parents=True, exist_ok=True)
@@ -216,8 +212,3 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--agc2019", type=Path, help="folder of the second challenge")
     parser.add_argument("--agc2018", type=Path, help="folder of the first challenge")
     parser.add_argument("--out", type=Path, required=True, help="folder for harvests.json")
-
-
-def run_command(arguments: Namespace) -> None:
-    """Run `reproduce harvests`."""
-    run(arguments.agc2019, arguments.agc2018, arguments.out)

@@ -12,8 +12,8 @@ taught them, and the leaf area that the climate stage reads is that of the growt
 from __future__ import annotations
 
 import json
-from argparse import ArgumentParser, Namespace
-from dataclasses import dataclass, replace
+from argparse import ArgumentParser
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -155,48 +155,42 @@ def stream(stage: Stage, virtual: StageData, real: StageData, weeks: range, shar
 
 
 def run(
-    virtual_folder: Path,
-    real_folder: Path,
-    compartment: str,
-    out: Path,
-    seed: int = 7,
-    layouts: Layouts | None = None,
+    virtual: Path, real: Path, compartment: str, out: Path, seed: int = 7, layouts: Layouts | None = None
 ) -> list[Step]:
     """Run the three steps, print the table and write incremental.json to `out`."""
     chosen = layouts or Layouts()
-    seasons = read_seasons(virtual_folder)
+    seasons = read_seasons(virtual)
     split = split_seasons(len(seasons.names), seed)
     training, test = seasons.select(split.training), seasons.select(split.test)
     base = train_simulator(training.columns, seasons.hour, seasons.valid, chosen, seed, print)
-    real = hourly_run(agc2019.read(real_folder, compartment).telemetry, seasons, base)
+    measured = hourly_run(agc2019.read(real, compartment).telemetry, seasons, base)
     virtual_data = hourly_data(base.climate, derived(training.columns), seasons.hour, seasons.valid)
-    last = real.weeks - TEST_WEEKS
+    last = measured.weeks - TEST_WEEKS
     if last <= FIRST_WEEKS:
-        raise IgrowError(f"{real_folder}: {real.weeks} weeks; more than {FIRST_WEEKS + TEST_WEEKS} are needed")
-    held_out = only_weeks(real.data, last, real.weeks)
+        raise IgrowError(f"{real}: {measured.weeks} weeks; more than {FIRST_WEEKS + TEST_WEEKS} are needed")
+    held_out = only_weeks(measured.data, last, measured.weeks)
 
     def scored(name: str, simulator: NetworkSimulator) -> Step:
-        virtual = score(test.columns, free_run(simulator, test.columns, test.hour), seasons.valid)
+        followed = score(test.columns, free_run(simulator, test.columns, test.hour), seasons.valid)
         errors, persistence = day_errors(simulator.climate, held_out)
         print(f"{name}: 24 h errors {np.round(errors, 2)}, persistence {np.round(persistence, 2)}")
         return Step(
             name,
-            {key: value.mean for key, value in virtual.items()},
+            {key: value.mean for key, value in followed.items()},
             dict(zip(simulator.climate.states, (float(error) for error in errors), strict=True)),
         )
 
     steps = [scored("virtual seasons only", base)]
-    mixed_data = joined(virtual_data, only_weeks(real.data, 0, FIRST_WEEKS), REAL_SHARE)
+    mixed_data = joined(virtual_data, only_weeks(measured.data, 0, FIRST_WEEKS), REAL_SHARE)
     start = untrained(chosen.climate, mixed_data, seed)
     mixed = replace(base, climate=train_stage(start, mixed_data, replace(MIXED, seed=seed), print))
     steps.append(scored(f"real weeks 1 to {FIRST_WEEKS} replace virtual ones", mixed))
     for name, share in (("stream, virtual seasons rehearsed", REAL_SHARE), ("stream, nothing rehearsed", 1.0)):
-        tuned = stream(mixed.climate, virtual_data, real.data, range(FIRST_WEEKS, last), share, seed)
+        tuned = stream(mixed.climate, virtual_data, measured.data, range(FIRST_WEEKS, last), share, seed)
         steps.append(scored(name, replace(mixed, climate=tuned)))
     print(as_text(steps))
     out.mkdir(parents=True, exist_ok=True)
-    content = [{"name": step.name, "virtual": step.virtual, "real": step.real} for step in steps]
-    (out / "incremental.json").write_text(json.dumps(content, indent=1))
+    (out / "incremental.json").write_text(json.dumps([asdict(step) for step in steps], indent=1))
     return steps
 
 
@@ -217,8 +211,3 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--compartment", default="Reference", help="with measured climate (Reference)")
     parser.add_argument("--out", type=Path, required=True, help="folder for incremental.json")
     parser.add_argument("--seed", type=int, default=7, help="of the split, the weights and the windows (7)")
-
-
-def run_command(arguments: Namespace) -> None:
-    """Run `reproduce incremental`."""
-    run(arguments.virtual, arguments.real, arguments.compartment, arguments.out, arguments.seed)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import warnings
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -91,9 +91,9 @@ def _line(unit: str, area: float, value: Callable[[str], float]) -> Line:
     )
 
 
-def run(folder: Path, out: Path) -> dict[str, Line]:
+def run(data: Path, out: Path) -> dict[str, Line]:
     """Print the table beside the published one; write pilot.json, figure5.svg and figureS4.svg to figureS13.svg."""
-    pilot = read(folder)
+    pilot = read(data)
     lines = table(pilot)
     print("| per greenhouse | growers (2) | iGrow (5) | change | p one-sample | p Student | p Welch |")
     print("|---|---|---|---|---|---|---|")
@@ -113,7 +113,7 @@ def run(folder: Path, out: Path) -> dict[str, Line]:
     figure5(pilot, out / "figure5.svg")
     pairs = [(experiment, control) for experiment in range(3, 8) for control in (1, 2)]
     for number, (experiment, control) in enumerate(pairs, _FIRST_PAIR):
-        climate_pair(folder, experiment, control, out / f"figureS{number}.svg")
+        climate_pair(data, experiment, control, out / f"figureS{number}.svg")
     print(f"figures 5 and S{_FIRST_PAIR} to S{_FIRST_PAIR + len(pairs) - 1} in {out}")
     return lines
 
@@ -174,8 +174,3 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Add the arguments of `reproduce pilot`."""
     parser.add_argument("--data", type=Path, required=True, help="folder of the pilot's data")
     parser.add_argument("--out", type=Path, required=True, help="folder for pilot.json and the figures")
-
-
-def run_command(arguments: Namespace) -> None:
-    """Run `reproduce pilot`."""
-    run(arguments.data, arguments.out)

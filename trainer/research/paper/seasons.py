@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser
 from dataclasses import asdict
 from pathlib import Path
 
@@ -15,11 +15,7 @@ from igrow.trainer.research.paper.scores import PUBLISHED_BASELINE, PUBLISHED_IN
 from igrow.trainer.research.paper.wur2020 import read_seasons
 
 
-def evaluate(
-    bundle: Path,
-    data: Path,
-    out: Path | None = None,
-) -> dict[str, Score]:
+def run(bundle: Path, data: Path, out: Path | None = None) -> dict[str, Score]:
     """Run every season of `data` (a file in the format of trajectories.parquet) with the networks of `bundle`.
 
     `bundle` is a bundle of the network variant, a folder of results that holds one, or a file of networks. Returns
@@ -51,8 +47,3 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--bundle", type=Path, required=True, help="network bundle, or the folder of table1")
     parser.add_argument("--data", type=Path, required=True, help="a file in the format of trajectories.parquet")
     parser.add_argument("--out", type=Path, help="write the scores to this JSON file")
-
-
-def run_command(arguments: Namespace) -> None:
-    """Run `reproduce seasons`."""
-    evaluate(arguments.bundle, arguments.data, arguments.out)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import time
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -65,13 +65,7 @@ def split_seasons(count: int, seed: int) -> Split:
 
 
 def run(
-    folder: Path,
-    out: Path,
-    seed: int = 7,
-    layouts: Layouts = LAYOUTS,
-    *,
-    choose: bool = False,
-    workers: int = 1,
+    data: Path, out: Path, seed: int = 7, layouts: Layouts = LAYOUTS, *, choose: bool = False, workers: int = 1
 ) -> Table:
     """Train, run the held-out seasons and write table1.json, table1.png and the folder `bundle` to `out`.
 
@@ -81,9 +75,9 @@ def run(
     begin = time.monotonic()
     if (out / BUNDLE_FOLDER).exists():
         raise IgrowError(f"{out / BUNDLE_FOLDER} exists already; name a new folder")
-    seasons = read_seasons(folder)
+    seasons = read_seasons(data)
     if len(seasons.names) < 4:
-        raise TrajectoryFileError(f"{folder}: {len(seasons.names)} seasons; at least 4 are needed to hold some out")
+        raise TrajectoryFileError(f"{data}: {len(seasons.names)} seasons; at least 4 are needed to hold some out")
     split = split_seasons(len(seasons.names), seed)
     rows = split.training if choose else np.concatenate([split.training, split.selection])
     learned, held_out = seasons.select(rows), seasons.select(split.selection if choose else split.test)
@@ -155,8 +149,3 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=7, help="of the split, the weights and the windows (7)")
     parser.add_argument("--workers", type=int, default=2, help="processes that train side by side (2)")
     parser.add_argument("--choose", action="store_true", help="hold out the selection seasons, not the test")
-
-
-def run_command(arguments: Namespace) -> None:
-    """Run `reproduce table1`."""
-    run(arguments.data, arguments.out, arguments.seed, choose=arguments.choose, workers=arguments.workers)

@@ -51,8 +51,7 @@ class Seasons:
     def hour(self) -> Floats:
         """Hour of the day, (hours,)."""
         since_midnight = self.time - self.time.astype("datetime64[D]")
-        hours: Floats = since_midnight.astype("timedelta64[s]").astype(np.float64) / 3600.0
-        return hours
+        return np.asarray(since_midnight.astype("timedelta64[s]").astype(np.float64) / 3600.0)
 
     def select(self, rows: Sequence[int] | Integers) -> Seasons:
         """Return the seasons at `rows`."""
