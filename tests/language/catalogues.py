@@ -1,8 +1,9 @@
 """Which texts there are, and which of them a language lacks; `make translations` adds and compiles them.
 
 Texts stand in the code of both sides (`text("...")`, `N_("...")`), in templates (`_("...")`), in the report's
-`texts.yaml` and in the effects. What the daemon and the reading of a log put together of text and values are f-strings:
-each becomes a text with numbered places, so that a sentence that somebody adds is missed until it is translated.
+`texts.yaml`, in `visible_parameters.yaml` and in the effects. What the daemon and the reading of a log put together of
+text and values are f-strings: each becomes a text with numbered places, so that a sentence that somebody adds is missed
+until it is translated.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import yaml
 from babel import Locale
@@ -69,12 +71,18 @@ def messages() -> list[str]:
         for folder in _FOLDERS
         for _, _, message, _, _ in extract_from_dir(folder, _METHODS, keywords=_KEYWORDS)
     ]
-    for texts in yaml.safe_load((_TRAINER / "report" / "texts.yaml").read_text(encoding="utf-8")).values():
+    for texts in _yaml("report/texts.yaml").values():
         found += texts.values()
+    visible = _yaml("diagnosis/visible_parameters.yaml")
+    found += [*visible["checks"].values(), *(title for title, _, _ in visible["visible"].values())]
     for effect in EFFECTS.values():
         texts = (effect.title, effect.sentence, effect.separating_test, effect.signature, effect.opposite)
         found += filter(None, texts)
     return list(dict.fromkeys([*found, *sentences()]))
+
+
+def _yaml(name: str) -> dict[str, Any]:
+    return dict(yaml.safe_load((_TRAINER / name).read_text(encoding="utf-8")))
 
 
 def sentences() -> list[str]:

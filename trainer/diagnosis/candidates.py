@@ -10,8 +10,11 @@ from __future__ import annotations
 import itertools
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from importlib.resources import files
+from typing import Any
 
 import numpy as np
+import yaml
 from scipy.signal import lfilter
 
 from igrow.core.arrays import Floats
@@ -27,34 +30,12 @@ from igrow.trainer.diagnosis.sensitivity import (
     unit_fluxes,
 )
 
-NONLINEAR_GRID: Mapping[tuple[str, str], tuple[float, ...]] = {
-    ("wind_infiltration", "exponent"): (0.7, 1.0, 1.5, 2.0),
-    ("cover_condensation", "cover_share"): (0.2, 0.35, 0.5),
-    ("soil_heat_storage", "time_constant"): (2.0, 4.0, 8.0),
-    ("pipe_lag", "time_constant"): (10.0, 25.0, 60.0, 120.0),
-    ("heating_valve_leak", "threshold"): (3.0,),
-    ("vent_wind_asymmetry", "direction"): tuple(45.0 * k for k in range(8)),
-    ("vent_backlash", "play"): (1.5, 3.0, 6.0, 10.0),
-    ("structure_shade", "azimuth"): (80.0, 105.0, 130.0, 155.0, 180.0, 205.0, 230.0, 255.0, 280.0),
-    ("structure_shade", "width"): (12.0, 25.0),
-    ("angle_transmission", "exponent"): (1.0, 2.0, 4.0),
-    ("deficit_stomata_closure", "threshold"): (0.5, 0.8, 1.2, 1.6),
-    ("irrigation_evaporation", "time_constant"): (20.0, 60.0, 150.0),
-    ("leaf_area_transpiration", "reference"): (3.0,),
-    ("photosynthesis_heat_limit", "threshold"): (23.0, 25.0, 27.0, 29.0),
-    ("soil_respiration", "time_constant"): (24.0,),
-    ("air_temperature_lag", "time_constant"): (8.0, 15.0, 30.0),
-}
-"""Values of nonlinear parameters tried first; refitting moves them. One that is not here is tried at three values."""
-
-UNIT_FLUX: Mapping[str, float] = {
-    "heat": 10.0,
-    "vapour": 2e-6,
-    "co2": 3e-7,
-    "air_exchange": 5e-4,
-    "light_loss": 0.1,
-}
-"""Size of one unit of a pattern in each channel: W m-2, kg m-2 s-1, kg m-2 s-1, m s-1, 1."""
+_TABLE = yaml.safe_load(files("igrow.trainer.diagnosis").joinpath("candidates.yaml").read_text(encoding="utf-8"))
+SHAPES: Mapping[str, Mapping[str, Sequence[float]]] = _TABLE["shapes"]
+"""Values of nonlinear parameters tried first, by effect."""
+CHANNELS: Mapping[str, Mapping[str, Any]] = _TABLE["channels"]
+"""In what a pattern may act: `size` of one unit of it and `unit`, `name`, and `balances` that it moves."""
+UNIT_FLUX: Mapping[str, float] = {name: one["size"] for name, one in CHANNELS.items()}
 WEEKDAYS = ("Monday", "Tuesday", "Wednesday", "Thursday", "Friday", "Saturday", "Sunday")
 _VISIBLE = 1e-9
 """Sensitivity below which a log shows nothing of a candidate."""
@@ -122,7 +103,8 @@ class EffectColumns:
 
 def nonlinear_grid(effect: Effect) -> list[dict[str, float]]:
     """Return the shapes at which an effect is tried."""
-    axes = [NONLINEAR_GRID.get((effect.name, shape.name)) or _default_axis(shape) for shape in effect.shapes]
+    known = SHAPES.get(effect.name, {})
+    axes = [known.get(shape.name) or _default_axis(shape) for shape in effect.shapes]
     names = [shape.name for shape in effect.shapes]
     return [dict(zip(names, values, strict=True)) for values in itertools.product(*axes)]
 
@@ -282,8 +264,4 @@ def _with_elapsed_one(line: Linearisation) -> Linearisation:
 
 
 def _default_axis(shape: Parameter) -> tuple[float, ...]:
-    return (
-        float(0.5 * (shape.low + shape.typical)),
-        shape.typical,
-        float(0.5 * (shape.high + shape.typical)),
-    )
+    return 0.5 * (shape.low + shape.typical), shape.typical, 0.5 * (shape.high + shape.typical)

@@ -12,7 +12,7 @@ from igrow.core.language import N_
 from igrow.core.language.units import written
 from igrow.core.site import Site
 from igrow.trainer.diagnosis.actuators import Replaced
-from igrow.trainer.diagnosis.candidates import UNIT_FLUX, Pattern
+from igrow.trainer.diagnosis.candidates import CHANNELS, Pattern
 from igrow.trainer.diagnosis.estimate import Estimated, OnsetInterval, normal_quantile
 from igrow.trainer.diagnosis.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.result import DISCREPANCY, Finding, plain
@@ -39,21 +39,6 @@ THIN_AIR = N_(
 HIGH = 1000.0
 """Metres above the sea from which on that is said."""
 SINCE = N_("The errors are of the days since then: before, the greenhouse was another.")
-UNITS = {"heat": "W m-2", "vapour": "kg m-2 s-1", "co2": "kg m-2 s-1", "air_exchange": "m s-1", "light_loss": "1"}
-NAMES = {
-    "heat": "heat",
-    "vapour": "water vapour",
-    "co2": "CO2",
-    "air_exchange": "air exchange",
-    "light_loss": "loss of light",
-}
-BALANCES_OF = {
-    "heat": ("heat",),
-    "vapour": ("vapour",),
-    "co2": ("co2",),
-    "air_exchange": ("heat", "vapour", "co2"),
-    "light_loss": ("light", "heat"),
-}
 MOVED_BY: dict[str, tuple[str, ...]] = {
     "rail_pipe_temperature": ("heat",),
     "grow_pipe_temperature": ("heat",),
@@ -151,8 +136,6 @@ def _day(onset: OnsetInterval) -> str:
 
 def separating_test(confounded: Sequence[str]) -> str:
     """Return the cheapest tests that would separate confounded causes."""
-    if len(confounded) == 1:
-        return EFFECTS[confounded[0]].separating_test
     return "; or ".join(dict.fromkeys(EFFECTS[name].separating_test for name in confounded[:MOST_TESTS]))
 
 
@@ -165,14 +148,15 @@ def discrepancy(patterns: Sequence[Hypothesis], rules: DecisionRules) -> Finding
     for one in patterns:
         pattern = one.cause
         assert isinstance(pattern, Pattern)
-        balances |= dict.fromkeys(BALANCES_OF[pattern.channel])
+        channel = CHANNELS[pattern.channel]
+        balances |= dict.fromkeys(channel["balances"])
         drivers |= dict.fromkeys(pattern.drivers)
-        size = UNIT_FLUX[pattern.channel]
+        size = channel["size"]
         reach = normal_quantile(rules) * abs(one.amplitude) / max(one.statistic, 1e-9)
         parameters[f"{pattern.channel}: {pattern.when}"] = Estimate(
-            size * one.amplitude, size * (one.amplitude - reach), size * (one.amplitude + reach), UNITS[pattern.channel]
+            size * one.amplitude, size * (one.amplitude - reach), size * (one.amplitude + reach), channel["unit"]
         )
-        words.append(f"{NAMES[pattern.channel]} ({'more' if one.amplitude > 0 else 'less'}, {pattern.when})")
+        words.append(f"{channel['name']} ({'more' if one.amplitude > 0 else 'less'}, {pattern.when})")
     return Finding(
         DISCREPANCY,
         "discrepancy",
