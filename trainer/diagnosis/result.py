@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -31,6 +31,11 @@ WORSE = 0.02
 """Share by which an error must grow to be told as worse."""
 DISCREPANCY = "discrepancy"
 """Effect and kind of a finding that no effect of the catalogue explains: what the model lacks, by outside drivers."""
+_TOLD = (
+    "effect", "kind", "balances", "parameters", "onset", "p_value", "confounded", "drivers", "resembles",
+    "separating_test",
+)  # fmt: skip
+"""Of a finding, in `diagnosis.json`."""
 
 
 @dataclass(frozen=True)
@@ -220,28 +225,22 @@ class Diagnosis:
             "verdict": self.verdict,
             "calibrated_here": not self.uncalibrated,
             "span": {
-                "start": _time(self.start),
-                "end": _time(self.end),
+                "start": _json(self.start),
+                "end": _json(self.end),
                 "fit_days": self.fit_days,
                 "held_out_days": self.held_out_days,
             },
-            "findings": [_finding(one) for one in self.findings],
+            "findings": [{key: _json(getattr(one, key)) for key in _TOLD} for one in self.findings],
             "errors": {
                 quantity: {
-                    horizon: {
-                        **{stage: _number(value) for stage, value in stages.items()},
-                        "unit": QUANTITIES[quantity].unit,
-                    }
-                    for horizon, stages in horizons.items()
+                    horizon: {**_json(by_stage), "unit": QUANTITIES[quantity].unit}
+                    for horizon, by_stage in horizons.items()
                 }
                 for quantity, horizons in self.errors.items()
             },
             "worsened": list(self.worsened),
             "missing": list(self.missing),
-            "screened": [
-                {"quantity": one.quantity, "start": _time(one.start), "end": _time(one.end), "reason": one.reason}
-                for one in self.screened
-            ],
+            "screened": _json(self.screened),
         }
 
 
@@ -251,31 +250,14 @@ def plain(value: float) -> str:
     return f"{rounded:.0f}" if abs(rounded) >= 10.0 else f"{rounded:.10f}".rstrip("0").rstrip(".")
 
 
-def _finding(finding: Finding) -> dict[str, Any]:
-    onset = finding.onset
-    return {
-        "effect": finding.effect,
-        "kind": finding.kind,
-        "balances": list(finding.balances),
-        "parameters": {
-            name: {"value": _number(one.value), "low": _number(one.low), "high": _number(one.high), "unit": one.unit}
-            for name, one in finding.parameters.items()
-        },
-        "onset": None
-        if onset is None
-        else {"time": _time(onset.time), "low": _time(onset.low), "high": _time(onset.high)},
-        "p_value": _number(finding.p_value),
-        "confounded": list(finding.confounded),
-        "drivers": list(finding.drivers),
-        "resembles": list(finding.resembles),
-        "separating_test": finding.separating_test,
-    }
-
-
-def _number(value: float) -> float:
-    """Return a number with six significant digits."""
-    return float(f"{value:.6g}")
-
-
-def _time(time: np.datetime64) -> str:
-    return f"{np.datetime_as_string(time.astype('datetime64[s]'))}Z"
+def _json(value: Any) -> Any:
+    """Return a value as JSON has it: numbers with six significant digits, times in UTC."""
+    if is_dataclass(value):
+        return {one.name: _json(getattr(value, one.name)) for one in fields(value)}
+    if isinstance(value, Mapping):
+        return {key: _json(one) for key, one in value.items()}
+    if isinstance(value, tuple):
+        return [_json(one) for one in value]
+    if isinstance(value, np.datetime64):
+        return f"{np.datetime_as_string(value.astype('datetime64[s]'))}Z"
+    return float(f"{value:.6g}") if isinstance(value, float) else value
