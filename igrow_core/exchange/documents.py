@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from pathlib import Path
 from typing import Any
 
 from igrow.core.errors import IgrowError
@@ -25,6 +26,14 @@ def parse_object(data: bytes, what: str) -> dict[str, Any]:
     if not isinstance(document, dict):
         raise IgrowError(f"{what}: a {type(document).__name__} where an object with names is needed")
     return document
+
+
+def read_object(path: Path) -> dict[str, Any]:
+    """Return the JSON object in a file; empty where there is no file, or none that can be read."""
+    try:
+        return parse_object(path.read_bytes(), path.name)
+    except (IgrowError, OSError):
+        return {}
 
 
 def _integer(digits: str) -> int:

@@ -87,7 +87,9 @@ def make_task(arguments: argparse.Namespace, registry: Registry, entry: Entry, n
         "known_hosts": registry.path(registry.file.known_hosts),
         "identity": registry.path(registry.file.identity),
     }
-    common = {"state": str(registry.state.resolve()), "exchange": exchange, "now": now.timestamp()}
+    common: dict[str, object] = {"state": str(registry.state.resolve()), "now": now.timestamp()}
+    # What was collected is enough to learn.
+    common |= {"exchange": exchange} if arguments.action != "learn" else {}
     site, file, keys = entry.site.name, str(entry.file.resolve()), str(registry.keys.resolve())
     asked = vars(arguments)
     days, drift = asked.get("days"), shared(entry, registry.drift)

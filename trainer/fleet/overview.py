@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from igrow.core.errors import IgrowError
-from igrow.core.exchange.documents import parse_object
+from igrow.core.exchange.documents import read_object
 from igrow.trainer.fleet.registry import Entry, Registry
 from igrow.trainer.fleet.work import COLLECTED
 from igrow.trainer.service import history
 from igrow.trainer.service.archive import Archive
 from igrow.trainer.service.ledger import read_ledger
 from igrow.trainer.service.recalibration import COMMAND, next_run
-from igrow.trainer.service.site_memory import bundle_in_force, read_diagnosis, refused_bundles, site_folder
+from igrow.trainer.service.site_memory import bundle_in_force, refused_bundles, site_folder
 
 SILENT = timedelta(days=2)
 """A site without a row for longer than this has a broken link."""
@@ -78,9 +78,9 @@ def _row(registry: Registry, entry: Entry, now: datetime) -> SiteRow:
     reports, _ = archive.reports(name)
     bundle, _ = bundle_in_force(folder, reports)
     newest = read_ledger(archive.root, name).newest
-    diagnosis = read_diagnosis(folder) or {}
+    diagnosis = read_object(folder / "diagnosis" / "diagnosis.json")
     last: Mapping[str, Any] = next((line for line in reversed(lines) if line.get("command") == COMMAND), {})
-    collected = _collected(folder)
+    collected = read_object(folder / COLLECTED)
     reasons: list[tuple[int, str]] = []
     failed = _last_failure(lines)
     if failed:
@@ -129,13 +129,6 @@ def _last_failure(lines: list[dict[str, Any]]) -> str:
         for command, line in newest.items()
         if line.get("verdict") == "error"
     )
-
-
-def _collected(folder: Path) -> dict[str, Any]:
-    try:
-        return parse_object((folder / COLLECTED).read_bytes(), COLLECTED)
-    except (IgrowError, OSError):
-        return {}
 
 
 def _finding(diagnosis: Mapping[str, Any]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict
 from datetime import UTC, datetime, timedelta
 from functools import partial
@@ -12,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from igrow.core.errors import IgrowError
-from igrow.core.exchange import Below, Place
+from igrow.core.exchange import Place
 from igrow.core.exchange.documents import LARGEST_DOCUMENT, parse_object
 from igrow.core.exchange.remote import open_place
 from igrow.core.site import load_site
@@ -24,6 +25,8 @@ from igrow.trainer.service.forwarding import forward
 from igrow.trainer.service.recalibration import recalibrate
 from igrow.trainer.service.site_memory import bundle_in_force, site_folder
 
+Exchange = Mapping[str, Any]
+"""The arguments of `_place`."""
 COLLECTED = "collected.json"
 LEARNED, CHANGE = "learned.json", "change.npz"
 """What a site's own log said of its parameters and its discrepancy, and of how it changes; no row of the log."""
@@ -34,17 +37,12 @@ REFRESH_BEFORE = timedelta(days=30)
 
 
 def collect_site(
-    site: str,
-    state: str,
-    exchange: dict[str, str | None],
-    now: float,
-    forward_to: str | None = None,
-    *,
-    take_over: bool = False,
+    site: str, state: str, exchange: Exchange, now: float, forward_to: str | None = None, *, take_over: bool = False
 ) -> dict[str, Any]:
     """Collect one site; its newest outcome stands in `collected.json`, and what people should know in its history."""
     moment = datetime.fromtimestamp(now, UTC)
-    done = collect(_place(exchange), site, Archive(Path(state) / "archive"), moment, take_over=take_over)
+    archive = Archive(Path(state) / "archive")
+    done = collect(_place(**exchange), site, archive, moment, take_over=take_over)
     document = {
         "time": moment.strftime("%Y-%m-%dT%H:%M:%SZ"),
         "command": "collect",
@@ -62,14 +60,14 @@ def collect_site(
     if done.notes:
         history.append(folder, document)
     if forward_to is not None:
-        forward(Archive(Path(state) / "archive"), site, forward_to, moment.date() + timedelta(days=1))
+        forward(archive, site, forward_to, moment.date() + timedelta(days=1))
     return document
 
 
 def recalibrate_site(
     file: str,
     state: str,
-    exchange: dict[str, str | None],
+    exchange: Exchange,
     keys: str,
     now: float,
     *,
@@ -79,14 +77,14 @@ def recalibrate_site(
     drift: str | None = None,
 ) -> dict[str, Any]:
     """Diagnose one site, and publish what is better where `publish` says so; an error is a verdict."""
-    from igrow.trainer.publishing import publish_in as publish_bundle  # noqa: PLC0415  (collecting needs no signatures)
+    from igrow.trainer.publishing import publish as publish_bundle  # noqa: PLC0415  (collecting needs no signatures)
 
     site = load_site(file)
     turn = recalibrate(
         site,
         Archive(Path(state) / "archive"),
         site_folder(Path(state), site.name),
-        partial(publish_bundle, repository=_repository(exchange, site.name), keys=Path(keys)) if publish else None,
+        partial(publish_bundle, exchange=_place(**exchange), keys=keys) if publish else None,
         now=datetime.fromtimestamp(now, UTC),
         days=days,
         force=force,
@@ -95,7 +93,7 @@ def recalibrate_site(
     return turn.to_json()
 
 
-def learn_from_site(file: str, state: str, exchange: dict[str, str | None], now: float, *, days: int) -> dict[str, Any]:
+def learn_from_site(file: str, state: str, now: float, *, days: int) -> dict[str, Any]:
     """Fit one site by itself, and keep what that says of it, means and variances in `learned.json`.
 
     Where the log is long enough the newest four weeks are left out of the fit. If nothing is found in them they tell
@@ -109,7 +107,6 @@ def learn_from_site(file: str, state: str, exchange: dict[str, str | None], now:
     from igrow.trainer.diagnosis import DEFAULT, change_since, diagnose, learned_from  # noqa: PLC0415
     from igrow.trainer.diagnosis.drift import read_drift  # noqa: PLC0415
 
-    del exchange  # what was collected is enough
     site, moment = load_site(file), datetime.fromtimestamp(now, UTC)
     start, end = (moment - timedelta(days=days)).date(), moment.date() + timedelta(days=2)
     log = Archive(Path(state) / "archive").read(site.name, start, end)
@@ -133,17 +130,10 @@ def learn_from_site(file: str, state: str, exchange: dict[str, str | None], now:
 
 
 def calibrate_site(
-    file: str,
-    state: str,
-    exchange: dict[str, str | None],
-    keys: str,
-    now: float,
-    *,
-    days: int,
-    population: str | None,
+    file: str, state: str, exchange: Exchange, keys: str, now: float, *, days: int, population: str | None
 ) -> dict[str, Any]:
     """Calibrate a site that has no bundle of its own yet, and publish it; an error is a verdict."""
-    from igrow.trainer.publishing import publish_in  # noqa: PLC0415
+    from igrow.trainer.publishing import publish  # noqa: PLC0415
     from igrow.trainer.service.first_calibration import calibrate_first  # noqa: PLC0415
 
     site = load_site(file)
@@ -151,7 +141,7 @@ def calibrate_site(
         site,
         Archive(Path(state) / "archive"),
         site_folder(Path(state), site.name),
-        partial(publish_in, repository=_repository(exchange, site.name), keys=Path(keys)),
+        partial(publish, exchange=_place(**exchange), keys=keys),
         now=datetime.fromtimestamp(now, UTC),
         days=days,
         population=None if population is None else Path(population),
@@ -159,14 +149,12 @@ def calibrate_site(
     return turn.to_json()
 
 
-def publish_site(
-    site: str, state: str, exchange: dict[str, str | None], keys: str, now: float, *, again: bool
-) -> dict[str, Any]:
+def publish_site(site: str, state: str, exchange: Exchange, keys: str, now: float, *, again: bool) -> dict[str, Any]:
     """Sign a site's bundles again where the signatures expire soon; with `again` publish its bundle once more."""
-    from igrow.trainer.publishing import publish_in, refresh  # noqa: PLC0415
+    from igrow.trainer.publishing import publish_in, refresh, repository_of  # noqa: PLC0415
     from igrow.trainer.publishing.repository import lacks_root, targets_hold_until  # noqa: PLC0415
 
-    repository, moment = _repository(exchange, site), datetime.fromtimestamp(now, UTC)
+    repository, moment = repository_of(_place(**exchange), site), datetime.fromtimestamp(now, UTC)
     folder = site_folder(Path(state), site)
     stamp = repository.get("metadata/timestamp.json", LARGEST_DOCUMENT)
     # What names the bundle holds for a year, and only publishing the bundle again renews it.
@@ -186,14 +174,6 @@ def publish_site(
     return {"site": site, "note": "signed again"}
 
 
-def _place(exchange: dict[str, str | None]) -> Place:
-    return open_place(
-        str(exchange["url"]),
-        base=Path(str(exchange["base"])),
-        known_hosts=exchange["known_hosts"],
-        identity=exchange["identity"],
-    )
-
-
-def _repository(exchange: dict[str, str | None], site: str) -> Place:
-    return Below(_place(exchange), f"{site}/bundles")
+def _place(url: str, base: str, known_hosts: str | None, identity: str | None) -> Place:
+    """Open an exchange by what a task is given of it."""
+    return open_place(url, base=Path(base), known_hosts=known_hosts, identity=identity)

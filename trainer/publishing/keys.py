@@ -35,7 +35,7 @@ from igrow.core.whole_files import write_whole
 ROLES = ("root", "targets", "snapshot", "timestamp")
 """Root says who may sign; targets which bundles there are; snapshot and timestamp that these are the newest."""
 ROOT_LIFETIME = timedelta(days=3650)
-_SERIALIZER = JSONSerializer(compact=False)
+SERIALIZER = JSONSerializer(compact=False)
 _ROOT_FILE = re.compile(r"(\d+)\.root\.json")
 
 
@@ -199,7 +199,7 @@ def _sign_root(root: Root, before: Metadata[Root] | None, folders: Sequence[Path
         where = ", ".join(str(folder) for folder in folders)
         raise PublishingError(f"root keys in {where}: {signed}, needed to sign: {needed}; give each folder with --root")
     path = target / f"{root.version}.root.json"
-    write_whole(path, metadata.to_bytes(_SERIALIZER))
+    write_whole(path, metadata.to_bytes(SERIALIZER))
     return path
 
 

@@ -28,19 +28,17 @@ from tuf.api.metadata import (  # type: ignore[attr-defined]  # the documented p
     Timestamp,
 )
 from tuf.api.serialization import DeserializationError
-from tuf.api.serialization.json import JSONSerializer
 
 from igrow.core.bundle import Bundle, read_bundle, self_test
 from igrow.core.exchange import ExchangeError, FolderPlace, Place
 from igrow.core.exchange.documents import LARGEST_DOCUMENT
 from igrow.core.exchange.signed_files import signed_files
-from igrow.trainer.publishing.keys import PublishingError, load_root, load_signer, root_versions
+from igrow.trainer.publishing.keys import SERIALIZER, PublishingError, load_root, load_signer, root_versions
 
 KEPT_VERSIONS = 8
 """Old versions of targets and snapshot that stay for gateways that are reading them."""
 LIFETIMES = {"targets": timedelta(days=365), "snapshot": timedelta(days=60), "timestamp": timedelta(days=60)}
 """How long signed metadata holds; a gateway that sees no newer ones then stops to accept updates."""
-_SERIALIZER = JSONSerializer(compact=False)
 
 
 def initialise(repository: Place | Path, keys: Path, *, now: datetime | None = None) -> None:
@@ -193,7 +191,7 @@ def _named(place: Place, keys: Path) -> set[str]:
 
 def _sign_and_write(metadata: Metadata[Any], place: Place, keys: Path, role: str, name: str) -> None:
     metadata.sign(load_signer(keys / f"{role}.pem"))
-    place.put(f"metadata/{name}", metadata.to_bytes(_SERIALIZER))
+    place.put(f"metadata/{name}", metadata.to_bytes(SERIALIZER))
 
 
 def _forget_old(place: Place, named: set[str]) -> None:

@@ -117,35 +117,28 @@ class Archive:
 
     def read(self, site: str, start: date, end: date) -> SiteLog:
         """Return what is there of the days start <= day < end; the cost does not grow with what lies before."""
-        tables: list[Telemetry] = []
+        days = [start + timedelta(days=number) for number in range((end - start).days)]
+        tables: dict[date, Telemetry] = {}
         events: list[Mapping[str, Any]] = []
-        present: list[date] = []
         notes: list[str] = []
-        for number in range((end - start).days):
-            day = start + timedelta(days=number)
-            path = self._day("telemetry", site, np.datetime64(day))
-            if path.exists():
+        for day in days:
+            for kind in ("telemetry", "events"):
+                path = self._day(kind, site, np.datetime64(day))
+                if not path.exists():
+                    continue
                 try:
-                    tables.append(_read_telemetry(path))
-                    present.append(day)
+                    if kind == "telemetry":
+                        tables[day] = _read_telemetry(path)
+                    else:
+                        events += [
+                            {"sequence": sequence, "category": category, **json.loads(body)}
+                            for _, sequence, category, body in _read_events(path)
+                        ]
                 except IgrowError as error:
                     notes.append(str(error))
-            path = self._day("events", site, np.datetime64(day))
-            if path.exists():
-                try:
-                    events += [
-                        {"sequence": sequence, "category": category, **json.loads(body)}
-                        for _, sequence, category, body in _read_events(path)
-                    ]
-                except IgrowError as error:
-                    notes.append(str(error))
-        missing = [
-            present[0] + timedelta(days=number)
-            for number in range((present[-1] - present[0]).days if present else 0)
-            if present[0] + timedelta(days=number) not in set(present)
-        ]
+        missing = tuple(day for day in days if tables and min(tables) < day < max(tables) and day not in tables)
         reports, unread = self.reports(site)
-        return SiteLog(concatenate(tables), tuple(events), tuple(reports), tuple(missing), (*notes, *unread))
+        return SiteLog(concatenate([*tables.values()]), tuple(events), tuple(reports), missing, (*notes, *unread))
 
     def reports(self, site: str) -> tuple[list[Mapping[str, Any]], list[str]]:
         """Return the reports on bundles, oldest first, and a sentence for each that is none."""

@@ -19,7 +19,7 @@ from igrow.core.site import Site
 from igrow.trainer.service import history, seasons
 from igrow.trainer.service.archive import Archive, SiteLog
 from igrow.trainer.service.history import Turn
-from igrow.trainer.service.recalibration import LEAST_GAIN
+from igrow.trainer.service.recalibration import LEAST_GAIN, relative_gain
 from igrow.trainer.service.site_memory import Publish, bundle_in_force, publish_new
 
 if TYPE_CHECKING:
@@ -114,9 +114,9 @@ def _gain(log: Log, model: FittedModel, deployed: FittedModel) -> float:
     record = log.record(model.alignment or 0.0)
     held_out = held_out_weeks(record.time)
     errors = evaluate(record, deployed.posterior.values, deployed.active_effects, ("24_h",), held_out)
-    falls = [
-        1.0 - one.after / errors[one.quantity]["24_h"].mae
+    beside = {
+        one.quantity: {"24_h": {"deployed": errors[one.quantity]["24_h"].mae, "corrected": one.after}}
         for one in model.errors
-        if one.horizon == "24_h" and errors[one.quantity]["24_h"].mae > 0.0
-    ]
-    return sum(falls) / len(falls) if falls else 0.0
+        if one.horizon == "24_h"
+    }
+    return relative_gain(beside)

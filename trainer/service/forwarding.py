@@ -24,12 +24,11 @@ from dataclasses import dataclass
 from datetime import date, timedelta
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from igrow.core.errors import IgrowError
-from igrow.core.exchange.documents import parse_object
+from igrow.core.exchange.documents import read_object
 from igrow.core.telemetry import Telemetry
 from igrow.core.whole_files import write_whole
 from igrow.trainer.given import installed
@@ -65,7 +64,7 @@ def forward(archive: Archive, site: str, target: str, today: date) -> Forwarded:
     Raises IgrowError where the target refuses them; they follow at the next call.
     """
     marks_file = archive.root / "ledger" / f"{site}.forwarded-{sha256(target.encode()).hexdigest()[:12]}.json"
-    marks = _marks(marks_file)
+    marks = read_object(marks_file)
     days = values = 0
     for number in range(DAYS):
         day = today - timedelta(days=number)
@@ -169,10 +168,3 @@ def _append(path: Path, text: str) -> None:
 def _key(text: str) -> str:
     """Return a name as the line protocol wants it."""
     return text.replace("\\", "\\\\").replace(",", "\\,").replace("=", "\\=").replace(" ", "\\ ")
-
-
-def _marks(path: Path) -> dict[str, Any]:
-    try:
-        return parse_object(path.read_bytes(), path.name)
-    except (IgrowError, OSError):
-        return {}

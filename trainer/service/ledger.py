@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -183,18 +184,11 @@ def _chain(one: dict[str, Any]) -> Chain:
     )
 
 
-def _runs(numbers: Iterable[int]) -> list[tuple[int, int]]:
-    runs: list[tuple[int, int]] = []
-    for number in sorted(numbers):
-        if runs and runs[-1][1] == number - 1:
-            runs[-1] = (runs[-1][0], number)
-        else:
-            runs.append((number, number))
-    return runs
-
-
 def _ranges(numbers: Iterable[int]) -> str:
-    return ", ".join(str(a) if a == b else f"{a} to {b}" for a, b in _runs(numbers))
+    """Return numbers for people, those that follow each other as one range."""
+    # Along such a range a number and its place grow alike.
+    runs = [list(run) for _, run in groupby(enumerate(sorted(numbers)), lambda one: one[1] - one[0])]
+    return ", ".join(f"{run[0][1]} to {run[-1][1]}" if len(run) > 1 else str(run[0][1]) for run in runs)
 
 
 def _day(seconds: float) -> str:

@@ -1,13 +1,11 @@
-"""What is kept of one site: the bundles that were published for it, its last diagnosis; its runs, in `history.py`."""
+"""What is kept of one site: the bundles that were published for it; its runs, in `history.py`."""
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import Any
 
 from igrow.core.bundle import Bundle, BundleError, default_bundle_folder, read_bundle
 
@@ -72,12 +70,3 @@ def forget_old(bundles: Path, in_force: Path) -> None:
     for old in sorted(bundles.iterdir())[:-KEPT]:
         if old.resolve() != in_force.resolve():
             shutil.rmtree(old)
-
-
-def read_diagnosis(folder: Path) -> dict[str, Any] | None:
-    """Return the last diagnosis of a site, None where there is none that can be read."""
-    try:
-        document: dict[str, Any] = json.loads((folder / "diagnosis" / "diagnosis.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
-        return None
-    return document if isinstance(document, dict) else None
