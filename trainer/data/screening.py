@@ -124,8 +124,7 @@ def outage_rows(telemetry: Telemetry) -> Mask:
             values = telemetry[name]
             rows &= ~(np.abs(values) > 0.0)
             zeros += values == 0.0
-    found: Mask = rows & (zeros >= 2)
-    return found
+    return np.asarray(rows & (zeros >= 2))
 
 
 def _sentence(name: str, reason: str, count: int, stretches: Sequence[Screened]) -> str:

@@ -36,8 +36,7 @@ class DaySplit:
     @property
     def fit_rows(self) -> Mask:
         """Rows that may be fitted, (n,)."""
-        rows: Mask = self.fit[self.day]
-        return rows
+        return np.asarray(self.fit[self.day])
 
 
 def split_days(record: Record, longitude: float) -> DaySplit:
@@ -54,11 +53,9 @@ def split_days(record: Record, longitude: float) -> DaySplit:
 
 def weeks(time: Times) -> Integers:
     """Return the week of each row counted from the first row, (n,)."""
-    number: Integers = (time - time[0]).astype("timedelta64[s]").astype(np.int64) // 604_800
-    return number
+    return np.asarray((time - time[0]).astype("timedelta64[s]").astype(np.int64) // 604_800)
 
 
 def held_out_weeks(time: Times) -> Mask:
     """Return the rows of every fourth week, (n,), for logs of few weeks."""
-    held_out: Mask = weeks(time) % 4 == 3
-    return held_out
+    return np.asarray(weeks(time) % 4 == 3)

@@ -139,15 +139,13 @@ def _of_wall(local: Times, time_zone: str) -> Times:
     In the hour that happens twice the order alone tells which is which.
     """
     if len(local) > 1 and (np.diff(local.astype(np.int64)) < 0).mean() > 0.5:
-        backwards: Times = _of_wall(local[::-1], time_zone)[::-1]
-        return backwards
+        return np.asarray(_of_wall(local[::-1], time_zone)[::-1])
     new = np.ones(len(local), dtype=bool)
     new[1:] = local[1:] != local[:-1]
     if np.count_nonzero(new) > _ONE_ROW * len(new):
         # Of an hourly log the hour that happens twice is the one time that stands on two rows.
         return from_local(local, time_zone)
-    times: Times = from_local(local[new], time_zone)[np.cumsum(new) - 1]
-    return times
+    return np.asarray(from_local(local[new], time_zone)[np.cumsum(new) - 1])
 
 
 def _iso(text: str) -> datetime.datetime:

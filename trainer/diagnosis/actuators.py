@@ -147,8 +147,7 @@ def _errors(days: LogDays, values: Mapping[str, float], knowledge: Knowledge) ->
         line = sensitivity.linearise(days.record, days.runs, values, activate(days.record, knowledge.terms))
     except DivergenceError:
         return np.full(days.runs.weight.shape, np.inf)
-    counted: Floats = np.where(days.split.fit[days.runs.day][None, :, None], line.errors / SCALES, 0.0)
-    return counted
+    return np.asarray(np.where(days.split.fit[days.runs.day][None, :, None], line.errors / SCALES, 0.0))
 
 
 def _loss(days: LogDays, knowledge: Knowledge) -> float:

@@ -95,13 +95,11 @@ class LogDays:
             return sensitivity.linearise(record, runs, clipped(prior.names, point), effects, added)
 
         def residuals(point: Floats) -> Floats:
-            flat: Floats = (line(point).errors / SCALES).ravel()[counted]
-            return flat
+            return np.asarray((line(point).errors / SCALES).ravel()[counted])
 
         def jacobian(point: Floats) -> Floats:
             slopes = sensitivity.parameter_sensitivities(line(point), prior.names, prior.standard_deviation)
-            flat: Floats = (slopes / SCALES).reshape(len(slopes), -1)[:, counted].T
-            return flat
+            return np.asarray((slopes / SCALES).reshape(len(slopes), -1)[:, counted].T)
 
         weight = record.step / CORRELATION_TIME
         return solver.solve(

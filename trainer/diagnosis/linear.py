@@ -78,8 +78,7 @@ class DailyGrams:
                 shift += 1
             picked[:first, position] = 0.0
             picked[:first, :, position] = 0.0
-        joined: Floats = picked[:, :size, :size]
-        return joined
+        return np.asarray(picked[:, :size, :size])
 
 
 def daily_products(columns: Floats, day: Integers, count: int) -> Floats:
@@ -132,8 +131,7 @@ class Fit:
     def day_losses(self) -> Floats:
         """Half the sum of squared innovations of each day, (days,)."""
         vector = np.concatenate([[1.0], self.solution.coefficients])
-        losses: Floats = 0.5 * np.einsum("i,dij,j->d", vector, self.products, vector)
-        return losses
+        return np.asarray(0.5 * np.einsum("i,dij,j->d", vector, self.products, vector))
 
 
 def solve(products: Floats, precision: Floats) -> Solution:

@@ -39,8 +39,7 @@ class NoiseFilter:
 
     def __call__(self, values: Floats) -> Floats:
         """Filter along the last axis."""
-        filtered: Floats = lfilter(self.numerator, self.denominator, values, axis=-1)
-        return filtered
+        return np.asarray(lfilter(self.numerator, self.denominator, values, axis=-1))
 
 
 @dataclass(frozen=True)
@@ -56,8 +55,7 @@ class Whitening:
     def __call__(self, values: Floats) -> Floats:
         """Turn errors or sensitivities, (c, b, r, steps), into weighted white noise of the same shape."""
         filtered = np.stack([one(values[:, balance]) for balance, one in enumerate(self.filters)], axis=1)
-        white: Floats = np.tensordot(self.root, filtered, axes=(1, 1)).swapaxes(0, 1) * self.weight
-        return white
+        return np.asarray(np.tensordot(self.root, filtered, axes=(1, 1)).swapaxes(0, 1) * self.weight)
 
 
 def fit_filter(errors: Floats, counted: Mask, start: NoiseFilter | None = None) -> NoiseFilter:
@@ -79,8 +77,7 @@ def fit_filter(errors: Floats, counted: Mask, start: NoiseFilter | None = None) 
 
         def deviance(values: Floats, scale: float = scale) -> Floats:
             innovation = _filtered(normal, values)[counted] / scale
-            root: Floats = np.sign(innovation) * np.sqrt((FREEDOM + 1.0) * np.log1p(innovation**2 / FREEDOM))
-            return root
+            return np.asarray(np.sign(innovation) * np.sqrt((FREEDOM + 1.0) * np.log1p(innovation**2 / FREEDOM)))
 
         before = raw
         raw = np.asarray(least_squares(deviance, raw, bounds=(-3.0, 9.0), max_nfev=12, ftol=1e-5, xtol=1e-3).x)
@@ -148,8 +145,7 @@ def log_likelihood(whitening: Whitening, errors: Floats) -> Floats:
     """
     distance = _distance(whitening, errors)
     scale = float(np.log(np.diag(whitening.root)).sum())
-    likelihood: Floats = scale - 0.5 * (FREEDOM + len(errors)) * np.log1p(distance / FREEDOM)
-    return likelihood
+    return np.asarray(scale - 0.5 * (FREEDOM + len(errors)) * np.log1p(distance / FREEDOM))
 
 
 def extend(whitening: Whitening, errors: Floats, counted: Mask) -> Whitening:
@@ -162,8 +158,7 @@ def extend(whitening: Whitening, errors: Floats, counted: Mask) -> Whitening:
 def _distance(whitening: Whitening, errors: Floats) -> Floats:
     """Return the squared Mahalanobis distance of the innovations of errors (b, r, steps) from 0, (r, steps)."""
     innovations = np.stack([one(errors[balance]) for balance, one in enumerate(whitening.filters)])
-    distance: Floats = np.sum(np.tensordot(whitening.root, innovations, axes=1) ** 2, axis=0)
-    return distance
+    return np.asarray(np.sum(np.tensordot(whitening.root, innovations, axes=1) ** 2, axis=0))
 
 
 def _coefficients(raw: Floats) -> tuple[Floats, Floats]:
@@ -175,8 +170,7 @@ def _coefficients(raw: Floats) -> tuple[Floats, Floats]:
 
 
 def _filtered(values: Floats, raw: Floats) -> Floats:
-    filtered: Floats = lfilter(*_coefficients(raw), values)
-    return filtered
+    return np.asarray(lfilter(*_coefficients(raw), values))
 
 
 def _t_scale(innovation: Floats) -> float:

@@ -53,8 +53,7 @@ def averaged(values: Floats, step: float, interval: float) -> Floats:
     """
     size = max(1, round(interval / step))
     count = values.shape[-1] // size
-    means: Floats = values[..., : count * size].reshape(*values.shape[:-1], count, size).mean(axis=-1)
-    return means
+    return np.asarray(values[..., : count * size].reshape(*values.shape[:-1], count, size).mean(axis=-1))
 
 
 def recalibrate(

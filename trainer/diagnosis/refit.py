@@ -119,8 +119,7 @@ class _Unknowns:
         other = max(
             (knob.set(terms, value + sign * step) for sign in (1, -1)), key=lambda one: abs(knob.of(one) - value)
         )
-        slope: Floats = (self.line(point, other).errors - line.errors) / (knob.of(other) - value)
-        return slope
+        return np.asarray((self.line(point, other).errors - line.errors) / (knob.of(other) - value))
 
 
 def refit(design: Design, named: Fit, terms: Sequence[ActiveTerm], before: Sequence[ActiveTerm]) -> list[Refitted]:
@@ -184,8 +183,7 @@ class _View:
 
     def white(self, values: Floats) -> Floats:
         """Turn means over intervals, (k, b, r, intervals), into white noise of the same shape."""
-        white: Floats = self.whitening(values) * self.fitted
-        return white
+        return np.asarray(self.whitening(values) * self.fitted)
 
     def flat(self, values: Floats) -> Floats:
         """Return the same as rows of a least-squares problem, (n, k)."""

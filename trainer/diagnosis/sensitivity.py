@@ -147,8 +147,7 @@ def sensor_sensitivity(line: Linearisation, effect: Effect, shape: Mapping[str, 
     active = {**line.effects, effect.name: {effect.amplitude.name: small, **shape}}
     states = observe(line.record, line.parameters, active)
     shown = free_run(line.record, states, line.runs.starts, line.runs.steps, line.parameters, active)
-    sensitivity: Floats = -(_stacked(shown) - line.shown) / small
-    return sensitivity
+    return np.asarray(-(_stacked(shown) - line.shown) / small)
 
 
 def unit_fluxes(line: Linearisation, effect: Effect, shape: Mapping[str, float]) -> dict[str, Array]:
@@ -185,8 +184,7 @@ def _flux_batch(line: Linearisation, fluxes: Sequence[tuple[Mapping[str, Array],
     }
     shown = free_run(record, line.states, runs.starts, runs.steps, line.parameters, line.effects, added)
     small = np.array([size for _, size in fluxes])
-    sensitivities: Floats = -(_batched(shown, len(fluxes), line) - line.shown) / small[:, None, None, None]
-    return sensitivities
+    return np.asarray(-(_batched(shown, len(fluxes), line) - line.shown) / small[:, None, None, None])
 
 
 def run_memory(effect: Effect, values: Mapping[str, float], drivers: Mapping[str, Array], step: float) -> Floats:
@@ -236,8 +234,7 @@ def _batched(shown: Mapping[str, Floats], count: int, line: Linearisation) -> Fl
     # What no variant moves has no axis of variants.
     tables = [shown[name] if shown[name].ndim == 3 else shown[name][:, None] for name in measurement.PREDICTED]
     stacked = np.stack([np.broadcast_to(table, shape) for table in tables])
-    batched: Floats = stacked.transpose(2, 0, 3, 1)
-    return batched
+    return np.asarray(stacked.transpose(2, 0, 3, 1))
 
 
 def is_measured(record: Record, effect: Effect) -> bool:

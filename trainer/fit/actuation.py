@@ -154,8 +154,7 @@ def _fit_rule(
 
     def predict(point: Floats) -> Floats:
         trial = dict(rules) | dict(zip(names, point.tolist(), strict=True))
-        result: Floats = actuation.targets(np, setpoints, table, table, table, trial)[actuator]
-        return result
+        return np.asarray(actuation.targets(np, setpoints, table, table, table, trial)[actuator])
 
     def residual(point: Floats) -> Floats:
         # A faint pull to the usual settings decides what the log leaves open.
@@ -197,5 +196,4 @@ def _usual_course(measured: Floats, step: float) -> Floats:
         course = np.nanmedian(np.where(np.isfinite(window).any(axis=0), window, np.nanmedian(measured)), axis=0)
         padded = np.concatenate([course[-width:], course, course[:width]])
         courses[position] = np.convolve(padded, np.ones(width) / width, "same")[width:-width]
-    usual: Floats = courses.ravel()[: len(measured)]
-    return usual
+    return np.asarray(courses.ravel()[: len(measured)])

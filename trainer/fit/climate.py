@@ -163,8 +163,7 @@ class _Runs:
 
     def measured(self, name: str) -> Floats:
         """Return what was measured where errors are kept, (k, s)."""
-        values: Floats = self.record.measured[name][self.starts + 1 + self.kept[:, None]]
-        return values
+        return np.asarray(self.record.measured[name][self.starts + 1 + self.kept[:, None]])
 
 
 def _runs_of(record: Record, rows: Mask | None) -> _Runs | None:

@@ -176,8 +176,7 @@ def starts_within(record: Record, allowed: Mask, steps: int, every: int) -> Inte
     """Return start rows, (s,), `every` apart, from which a complete run of `steps` stays among `allowed` rows, (n,)."""
     starts = records.complete_starts(record, steps, every)
     outside = np.concatenate([[0], np.cumsum(~allowed)])
-    chosen: Integers = starts[outside[starts + steps + 1] - outside[starts] == 0]
-    return chosen
+    return np.asarray(starts[outside[starts + steps + 1] - outside[starts] == 0])
 
 
 def _summary(error: Floats, naive: Floats, day: Times, seed: int) -> ErrorSummary:

@@ -34,8 +34,7 @@ class Gaussian:
     @cached_property
     def standard_deviation(self) -> Floats:
         """Per parameter, (p,)."""
-        deviation: Floats = np.sqrt(np.diag(self.covariance))
-        return deviation
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
 
     @cached_property
     def values(self) -> dict[str, float]:
@@ -51,22 +50,19 @@ class Gaussian:
     def correlation(self) -> Floats:
         """How the parameters hang together, (p, p), ones on the diagonal."""
         scale = self.standard_deviation
-        correlation: Floats = self.covariance / np.outer(scale, scale)
-        return correlation
+        return np.asarray(self.covariance / np.outer(scale, scale))
 
     @cached_property
     def whitening(self) -> Floats:
         """The matrix W, (p, p), for which W (x - mean) is standard normal: W^T W is the inverse covariance."""
         scale = self.standard_deviation
         # Parameters differ by six orders of magnitude; their correlations do not.
-        whitening: Floats = np.linalg.inv(np.linalg.cholesky(self.correlation)) / scale
-        return whitening
+        return np.asarray(np.linalg.inv(np.linalg.cholesky(self.correlation)) / scale)
 
     @cached_property
     def precision(self) -> Floats:
         """The inverse covariance, (p, p)."""
-        precision: Floats = self.whitening.T @ self.whitening
-        return precision
+        return np.asarray(self.whitening.T @ self.whitening)
 
     def marginal(self, names: Sequence[str]) -> Gaussian:
         """Return what is known of some of the parameters, in the order of `names`."""

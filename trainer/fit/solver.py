@@ -178,8 +178,7 @@ def by_differences(batch: Batch, prior: Gaussian, high: Floats) -> tuple[Residua
     def jacobian(point: Floats) -> Floats:
         step = DIFFERENCE * prior.standard_deviation
         step = np.where(point + step > high, -step, step)
-        slope: Floats = (batch(point + np.diag(step)) - residuals(point)).T / step
-        return slope
+        return np.asarray((batch(point + np.diag(step)) - residuals(point)).T / step)
 
     return residuals, jacobian
 
@@ -194,8 +193,7 @@ def _has_arrived(found: OptimizeResult) -> bool:
 
 def _counted(values: Floats, weight: Floats) -> Floats:
     """Return values (..., n) times the roots of their weights, 0 where they do not count."""
-    counted: Floats = np.where(weight > 0.0, values, 0.0) * np.sqrt(weight)
-    return counted
+    return np.asarray(np.where(weight > 0.0, values, 0.0) * np.sqrt(weight))
 
 
 def _huber(squares: Floats, limit: Floats) -> Floats:

@@ -121,8 +121,7 @@ def planned_runs(bundle: Bundle, site: Site, record: Record, setpoints: Mapping[
 
     def hourly(table: Floats, start: int, hours: int) -> Floats:
         rows = np.minimum(start + np.arange(hours * hour), last)
-        means: Floats = table[rows].reshape(hours, hour, -1).mean(axis=1)
-        return means
+        return np.asarray(table[rows].reshape(hours, hour, -1).mean(axis=1))
 
     def predict(starts: Integers, steps: int) -> Mapping[str, Floats]:
         whole = -(-steps // (hour * _DAY)) * _DAY

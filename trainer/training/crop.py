@@ -81,8 +81,7 @@ def fit_net_growth(
         hours = record.step / 3600.0
 
         def total(values: Floats, day: int = day, days: int = days, hours: float = hours) -> Floats:
-            summed: Floats = values[: day * days].reshape(days, day).sum(axis=1) * hours
-            return summed
+            return np.asarray(values[: day * days].reshape(days, day).sum(axis=1) * hours)
 
         cumulative = to_grid(season, int(record.step))["net_growth"]
         end = np.minimum(day * np.arange(1, days + 1), len(cumulative) - 1)
@@ -108,8 +107,7 @@ def _bridged(table: Telemetry, name: str) -> Floats:
 
 def _by_day(values: Floats, days: int) -> Floats:
     """Return the means of whole days, (seasons, days)."""
-    means: Floats = values[:, : days * 24].reshape(len(values), days, 24).mean(axis=-1)
-    return means
+    return np.asarray(values[:, : days * 24].reshape(len(values), days, 24).mean(axis=-1))
 
 
 def _last(values: Floats, days: int) -> Floats:

@@ -79,5 +79,4 @@ def excel_times(serial: Floats, path: Path) -> Times:
 
 def excel_days(serial: Floats) -> Times:
     """Return Excel days as calendar days, datetime64[D]."""
-    days: Times = (_EPOCH + (np.floor(serial + 1e-6) * 86_400.0).astype("timedelta64[s]")).astype("datetime64[D]")
-    return days
+    return np.asarray((_EPOCH + (np.floor(serial + 1e-6) * 86_400.0).astype("timedelta64[s]")).astype("datetime64[D]"))

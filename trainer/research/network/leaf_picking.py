@@ -26,8 +26,7 @@ CERTAIN, FADED = 55.0, 75.0
 def smooth(values: Floats) -> Floats:
     """Return (runs, hours) as Cao et al. (2022) smooth leaf area and plant load: Savitzky-Golay, never negative."""
     window = min(SMOOTHING_WINDOW, values.shape[1] - 1 + values.shape[1] % 2)
-    smoothed: Floats = np.maximum(savgol_filter(values, window, SMOOTHING_ORDER, axis=1), 0.0)
-    return smoothed
+    return np.asarray(np.maximum(savgol_filter(values, window, SMOOTHING_ORDER, axis=1), 0.0))
 
 
 def followed(leaf_area: Floats) -> Floats:
