@@ -179,16 +179,13 @@ def _told(group: _Group, known: Collection[str]) -> list[Question]:
     ):
         for line in lines:
             print(f"{label}: {line}")
+    # Where the zone is another one now, the sun has answered the question about the clock.
+    answered = {"time_zone"} if checked.mapping.time.time_zone != proposal.mapping.time.time_zone else set()
     return [
         one
         for one in group.open_ones
-        if not _settled(one, proposal, checked) and (one.blocks or one.about.removeprefix("columns:") not in known)
+        if one.about not in answered and (one.blocks or one.about.removeprefix("columns:") not in known)
     ]
-
-
-def _settled(question: Question, proposal: Proposal, checked: Checked) -> bool:
-    """Tell whether the sun has answered a question about the clock."""
-    return question.about == "time_zone" and checked.mapping.time.time_zone != proposal.mapping.time.time_zone
 
 
 def _asked(files: Sequence[Path], site: Site | None, answers: Answers) -> tuple[Proposal, tuple[Question, ...]]:

@@ -54,16 +54,12 @@ def is_text(path: Path) -> bool:
     name = path.name.lower()
     if not name.endswith(EXCEL):
         return not name.endswith(".parquet")
-    start = _start(path)
-    return name.endswith(".xls") and bool(start) and (start.startswith(_MARKS) or b"\x00" not in start)
-
-
-def _start(path: Path) -> bytes:
     try:
         with path.open("rb") as file:
-            return file.read(4096)
+            start = file.read(4096)
     except OSError:
-        return b""
+        return False
+    return name.endswith(".xls") and bool(start) and (start.startswith(_MARKS) or b"\x00" not in start)
 
 
 def _refuse_what_is_no_text(path: Path, data: bytes) -> None:
@@ -109,12 +105,7 @@ def read_text(path: Path, encoding: str) -> str:
 
 
 def read_cells(
-    path: Path,
-    *,
-    delimiter: str = ",",
-    encoding: str = "utf-8",
-    sheet: str | None = None,
-    transposed: bool = False,
+    path: Path, *, delimiter: str = ",", encoding: str = "utf-8", sheet: str | None = None, transposed: bool = False
 ) -> Cells:
     """Return the cells of a file; rows without any text are left out.
 

@@ -46,11 +46,7 @@ def _tables(path: Path, mapping: ExportMapping) -> list[ExportTable]:
         if tables:
             return tables
     cells = read_cells(
-        path,
-        delimiter=mapping.delimiter,
-        encoding=mapping.encoding,
-        sheet=mapping.sheet,
-        transposed=mapping.transposed,
+        path, delimiter=mapping.delimiter, encoding=mapping.encoding, sheet=mapping.sheet, transposed=mapping.transposed
     )
     return [_table(cells, mapping)]
 

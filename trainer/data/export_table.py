@@ -55,7 +55,7 @@ def as_table(
     start = max(header) + 1 if first_row is None else first_row
     body = [(row, line) for row, line in zip(cells.rows, cells.lines, strict=True) if line >= start]
     width = max(len(row) for row in heads)
-    heads = [*(_spread(row, width) for row in heads[:-1]), heads[-1]]
+    heads = [*(held([*row, *[""] * (width - len(row))]) for row in heads[:-1]), heads[-1]]
     names: list[str] = []
     for position in range(width):
         parts = [" ".join(row[position].split()) for row in heads if position < len(row) and row[position]]
@@ -112,11 +112,6 @@ def _places(row: Sequence[str], names: Sequence[str]) -> list[int]:
         place = next(index for index, (_, cell) in enumerate(left) if cell == name)
         places.append(left.pop(place)[0])
     return places
-
-
-def _spread(row: Sequence[str], width: int) -> list[str]:
-    """Return a row whose empty cells have the text of the cell before them."""
-    return held([*row, *[""] * (width - len(row))])
 
 
 def chosen_rows(table: ExportTable, only: Mapping[str, str]) -> ExportTable:

@@ -79,14 +79,7 @@ def _prepared(source: Source, site: Site | None, accept: Collection[str] = ()) -
         *_unjudged(table, site),
     ]
     return Log(
-        source.name,
-        table,
-        site,
-        tuple(notes),
-        screened.screened,
-        tuple(faults),
-        source.harvests,
-        source.resources,
+        source.name, table, site, tuple(notes), screened.screened, tuple(faults), source.harvests, source.resources
     )
 
 

@@ -13,24 +13,16 @@ from igrow.core.quantities import QUANTITIES
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data.fault import DataFault
 
-STUCK_HOURS: Mapping[str, float] = {
-    "air_temperature": 6.0,
-    "air_humidity": 8.0,
-    "air_co2": 6.0,
-    "outdoor_temperature": 8.0,
-    "outdoor_humidity": 24.0,
-    "sky_temperature": 12.0,
+STUCK: Mapping[str, tuple[float, float]] = {
+    "air_temperature": (6.0, 0.25),
+    "air_humidity": (8.0, 0.9),
+    "air_co2": (6.0, 9.0),
+    "outdoor_temperature": (8.0, 0.25),
+    "outdoor_humidity": (24.0, 0.9),
+    "sky_temperature": (12.0, 0.9),
 }
-"""Hours after which an unchanged reading is no reading (saturated humidity aside)."""
-COARSE: Mapping[str, float] = {
-    "air_temperature": 0.25,
-    "outdoor_temperature": 0.25,
-    "sky_temperature": 0.9,
-    "air_humidity": 0.9,
-    "outdoor_humidity": 0.9,
-    "air_co2": 9.0,
-}
-"""A column in steps of so much may well stand still for longer: three times the hours."""
+"""Hours after which an unchanged reading is no reading (saturated humidity aside), and the steps of a column that may
+well stand still for three times as long."""
 SPIKE: Mapping[str, float] = {
     "air_temperature": 4.0,
     "air_humidity": 15.0,
@@ -87,8 +79,9 @@ def screen(telemetry: Telemetry) -> Screening:
             checks.insert(0, ("outage", out & np.isfinite(raw)))
         if name in SPIKE:
             checks.append(("spike", _spikes(np.where(wrong, np.nan, values), SPIKE[name])))
-        if name in STUCK_HOURS:
-            hours = STUCK_HOURS[name] * (3.0 if _resolution(values) >= COARSE[name] else 1.0)
+        if name in STUCK:
+            hours, coarse = STUCK[name]
+            hours *= 3.0 if _resolution(values) >= coarse else 1.0
             checks.append(("stuck", _stuck(telemetry.time, values, hours, saturated=name.endswith("humidity"))))
         before = int(np.isfinite(raw).sum())
         for reason, rows in checks:

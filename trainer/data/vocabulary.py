@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
@@ -42,6 +42,10 @@ class Rule:
     excluded: frozenset[str]
     likelier: tuple[str, ...]
     dimension: str
+
+    def fitting(self, words: frozenset[str], enough: Iterable[tuple[str, ...]]) -> list[tuple[str, ...]]:
+        """Return the sets of words, of those that are enough, that a name has; a word of one excludes nothing."""
+        return [one for one in enough if words.issuperset(one) and not words & self.excluded.difference(one)]
 
 
 @cache
@@ -98,10 +102,19 @@ def switch_words() -> Mapping[str, float]:
 @cache
 def _words() -> Mapping[str, Sequence[tuple[str, bool]]]:
     """Return each word's spellings, folded, and whether one must stand alone."""
-    return {
-        word: [(folded(spelling.removeprefix("=")), spelling.startswith("=")) for spelling in spellings]
-        for word, spellings in _table()["words"].items()
-    }
+    return {word: _spelt(spellings) for word, spellings in _table()["words"].items()}
+
+
+def _spelt(words: Iterable[str]) -> list[tuple[str, bool]]:
+    """Return words folded, and whether one must stand alone: what has a sign of equality before it."""
+    return [(folded(word.removeprefix("=")), word.startswith("=")) for word in words]
+
+
+def _has_one_of(name: str, spelt: Iterable[tuple[str, bool]]) -> bool:
+    """Tell whether a name has one of some words in it, or among its own where that must stand alone."""
+    text = folded(name)
+    alone = set(re.split(r"\W+", text))
+    return any(word in alone if single else word in text for word, single in spelt)
 
 
 @cache
@@ -159,7 +172,12 @@ def exact_names() -> Mapping[str, str]:
 
 def time_words(kind: str) -> Sequence[tuple[str, bool]]:
     """Return the spellings of a kind of time column (``date_and_time``, ``date``, ``time_of_day``)."""
-    return [(folded(word.removeprefix("=")), word.startswith("=")) for word in _table()["time"][kind]]
+    return _spelt(_table()["time"][kind])
+
+
+def is_time(name: str, kind: str) -> bool:
+    """Tell whether a column's name is a word for a kind of time column."""
+    return _has_one_of(name, time_words(kind))
 
 
 def is_total(text: str) -> bool:
@@ -258,7 +276,4 @@ def is_value(name: str) -> bool:
 
 def is_compartment(name: str) -> bool:
     """Tell whether a column's name is a word for a compartment."""
-    text = folded(name)
-    alone = set(re.split(r"\W+", text))
-    spelt = [(folded(word.removeprefix("=")), word.startswith("=")) for word in _table()["compartments"]]
-    return any(word in alone if single else word in text for word, single in spelt)
+    return _has_one_of(name, _spelt(_table()["compartments"]))

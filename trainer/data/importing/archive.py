@@ -38,7 +38,7 @@ def unpack(archive: Path, into: Path) -> Path:
 
 def _unpacked(archive: Path, opened: zipfile.ZipFile, into: Path, room: int, depth: int) -> int:
     """Unpack tables and the archives that lie among them, each of these into a folder of its name; returns bytes."""
-    tables = [one for one in opened.infolist() if _is_table(one.filename)]
+    tables = [one for one in opened.infolist() if may_be_table(_own(one.filename))]
     inner = [one for one in opened.infolist() if _own(one.filename).lower().endswith(ARCHIVE)] if depth > 1 else []
     size = sum(one.file_size for one in tables)
     if size + max((one.file_size for one in inner), default=0) > room:
@@ -55,11 +55,6 @@ def _unpacked(archive: Path, opened: zipfile.ZipFile, into: Path, room: int, dep
 def is_archive(path: Path) -> bool:
     """Tell whether a file is called an archive."""
     return path.is_file() and path.name.lower().endswith(ARCHIVE)
-
-
-def _is_table(name: str) -> bool:
-    """Tell whether a name in an archive is that of a table."""
-    return may_be_table(_own(name))
 
 
 def _own(name: str) -> str:

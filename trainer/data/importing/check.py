@@ -103,11 +103,6 @@ def _candidates(site: Site, merged: Merged) -> list[str]:
     return list(dict.fromkeys([*zones, "UTC", fixed(solar)]))
 
 
-def _of_one_column(quantity: str, rules: Mapping[str, ColumnMapping]) -> list[str]:
-    """Return a quantity and those that are made of its column, as the lamps' power is of whether they burn."""
-    return [name for name, rule in rules.items() if rule.column == rules[quantity].column]
-
-
 def _with_remedy(rule: ColumnMapping, remedy: Remedy) -> ColumnMapping:
     amount = rule.amount if remedy.amount == "rate" else remedy.amount
     return replace(
@@ -158,8 +153,11 @@ def _remedied(
             one, other = fault.quantity.split(", ")
             changed[one], changed[other] = changed[other], changed[one]
         elif fault.remedy is not None and fault.quantity in changed:
-            for name in _of_one_column(fault.quantity, changed):
-                changed[name] = _with_remedy(changed[name], fault.remedy)
+            # What is made of its column too, as the lamps' power is of whether they burn.
+            column = changed[fault.quantity].column
+            changed |= {
+                name: _with_remedy(rule, fault.remedy) for name, rule in changed.items() if rule.column == column
+            }
         else:
             continue
         choice = " (--unit wind_speed=mph or knots says otherwise)" if fault.kind == "kilometres_per_hour" else ""

@@ -62,9 +62,7 @@ def find_matches(columns: Iterable[str], unit_line: Mapping[str, str]) -> list[M
             continue
         for quantity, rule in vocabulary.rules().items():
             enough = (*rule.needed, *(rule.by_unit if rule.dimension in units else ()))
-            # A word that is needed excludes nothing.
-            fitting = [one for one in enough if words.issuperset(one) and not words & rule.excluded.difference(one)]
-            needed = max(map(len, fitting), default=0)
+            needed = max(map(len, rule.fitting(words, enough)), default=0)
             if not needed or foreign or (units and rule.dimension not in units):
                 continue
             more = sum(word in words for word in rule.likelier)
@@ -80,11 +78,7 @@ def of_unknown_unit(columns: Iterable[str], unit_line: Mapping[str, str]) -> dic
         written = vocabulary.compact(unit_line.get(column, ""))
         own = unit_line[column] if written and not vocabulary.find_units([written]) else vocabulary.unknown_unit(column)
         words = vocabulary.words_in(vocabulary.without_unit(column))
-        named = any(
-            words.issuperset(one) and not words & rule.excluded.difference(one)
-            for rule in vocabulary.rules().values()
-            for one in (*rule.needed, *rule.by_unit)
-        )
+        named = any(rule.fitting(words, (*rule.needed, *rule.by_unit)) for rule in vocabulary.rules().values())
         if own and named and _exact(column) is None:
             found[column] = own
     return found
@@ -162,12 +156,14 @@ def assign(matches: Sequence[Match], compartment: str, given: Mapping[str, str])
     rivals: dict[str, tuple[str, ...]] = {}
     for quantity, column in given.items():
         known = next((one for one in matches if one.quantity == quantity and one.column == column), None)
-        chosen[quantity] = known or Match(quantity, column, _CERTAIN, _unit_of(column, quantity), "")
+        unit = vocabulary.find_units(vocabulary.unit_texts(column)).get(dimension(quantity))
+        chosen[quantity] = known or Match(quantity, column, _CERTAIN, unit, "")
     taken = set(given.values())
     # A compartment's own column comes before one that tells none.
     ranked = sorted(fitting, key=lambda one: (-one.score, one.compartment != compartment))
     for one in ranked:
-        if one.quantity in given or one.column in taken or _spoken_for(one, ranked):
+        likelier = any(other.column == one.column and other.score > one.score for other in ranked)
+        if one.quantity in given or one.column in taken or likelier:
             continue
         best = chosen.get(one.quantity)
         if best is None:
@@ -185,15 +181,6 @@ def check_given(given: Mapping[str, str], labels: Sequence[str]) -> None:
             raise IgrowError(f"--column {quantity}={column}: no such quantity: {nearest(quantity, QUANTITIES)}")
         if column not in labels:
             raise IgrowError(f"--column {quantity}={column}: no such column: {nearest(column, labels)}")
-
-
-def _spoken_for(one: Match, ranked: Sequence[Match]) -> bool:
-    """Tell whether a column is likelier another quantity."""
-    return any(other.column == one.column and other.score > one.score for other in ranked)
-
-
-def _unit_of(column: str, quantity: str) -> Unit | None:
-    return vocabulary.find_units(vocabulary.unit_texts(column)).get(dimension(quantity))
 
 
 def unit_called(quantity: str, text: str) -> Unit:

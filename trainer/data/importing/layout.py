@@ -18,12 +18,7 @@ from igrow.core.errors import IgrowError
 from igrow.trainer.data import vocabulary
 from igrow.trainer.data.cells import Cells, is_text, is_workbook, read_bytes, read_cells, unquoted
 from igrow.trainer.data.fixed_places import stands_at_fixed_places
-from igrow.trainer.data.importing.first_reading import (
-    first_reading,
-    is_value,
-    times_have_no_day,
-    times_stand_across,
-)
+from igrow.trainer.data.importing.first_reading import first_reading, is_value, times_have_no_day, times_stand_across
 from igrow.trainer.data.importing.sheets import fullest_sheet
 from igrow.trainer.data.named_days import day_in
 

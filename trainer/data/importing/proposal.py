@@ -69,12 +69,10 @@ class _Body:
 
     def cells(self, label: str) -> Sequence[str]:
         """Return the readings under a label as they are written."""
-        return self.table[label] if self.long is None else self._named(self.long, label)
-
-    def _named(self, long: LongTable, label: str) -> list[str]:
-        return [
-            value for name, value in zip(self.table[long.name], self.table[long.value], strict=True) if name == label
-        ]
+        if self.long is None:
+            return self.table[label]
+        names, values = self.table[self.long.name], self.table[self.long.value]
+        return [value for name, value in zip(names, values, strict=True) if name == label]
 
 
 @dataclass
@@ -212,11 +210,7 @@ def _ordered(time: TimeForm, answers: Answers, draft: _Draft) -> TimeForm:
 
 
 def _mapped(
-    body: _Body,
-    assigned: names.Assignment,
-    site: Site | None,
-    answers: Answers,
-    draft: _Draft,
+    body: _Body, assigned: names.Assignment, site: Site | None, answers: Answers, draft: _Draft
 ) -> tuple[dict[str, ColumnMapping], dict[str, str]]:
     """Return the rule of each quantity, and the units that they are taken to be in."""
     rules: dict[str, ColumnMapping] = {}

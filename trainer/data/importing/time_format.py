@@ -91,7 +91,7 @@ def find_time(columns: dict[str, Sequence[str]]) -> TimeForm | None:
         forms = _forms(texts)
         if not forms:
             continue
-        likely = 1.0 + _named(name, "date_and_time") - 0.02 * position
+        likely = 1.0 + vocabulary.is_time(name, "date_and_time") - 0.02 * position
         if all(_midnight(texts, form) for form in forms):
             clock = _clock_column(columns, names, name)
             if clock is not None:
@@ -100,7 +100,8 @@ def find_time(columns: dict[str, Sequence[str]]) -> TimeForm | None:
                 ]
                 both = _forms(_sample(joined))
                 if both:
-                    found.append((likely + 0.5 + _named(name, "date"), _best(name, clock, both, _sample(joined))))
+                    likely += 0.5 + vocabulary.is_time(name, "date")
+                    found.append((likely, _best(name, clock, both, _sample(joined))))
                     continue
         found.append((likely, _best(name, None, forms, texts)))
     return max(found, key=lambda one: one[0])[1] if found else None
@@ -116,12 +117,6 @@ def _sample(texts: Sequence[str]) -> list[str]:
     return kept if len(kept) <= 2 * _SAMPLE else kept[:_SAMPLE] + kept[_SAMPLE :: max(1, len(kept) // _SAMPLE)]
 
 
-def _named(name: str, kind: str) -> float:
-    text = vocabulary.folded(name)
-    alone = set(re.split(r"\W+", text))
-    return float(any(word in alone if single else word in text for word, single in vocabulary.time_words(kind)))
-
-
 def _clock_column(columns: dict[str, Sequence[str]], names: Sequence[str], date: str) -> str | None:
     """Return the column of the time of day that goes with a column of dates."""
     clocks = [
@@ -129,23 +124,19 @@ def _clock_column(columns: dict[str, Sequence[str]], names: Sequence[str], date:
         for name in names
         if name != date
         and (texts := _sample(columns[name]))
-        and (_is_clock(texts) or _is_hour(name, texts) or _is_part_of_day(texts))
+        and (all(map(is_clock, texts[:50])) or _is_hour(name, texts) or _is_part_of_day(texts))
     ]
     return min(
         clocks,
-        key=lambda name: (-_named(name, "time_of_day"), abs(names.index(name) - names.index(date))),
+        key=lambda name: (not vocabulary.is_time(name, "time_of_day"), abs(names.index(name) - names.index(date))),
         default=None,
     )
-
-
-def _is_clock(texts: Sequence[str]) -> bool:
-    return all(map(is_clock, texts[:50]))
 
 
 def _is_hour(name: str, texts: Sequence[str]) -> bool:
     """Tell whether a column counts the hours of the day, from 0 or from 1."""
     whole = all(re.fullmatch(r"\d{1,2}", text) and int(text) <= 24 for text in texts[:50])
-    return whole and len(set(texts)) in (23, 24, 25) and bool(_named(name, "time_of_day"))
+    return whole and len(set(texts)) in (23, 24, 25) and vocabulary.is_time(name, "time_of_day")
 
 
 def _is_part_of_day(texts: Sequence[str]) -> bool:
@@ -202,9 +193,9 @@ def _written_forms(texts: Sequence[str]) -> list[str]:
     numbers = [position for position, token in enumerate(tokens) if token.isdigit()]
     months = [p for p, token in enumerate(tokens) if vocabulary.folded(token) in vocabulary.month_names()]
     if numbers and len(tokens[numbers[0]]) == 8:
-        return [form for form in (_clock_after(tokens, numbers[0] + 1, "%Y%m%d"),) if form is not None]
+        return _clock_after(tokens, numbers[0] + 1, "%Y%m%d")
     if re.match(r"(19|20)\d\d-\d{3}(?!\d)", texts[0]):
-        return [form for form in (_clock_after(tokens, 3, "%Y-%j"),) if form is not None]
+        return _clock_after(tokens, 3, "%Y-%j")
     date = sorted([*numbers, *months[:1]])[:3]
     if len(date) < 3:
         return []
@@ -212,7 +203,7 @@ def _written_forms(texts: Sequence[str]) -> list[str]:
         orders = [("%d", "%b", "Y"), ("%b", "%d", "Y"), ("Y", "%b", "%d")]
     else:
         orders = [("%d", "%m", "Y"), ("%m", "%d", "Y"), ("Y", "%m", "%d"), ("Y", "%d", "%m")]
-    forms = []
+    forms: list[str] = []
     for order in orders:
         parts = list(tokens[: date[2] + 1])
         fits = True
@@ -220,14 +211,12 @@ def _written_forms(texts: Sequence[str]) -> list[str]:
             long = tokens[position].isdigit() and len(tokens[position]) == 4
             fits &= (sign == "Y" or not long) and ((sign == "%b") == (position in months))
             parts[position] = ("%Y" if long else "%y") if sign == "Y" else sign
-        form = _clock_after(tokens, date[2] + 1, "".join(parts)) if fits else None
-        if form is not None:
-            forms.append(form)
+        forms += _clock_after(tokens, date[2] + 1, "".join(parts)) if fits else []
     return forms
 
 
-def _clock_after(tokens: Sequence[str], start: int, form: str) -> str | None:
-    """Return a form with the time of day that follows the date, or None for what is no time of day."""
+def _clock_after(tokens: Sequence[str], start: int, form: str) -> list[str]:
+    """Return a form with the time of day that follows the date; none for what is no time of day."""
     signs = iter(("%H", "%M", "%S", "%f"))
     half = any(re.fullmatch(r"[ap]m", token, re.IGNORECASE) for token in tokens[start:])
     compact = [token for token in tokens[start:] if token.isdigit()]
@@ -237,11 +226,11 @@ def _clock_after(tokens: Sequence[str], start: int, form: str) -> str | None:
         if token.isdigit():
             sign = next(signs, None)
             if sign is None:
-                return None
+                return []
             form += "%I" if half and sign == "%H" else sign
         else:
             form += "%p" if re.fullmatch(r"[ap]m", token, re.IGNORECASE) else token
-    return form
+    return [form]
 
 
 def _midnight(texts: Sequence[str], form: str) -> bool:

@@ -13,20 +13,15 @@ from igrow.core.quantities import QUANTITIES
 from igrow.trainer.data import vocabulary
 from igrow.trainer.data.importing import columns as names
 from igrow.trainer.data.mapping import ColumnMapping
+from igrow.trainer.data.plausibility.units import PIPES
 from igrow.trainer.data.vocabulary import Unit
 
 _AMERICAN = {"temperature": "degF", "speed": "mph"}
 """By dimension, what goes with degrees Fahrenheit."""
-BY_SIZE = ("air_temperature", "heating_setpoint", "rail_pipe_temperature", "grow_pipe_temperature")
+BY_SIZE = ("air_temperature", "heating_setpoint", *PIPES)
 """Temperatures of the greenhouse, whose own size tells degF: what is 20 there is never degF, whatever stands beside."""
 
-LIKE_THE_AIR = (
-    "outdoor_temperature",
-    "sky_temperature",
-    "rail_pipe_temperature",
-    "grow_pipe_temperature",
-    "wind_speed",
-)
+LIKE_THE_AIR = ("outdoor_temperature", "sky_temperature", *PIPES, "wind_speed")
 """Quantities that are whole tenths where the air temperature is, and of which the size alone says nothing."""
 
 

@@ -20,12 +20,9 @@ def find_faults(telemetry: Telemetry, site: Site | None = None) -> tuple[DataFau
         telemetry: as it was read, in the units that it claims.
         site: where the greenhouse stands; without it nothing is said of the sun.
     """
-    sparse = order.sparse(telemetry)
-    if sparse:
-        return sparse
-    shuffled = order.shuffled(telemetry)
-    if shuffled:
-        return shuffled
+    odd = order.sparse(telemetry) or order.shuffled(telemetry)
+    if odd is not None:
+        return (odd,)
     wrong = units.wrong_units(telemetry)
     by_size = {fault.quantity for fault in wrong}
     swapped = columns.swapped(telemetry, site, by_size)

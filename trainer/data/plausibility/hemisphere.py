@@ -23,12 +23,9 @@ def other_hemisphere(telemetry: Telemetry, site: Site) -> DataFault | None:
     if here < LEAST_SHARE or here < LEAST_RATIO * there:
         return None
     right = f"{-site.latitude:g}"
-    return DataFault(
-        "latitude",
-        "",
-        f"days and nights are not as long as at latitude {site.latitude:g}, but as at {right}",
-        f"north is positive and south is negative: latitude: {right} in the site file",
-    )
+    seen = f"days and nights are not as long as at latitude {site.latitude:g}, but as at {right}"
+    mend = f"north is positive and south is negative: latitude: {right} in the site file"
+    return DataFault("latitude", "", seen, mend)
 
 
 def _against(telemetry: Telemetry, latitude: float, longitude: float) -> float:

@@ -17,13 +17,13 @@ LEAST_CORRELATION = 0.3
 _LEAST_ROWS = 100
 
 
-def sparse(telemetry: Telemetry) -> tuple[DataFault, ...]:
+def sparse(telemetry: Telemetry) -> DataFault | None:
     """Tell whether the rows, or the readings in them, lie too far apart for any model."""
     step = own_step(telemetry.time)
     mend = "export a row every hour or more, best every 5 min"
     if not step <= HOUR:
         pace = f"a row every {step / HOUR:.3g} h" if step > 0.0 else "a single row"
-        return (DataFault("sparse", "", f"{pace} is too sparse for any model", mend),)
+        return DataFault("sparse", "", f"{pace} is too sparse for any model", mend)
     hours = telemetry.time.astype("datetime64[h]")
     days = np.unique(telemetry.time.astype("datetime64[D]"))
     for name in NEEDED:
@@ -34,11 +34,11 @@ def sparse(telemetry: Telemetry) -> tuple[DataFault, ...]:
         whole = int((count >= 12).sum())
         if len(there) and len(days) > LEAST_DAYS and whole < LEAST_DAYS:
             seen = f"{name} has readings in half of the hours on {whole} of {len(days)} days only"
-            return (DataFault("sparse", name, f"{seen}, too sparse for any model", mend),)
-    return ()
+            return DataFault("sparse", name, f"{seen}, too sparse for any model", mend)
+    return None
 
 
-def shuffled(telemetry: Telemetry) -> tuple[DataFault, ...]:
+def shuffled(telemetry: Telemetry) -> DataFault | None:
     """Tell whether one row says nothing of the next: the times are not those of the readings."""
     for name in ("outdoor_temperature", "air_temperature", "global_radiation"):
         values = readings(telemetry, name)
@@ -46,14 +46,9 @@ def shuffled(telemetry: Telemetry) -> tuple[DataFault, ...]:
             continue
         ranks = np.argsort(np.argsort(values, kind="stable"), kind="stable").astype(np.float64)
         correlation = float(np.corrcoef(ranks[1:], ranks[:-1])[0, 1])
-        if correlation < LEAST_CORRELATION:
-            return (
-                DataFault(
-                    "shuffled_rows",
-                    name,
-                    f"{name} of one row says nothing of the next (correlation {correlation:.2f})",
-                    "the times do not belong to the readings: export the log anew, without sorting single columns",
-                ),
-            )
-        return ()
-    return ()
+        if correlation >= LEAST_CORRELATION:
+            return None
+        seen = f"{name} of one row says nothing of the next (correlation {correlation:.2f})"
+        mend = "the times do not belong to the readings: export the log anew, without sorting single columns"
+        return DataFault("shuffled_rows", name, seen, mend)
+    return None

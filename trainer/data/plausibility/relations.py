@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from igrow.core import sun
+from igrow.core.arrays import Floats
 from igrow.core.quantities import difference_with_unit, with_unit
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
@@ -82,14 +83,20 @@ def _outdoor_temperature(telemetry: Telemetry, site: Site | None) -> DataFault |
     return in_another_unit("fahrenheit", name, seen, FAHRENHEIT)
 
 
+def _side_by_side(telemetry: Telemetry, name: str, beside: str) -> tuple[Floats, Floats]:
+    """Return two columns where both were read, (k,) each; nothing where the log lacks one."""
+    if name not in telemetry or beside not in telemetry:
+        return np.empty(0), np.empty(0)
+    known = np.isfinite(telemetry[name]) & np.isfinite(telemetry[beside])
+    return telemetry[name][known], telemetry[beside][known]
+
+
 def _sky(telemetry: Telemetry) -> DataFault | None:
     name = "sky_temperature"
-    if name not in telemetry or "outdoor_temperature" not in telemetry:
+    both = _side_by_side(telemetry, name, "outdoor_temperature")
+    if len(both[0]) < LEAST_VALUES:
         return None
-    known = np.isfinite(telemetry[name]) & np.isfinite(telemetry["outdoor_temperature"])
-    if known.sum() < LEAST_VALUES:
-        return None
-    sky, air = (float(np.median(telemetry[one][known])) for one in (name, "outdoor_temperature"))
+    sky, air = (float(np.median(values)) for values in both)
     if sky <= air + SKY_ABOVE or sky * FAHRENHEIT.scale + FAHRENHEIT.offset > air + SKY_ABOVE:
         return None
     warmer = difference_with_unit(name, sky - air, ".3g")
@@ -99,13 +106,10 @@ def _sky(telemetry: Telemetry) -> DataFault | None:
 
 def _pipe(telemetry: Telemetry, name: str) -> DataFault | None:
     """Judge a pipe by its coolest tenth: at rest it is as warm as the air around it."""
-    if name not in telemetry or "air_temperature" not in telemetry:
+    pipe, air = _side_by_side(telemetry, name, "air_temperature")
+    pipe, air = pipe[pipe > 1.0], air[pipe > 1.0]
+    if len(pipe) < _LEAST_ROWS:
         return None
-    pipe, air = telemetry[name], telemetry["air_temperature"]
-    known = np.isfinite(pipe) & np.isfinite(air) & (pipe > 1.0)
-    if known.sum() < _LEAST_ROWS:
-        return None
-    pipe, air = pipe[known], air[known]
     coolest = pipe <= np.quantile(pipe, 0.1)
     above = float(np.median((pipe - air)[coolest]))
     converted = float(np.median((pipe * FAHRENHEIT.scale + FAHRENHEIT.offset - air)[coolest]))
@@ -121,11 +125,7 @@ def _pipe(telemetry: Telemetry, name: str) -> DataFault | None:
 def _outdoor_humidity(telemetry: Telemetry) -> DataFault | None:
     """Relative humidity falls as a day grows warmer; grams a cubic metre do not."""
     name = "outdoor_humidity"
-    if name not in telemetry or "outdoor_temperature" not in telemetry:
-        return None
-    humidity, warmth = telemetry[name], telemetry["outdoor_temperature"]
-    known = np.isfinite(humidity) & np.isfinite(warmth)
-    humidity, warmth = humidity[known], warmth[known]
+    humidity, warmth = _side_by_side(telemetry, name, "outdoor_temperature")
     if len(humidity) < _LEAST_ROWS or np.std(humidity) == 0.0 or np.std(warmth) == 0.0:
         return None
     middle, high = (float(one) for one in np.quantile(humidity, (0.5, 0.995)))

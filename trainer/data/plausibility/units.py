@@ -78,8 +78,7 @@ def _temperature(name: str, values: Floats) -> DataFault | None:
     if high < 140.0:
         return in_another_unit("fahrenheit", name, f"{seen}, so it is in degF", FAHRENHEIT)
     if high < 600.0:
-        tenths = Remedy(0.1)
-        return in_another_unit("tenths", name, f"{seen}, so it is in tenths of degC", tenths)
+        return in_another_unit("tenths", name, f"{seen}, so it is in tenths of degC", Remedy(0.1))
     return DataFault("no_temperature", name, f"{seen} and is no temperature", "name its column anew (--column)")
 
 
@@ -105,9 +104,8 @@ def _humidity(name: str, values: Floats) -> DataFault | None:
         )
     # A deficit in kPa lies there too, and is small where the air is damp.
     if high <= 1.05 and middle > (DRIEST if name == "air_humidity" else 0.1):
-        percent = Remedy(100.0)
         seen = f"{name} lies between 0 and 1 (median {middle:.2f}), so it is a fraction"
-        return in_another_unit("fraction", name, seen, percent)
+        return in_another_unit("fraction", name, seen, Remedy(100.0))
     if name == "air_humidity" and middle < 25.0 and high < 45.0:
         seen = f"{name} has a median of {middle:.3g} and hardly exceeds {high:.3g}: no greenhouse is so dry"
         return DataFault("absolute_humidity", name, seen, RELATIVE_IN_PER_CENT)
@@ -119,17 +117,15 @@ def _position(name: str, values: Floats) -> DataFault | None:
     between = np.unique(np.round(values[(values > 0.02) & (values < 0.98)], 4))
     # Percentages below 1 all along, in steps finer than any actuator has.
     if 0.3 < top <= 1.001 and (len(between) >= 15 or (values > 0.9).mean() > 0.05):
-        percent = Remedy(100.0)
         seen = f"{name} never exceeds {top:.2g}, so it is a fraction"
-        return in_another_unit("fraction", name, seen, percent)
+        return in_another_unit("fraction", name, seen, Remedy(100.0))
     return None
 
 
 def _carbon_dioxide(name: str, values: Floats) -> DataFault | None:
     middle = float(np.median(values))
     if 0.02 < middle < 0.6:
-        parts = Remedy(10_000.0)
-        return in_another_unit("percent", name, f"{name} has a median of {middle:.3g}, so it is in %", parts)
+        return in_another_unit("percent", name, f"{name} has a median of {middle:.3g}, so it is in %", Remedy(1e4))
     return None
 
 
@@ -175,6 +171,5 @@ def _power(name: str, values: Floats) -> DataFault | None:
 def _switch(name: str, values: Floats) -> DataFault | None:
     top = float(values.max())
     if 1.5 < top <= 100.5 and (values > 1.5).mean() > 0.01:
-        share = Remedy(0.01)
-        return in_another_unit("percent", name, f"{name} reaches {top:.3g}, so it is in %", share)
+        return in_another_unit("percent", name, f"{name} reaches {top:.3g}, so it is in %", Remedy(0.01))
     return None

@@ -64,10 +64,7 @@ def _setpoints(folder: Path, local: Times, columns: dict[str, Floats]) -> list[s
         return ["no setpoints are known"]
     table = excel_tables.read(path)
     time = excel_tables.excel_times(table["time"].to_numpy(dtype=np.float64), path)
-    row = np.minimum(np.searchsorted(time, local), len(time) - 1)
-    there = time[row] == local
-    for ours, values in excel_tables.columns(table, _COLUMNS["setpoints"]).items():
-        columns[ours] = np.where(there, values[row], np.nan)
+    columns |= challenge.at_times(local, time, excel_tables.columns(table, _COLUMNS["setpoints"]))
     return []
 
 

@@ -44,12 +44,7 @@ def read(folder: Path, compartment: str | None = None) -> Source:
     columns = challenge.climate(table) | _lamps_and_doses(table, local) | _setpoints(table)
     outside = excel_tables.read(weather_path)
     weather_local = excel_tables.excel_times(outside["time"].to_numpy(dtype=np.float64), weather_path)
-    weather_columns = challenge.weather(outside)
-    row = np.searchsorted(weather_local, local)
-    row = np.minimum(row, len(weather_local) - 1)
-    there = weather_local[row] == local
-    for ours, values in weather_columns.items():
-        columns[ours] = np.where(there, values[row], np.nan)
+    columns |= challenge.at_times(local, weather_local, challenge.weather(outside))
     # Rows without any measurement hold computed numbers that mean nothing.
     empty = ~np.isfinite(table[["Tair", "VentLee", "EnScr"]].to_numpy(dtype=np.float64)).any(axis=1)
     telemetry = challenge.to_telemetry(local, columns, empty)

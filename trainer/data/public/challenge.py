@@ -87,6 +87,13 @@ def climate(frame: Any) -> dict[str, Floats]:
     return columns
 
 
+def at_times(local: Times, time: Times, columns: Mapping[str, Floats]) -> dict[str, Floats]:
+    """Return columns with rows of their own times, as they are at the times `local`; NaN where they have no row."""
+    row = np.minimum(np.searchsorted(time, local), len(time) - 1)
+    there = time[row] == local
+    return {ours: np.where(there, values[row], np.nan) for ours, values in columns.items()}
+
+
 def to_telemetry(local: Times, columns: Mapping[str, Floats], empty: Mask) -> Telemetry:
     """Return telemetry in UTC of rows in wall time; rows that are `empty` or at times that never were are dropped."""
     time = from_local(local, TIME_ZONE)
