@@ -162,44 +162,30 @@ def costs(finding: Finding, one: Worth | None, area: float, language: Language) 
         return told
     number, area_unit = language.number, language.shown("m2")
     # What is of a m2 is of so much less in a smaller unit.
-    share, here = 1.0 / area_unit.of(1.0), {"area": area_unit.unit}
+    share = 1.0 / area_unit.of(1.0)
+
+    def tell(what: str, amount: float, **sizes: str) -> None:
+        """Say what is taken, or saved where the amount is negative."""
+        text = TEXTS["costs"][f"{what} {'saved' if amount < 0.0 else 'taken'}"]
+        told.append(language.text(text, area=area_unit.unit, **sizes))
+
     if abs(one.heat) >= _LEAST["heat"]:
-        text = (
-            N_("It takes {heat} of heat per {area} and week ({kwh} kWh).")
-            if one.heat > 0
-            else N_("It saves {heat} of heat per {area} and week ({kwh} kWh).")
-        )
         size = share * abs(one.heat)
-        told.append(language.text(text, heat=language.amount(size, "MJ"), kwh=number(size / 3.6), **here))
+        tell("heat", one.heat, heat=language.amount(size, "MJ"), kwh=number(size / 3.6))
         if finding.effect in EFFECTS and "air_temperature" in EFFECTS[finding.effect].measured:
-            colder = N_("That is so since the greenhouse is colder than its sensor shows.")
-            warmer = N_("That is so since the greenhouse is warmer than its sensor shows.")
-            told.append(language.text(colder if one.heat < 0 else warmer))
+            tell("heat by a sensor", one.heat)
     if abs(one.co2) >= _LEAST["co2"]:
-        text = (
-            N_("It takes {co2} of CO2 per {area} and week.")
-            if one.co2 > 0
-            else N_("It saves {co2} of CO2 per {area} and week.")
-        )
-        size = 1000.0 * share * abs(one.co2)
-        told.append(language.text(text, co2=language.amount(size, "g"), **here))
+        tell("co2", one.co2, co2=language.amount(1000.0 * share * abs(one.co2), "g"))
     if abs(one.lamp_light) >= _LEAST["lamp_light"]:
-        text = N_("The light that is lost would cost the lamps {kwh} kWh per {area} and week.")
-        told.append(language.text(text, kwh=number(share * one.lamp_light), **here))
+        tell("light", abs(one.lamp_light), kwh=number(share * one.lamp_light))
     if not told:
-        return [language.text("It takes no heat and no CO2 worth counting; it makes predictions and plans wrong.")]
-    text = (
-        N_("In money, by the prices of the site: {money} EUR per {area} and week, {all} EUR for the whole greenhouse.")
-        if one.money >= 0
-        else N_(
-            "In money, by the prices of the site: {money} EUR saved per {area} and week, {all} EUR for the greenhouse."
-        )
-    )
-    money, whole = number(share * abs(one.money)), number(abs(one.money) * area)
-    told.append(language.text(text, money=money, all=whole, **here))
+        nothing = TEXTS["costs"]["nothing"]
+        return [language.text(nothing)]
+    tell("money", one.money, money=number(share * abs(one.money)), all=number(abs(one.money) * area))
     if one.spread is not None:
         low, high = map(number, one.spread)
-        told.append(language.text("It may be {low} to {high} times as much (90 % interval).", low=low, high=high))
+        text = TEXTS["costs"]["spread"]
+        told.append(language.text(text, low=low, high=high))
     return told
 
 

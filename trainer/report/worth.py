@@ -17,7 +17,6 @@ from igrow.core.arrays import Array, Floats
 from igrow.core.economics import co2_cost, electricity_price
 from igrow.core.simulator.hybrid import climate
 from igrow.core.simulator.hybrid.record import Record, observe
-from igrow.core.site import Site
 from igrow.trainer.diagnosis.freerun import Stage
 from igrow.trainer.diagnosis.knowledge import activate
 from igrow.trainer.diagnosis.result import DISCREPANCY, Diagnosis, Finding
@@ -78,7 +77,8 @@ def worth(result: Diagnosis, finding: Finding) -> Worth | None:
     price = electricity_price(site.prices, record.time, site.time_zone)
     money = (
         site.prices.heat * 1e-6 * sums["heat"]
-        + _priced_co2(site, sums["co2"])
+        # Of the first tier; what is saved counts as much.
+        + float(np.sign(sums["co2"]) * co2_cost(site.prices, 0.0, abs(sums["co2"])))
         + share * float(np.sum((electricity * price)[counted]))
     )
     return Worth(1e-6 * sums["heat"], sums["co2"], share * float(np.sum(electricity[counted])), money, _spread(finding))
@@ -131,11 +131,6 @@ def _brought_in(record: Record, stage: Stage, effect: str, channel: str) -> Floa
 
 def _course(values: Array, record: Record) -> Floats:
     return np.broadcast_to(np.asarray(values, dtype=np.float64), (len(record),))
-
-
-def _priced_co2(site: Site, used: float) -> float:
-    """Return the price of an amount in the first tier, EUR m-2; what is saved counts as much."""
-    return float(np.sign(used) * co2_cost(site.prices, 0.0, abs(used)))
 
 
 def _spread(finding: Finding) -> tuple[float, float] | None:
