@@ -49,13 +49,9 @@ def drift_within(design: Design) -> Floats:
 
 def omission(names: Sequence[str], rules: DecisionRules) -> Floats:
     """Return the prior deviation of effects and patterns before any log, (k,)."""
-    effects = [EFFECTS.get(name.partition(":")[0]) for name in names]
-    return np.array(
-        [
-            rules.omission_pattern if one is None else rules.omission_effect * abs(one.amplitude.typical)
-            for one in effects
-        ]
-    )
+    effects = (EFFECTS.get(name.partition(":")[0]) for name in names)
+    typical = (None if one is None else abs(one.amplitude.typical) for one in effects)
+    return np.array([rules.omission_pattern if one is None else rules.omission_effect * one for one in typical])
 
 
 def _typical(design: Design) -> Floats:

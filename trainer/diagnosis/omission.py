@@ -126,11 +126,7 @@ def gains_of(
 
 
 def examine(
-    record: Record,
-    site: Site,
-    posterior: Gaussian,
-    rules: DecisionRules,
-    usual: UsualGains | None = None,
+    record: Record, site: Site, posterior: Gaussian, rules: DecisionRules, usual: UsualGains | None = None
 ) -> Omission | None:
     """Return the terms that a calibrated model lacks; None where none stands out, or none makes unseen weeks better.
 

@@ -134,7 +134,8 @@ def parameter_sensitivities(line: Linearisation, names: Sequence[str], spread: F
     variants = value + np.diag(step)
     varied = {**line.parameters, **{name: variants[:, k : k + 1] for k, name in enumerate(names)}}
     # Memories of processes run along the log as they are: one course of drivers, not one a variant.
-    plain = {name: values for name, values in line.effects.items() if not _remembers(name)}
+    remembering = {one.name for one in EFFECTS.values() if one.kind == "process" and one.memory is not None}
+    plain = {name: values for name, values in line.effects.items() if name not in remembering}
     states = dict(observe(line.record, varied, plain))
     states |= {name: values for name, values in line.states.items() if name not in states}
     shown = free_run(line.record, states, line.runs.starts, line.runs.steps, varied, line.effects, line.added)
@@ -218,10 +219,6 @@ class _Scalars:
     exp = staticmethod(np.exp)
     sqrt = staticmethod(np.sqrt)
     tanh = staticmethod(np.tanh)
-
-
-def _remembers(name: str) -> bool:
-    return EFFECTS[name].kind == "process" and EFFECTS[name].memory is not None
 
 
 def _stacked(shown: Mapping[str, Floats]) -> Floats:

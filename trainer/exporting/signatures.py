@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from igrow.core.bundle import GraphSignature, Tensor
 from igrow.core.effects import EFFECTS
 from igrow.core.quantities import QUANTITIES
@@ -12,6 +15,10 @@ from igrow.trainer.exporting.blocks import Ports
 
 _UNITS = {"vent_lee": "%", "vent_wind": "%", "rail_pipe_excess": "K", "heat": "MJ m-2", "electricity": "kWh m-2"}
 _UNITS |= {"co2": "kg m-2", "sun_elevation": "deg", "sun_azimuth": "deg", "hour": "h"}
+_DEFINED: Mapping[str, Mapping[str, Any]] = {
+    "parameter": PARAMETERS, "actuation": actuation.RULES, "holding": holding.PARAMETERS
+}  # fmt: skip
+"""What stands in the input `parameters`, by its group."""
 
 
 def signatures(blocks: plan.PlanBlocks) -> dict[str, GraphSignature]:
@@ -30,12 +37,8 @@ def _unit(name: str) -> str:
     if name in QUANTITIES:
         return QUANTITIES[name].unit
     group, _, rest = name.partition(":")
-    if group == "parameter":
-        return PARAMETERS[rest].unit
-    if group == "actuation":
-        return actuation.RULES[rest].unit
-    if group == "holding":
-        return holding.PARAMETERS[rest].unit
+    if group in _DEFINED:
+        return str(_DEFINED[group][rest].unit)
     if group == "effect":
         effect, _, parameter = rest.partition(":")
         return next((one.unit for one in EFFECTS[effect].parameters if one.name == parameter), "d")

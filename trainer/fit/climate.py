@@ -60,11 +60,7 @@ def _of_effect(name: str) -> Parameter:
 
 
 def fit_climate(
-    parts: Sequence[Part],
-    prior: Gaussian,
-    effects: ActiveEffects | None = None,
-    *,
-    progress: Progress = silent,
+    parts: Sequence[Part], prior: Gaussian, effects: ActiveEffects | None = None, *, progress: Progress = silent
 ) -> Gaussian:
     """Return the posterior of the parameters.
 
@@ -82,7 +78,8 @@ def fit_climate(
     if not runs:
         raise IgrowError(f"no stretch of {RUN_HOURS:g} h of the log is complete enough to calibrate on")
     low, high = bounds(prior.names)
-    measured = {name: _measured(runs, name) for name in PREDICTED if any(name in one.quantities for one in runs)}
+    known = {name: [one.measured(name) for one in runs if name in one.quantities] for name in PREDICTED}
+    measured = {name: np.concatenate(parts, axis=1) for name, parts in known.items() if parts}
     shapes = {name: values.shape for name, values in measured.items()}
 
     def batch(points: Floats) -> Floats:
@@ -193,10 +190,6 @@ def _errors(runs: Sequence[_Runs], parameters: Mapping[str, Floats], effects: Ac
         for name in one.quantities:
             collected.setdefault(name, []).append(np.moveaxis(shown[name][one.kept], 0, 1) - one.measured(name))
     return {name: np.concatenate(parts, axis=2) for name, parts in collected.items()}
-
-
-def _measured(runs: Sequence[_Runs], name: str) -> Floats:
-    return np.concatenate([one.measured(name) for one in runs if name in one.quantities], axis=1)
 
 
 def _split(errors: Floats, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, Floats]:

@@ -75,10 +75,7 @@ def growth_of_log(
 
 
 def growth_since(
-    log: Log,
-    record: Record,
-    parameters: tuple[Mapping[str, float], Mapping[str, float]],
-    before: CropStages,
+    log: Log, record: Record, parameters: tuple[Mapping[str, float], Mapping[str, float]], before: CropStages
 ) -> CropStages:
     """Return the stages for parameters that a later log has moved, with what it counts of growth.
 

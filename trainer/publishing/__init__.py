@@ -10,13 +10,4 @@ from igrow.trainer.publishing.keys import ROLES, PublishingError, create_keys
 from igrow.trainer.publishing.publish import publish, repository_of
 from igrow.trainer.publishing.repository import initialise, publish_in, refresh
 
-__all__ = [
-    "ROLES",
-    "PublishingError",
-    "create_keys",
-    "initialise",
-    "publish",
-    "publish_in",
-    "refresh",
-    "repository_of",
-]
+__all__ = ["ROLES", "PublishingError", "create_keys", "initialise", "publish", "publish_in", "refresh", "repository_of"]

@@ -12,6 +12,7 @@ from igrow.core.arrays import Floats
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import GROWTH, YIELD
 from igrow.core.simulator.crop import GROWTH_DRIVERS, HARVEST_DRIVERS
+from igrow.core.simulator.growth import warmth
 from igrow.core.simulator.hybrid import climate
 from igrow.core.simulator.hybrid.record import Record, observe
 from igrow.core.simulator.network import Stage
@@ -86,8 +87,8 @@ def fit_net_growth(
         cumulative = to_grid(season, int(record.step))["net_growth"]
         end = np.minimum(day * np.arange(1, days + 1), len(cumulative) - 1)
         grown.append(cumulative[end] - cumulative[day * np.arange(days)])
-        respired = np.exp(0.0693147 * (states["air_temperature"] - 20.0))
-        rows.append(np.stack([total(3600.0 * drivers["assimilation"]), -total(respired)], axis=1))
+        respired = total(warmth(states["air_temperature"]))
+        rows.append(np.stack([total(3600.0 * drivers["assimilation"]), -respired], axis=1))
     table, target = np.concatenate(rows), np.concatenate(grown)
     fine = np.isfinite(table).all(axis=1) & np.isfinite(target)
     conversion, maintenance = nnls(table[fine], target[fine])[0]

@@ -159,12 +159,8 @@ def write_network_bundle(
 
 def _traceable(simulator: NetworkSimulator) -> NetworkSimulator:
     """Return the simulator with stages that can be traced."""
-    return replace(
-        simulator,
-        climate=traceable(simulator.climate),
-        growth=traceable(simulator.growth),
-        harvest=traceable(simulator.harvest),
-    )
+    stages: dict[str, Any] = {name: traceable(getattr(simulator, name)) for name in STAGES}
+    return replace(simulator, **stages)
 
 
 def _golden_day(

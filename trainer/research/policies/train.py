@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import time
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -145,11 +146,8 @@ def run(arguments: argparse.Namespace) -> int:
     torch.set_num_threads(1)
     site = load_site(arguments.site)
     simulator = BundleSimulator(read_bundle(arguments.bundle), site.greenhouse, members=1)
-    training = train(site, simulator, 60.0 * arguments.minutes, seed=arguments.seed, progress=_say)
+    say = partial(print, flush=True)
+    training = train(site, simulator, 60.0 * arguments.minutes, seed=arguments.seed, progress=say)
     arguments.out.write_bytes(export(training.actor).SerializeToString())
     print(f"{arguments.out} written")
     return 0
-
-
-def _say(line: str) -> None:
-    print(line, flush=True)
