@@ -30,17 +30,13 @@ if TYPE_CHECKING:
     from igrow.trainer.scoring.comparison import Comparison, compare
 
 _PLACES = {
-    "Comparison": "igrow.trainer.scoring.comparison",
-    "FittedModel": "igrow.trainer.fit",
-    "Log": "igrow.trainer.data",
-    "calibrate": "igrow.trainer.calibration",
-    "compare": "igrow.trainer.scoring.comparison",
-    "diagnose": "igrow.trainer.diagnosis",
-    "export": "igrow.trainer.exporting",
-    "prepare_log": "igrow.trainer.data",
-    "publish": "igrow.trainer.publishing",
-    "read_log": "igrow.trainer.data",
-    "read_model": "igrow.trainer.exporting",
+    "calibration": ("calibrate",),
+    "data": ("Log", "prepare_log", "read_log"),
+    "diagnosis": ("diagnose",),
+    "exporting": ("export", "read_model"),
+    "fit": ("FittedModel",),
+    "publishing": ("publish",),
+    "scoring.comparison": ("Comparison", "compare"),
 }
 
 __all__ = [
@@ -61,9 +57,10 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Import one of the road's names when it is first used: torch, onnx and pandas are slow to load."""
-    if name not in _PLACES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_PLACES[name]), name)
+    for place, names in _PLACES.items():
+        if name in names:
+            return getattr(import_module(f"igrow.trainer.{place}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

@@ -30,10 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--bundle", type=Path, help="the bundle in force (default: the built-in one)")
     parser.add_argument("--out", type=Path, required=True, help="folder for diagnosis.json, report.html and the bundle")
     parser.add_argument(
-        "--drift",
-        type=Path,
-        metavar="FILE",
-        help="what `igrow-trainer fleet learn` wrote of how greenhouses change",
+        "--drift", type=Path, metavar="FILE", help="what `igrow-trainer fleet learn` wrote of how greenhouses change"
     )
     parser.add_argument("--without", action="append", default=[], metavar="EFFECT", help="an effect not to consider")
     parser.add_argument(

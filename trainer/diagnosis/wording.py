@@ -40,11 +40,10 @@ HIGH = 1000.0
 """Metres above the sea from which on that is said."""
 SINCE = N_("The errors are of the days since then: before, the greenhouse was another.")
 MOVED_BY: dict[str, tuple[str, ...]] = {
-    "rail_pipe_temperature": ("heat",),
-    "grow_pipe_temperature": ("heat",),
+    **dict.fromkeys(("rail_pipe_temperature", "grow_pipe_temperature"), ("heat",)),
+    **dict.fromkeys(("energy_screen", "blackout_screen"), ("heat", "light", "vapour")),
     "lamp_power": ("heat", "light", "co2", "vapour"),
 }
-MOVED_BY_SCREENS = ("heat", "light", "vapour")
 """Balances that an actuator moves; vents move all that the air carries."""
 UNLIKE_RULE = 0.15
 """Difference of a share from one at which it is told."""
@@ -89,7 +88,7 @@ def actuator(one: Replaced) -> Finding:
     return Finding(
         one.actuator,
         "actuator",
-        MOVED_BY_SCREENS if one.actuator.endswith("screen") else MOVED_BY.get(one.actuator, ("heat", "vapour", "co2")),
+        MOVED_BY.get(one.actuator, ("heat", "vapour", "co2")),
         {"share": one.share},
         None,
         one.stood_still,

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-ERROR_SCALES: Mapping[str, float] = MappingProxyType(
-    {"air_temperature": 0.5, "air_humidity": 3.0, "air_co2": 35.0},
-)
+ERROR_SCALES: Mapping[str, float] = MappingProxyType({"air_temperature": 0.5, "air_humidity": 3.0, "air_co2": 35.0})
 """Error that counts as one, by quantity: K, %, ppm.
 
 Fixed, since a quantity that is predicted badly would else lose its weight and be predicted worse still.

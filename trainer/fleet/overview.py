@@ -121,9 +121,7 @@ def _row(registry: Registry, entry: Entry, now: datetime) -> SiteRow:
 
 def _last_failure(lines: list[dict[str, Any]]) -> str:
     """Return the sentence of each command whose last run was an error."""
-    newest: dict[str, Mapping[str, Any]] = {}
-    for line in lines:
-        newest[str(line.get("command"))] = line
+    newest = {str(line.get("command")): line for line in lines}
     return "; ".join(
         f"{command} failed: {line.get('note', '')} (tried again at the next run)"
         for command, line in newest.items()

@@ -27,20 +27,6 @@ MOST_STRETCHES = 60
 
 
 @dataclass(frozen=True)
-class Cause:
-    """A finding as the page tells it."""
-
-    finding: Finding
-    title: str
-    sentence: str
-    rivals: list[str]
-    checks: list[str]
-    costs: list[str]
-    signature: str
-    """How an effect shows in the log; empty for what is none."""
-
-
-@dataclass(frozen=True)
 class ErrorRow:
     """One line of the table of errors."""
 
@@ -130,18 +116,19 @@ def render_report(result: Diagnosis, language: str = "en", typed: Sequence[str] 
     )
 
 
-def _cause(result: Diagnosis, finding: Finding, language: Language) -> Cause:
+def _cause(result: Diagnosis, finding: Finding, language: Language) -> dict[str, Any]:
+    """Return a finding as the page tells it."""
     title = sentences.title(finding.effect, language)
     site = result.model.site if result.log is None else result.log.known_site
-    return Cause(
-        finding,
-        f"{title[0].upper()}{title[1:]}",
-        sentences.cause(finding, language),
-        sentences.rivals(finding, language),
-        sentences.checks(finding, language),
-        sentences.costs(finding, priced_at(result, finding), site.greenhouse.floor_area, language),
-        sentences.signature(finding, language),
-    )
+    return {
+        "finding": finding,
+        "title": f"{title[0].upper()}{title[1:]}",
+        "sentence": sentences.cause(finding, language),
+        "rivals": sentences.rivals(finding, language),
+        "checks": sentences.checks(finding, language),
+        "costs": sentences.costs(finding, priced_at(result, finding), site.greenhouse.floor_area, language),
+        "signature": sentences.signature(finding, language),
+    }
 
 
 def error_rows(result: Diagnosis, language: Language) -> Iterator[ErrorRow]:

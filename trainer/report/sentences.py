@@ -45,11 +45,7 @@ def cause(finding: Finding, language: Language) -> str:
         return language.text("Something that the model does not know changes these: {parts}.", parts="; ".join(parts))
     if finding.kind == "parameter":
         share = finding.parameters["change"].value
-        text = (
-            N_("{parameter}: {share} % less than at the calibration")
-            if share < 0.0
-            else N_("{parameter}: {share} % more than at the calibration")
-        )
+        text = TEXTS["changes"]["less" if share < 0.0 else "more"]
         told = language.text(text, parameter=title(finding.effect, language), share=language.number(100.0 * abs(share)))
         return _since(finding, told, language)
     if finding.effect not in EFFECTS:
@@ -197,11 +193,7 @@ def gains(result: Diagnosis, language: Language) -> Iterator[str]:
             continue
         unit = QUANTITIES[quantity].difference_unit
         before, after = (language.amount(day[stage], unit, 3) for stage in ("deployed", "corrected"))
-        text = (
-            N_("{quantity}: predictions a day ahead were off by {before}; now by {after}.")
-            if day["corrected"] <= day["deployed"]
-            else N_("{quantity}: correction makes predictions a day ahead worse: off by {after}, before by {before}.")
-        )
+        text = TEXTS["gains"]["better" if day["corrected"] <= day["deployed"] else "worse"]
         name = language.name(quantity)
         yield language.text(text, quantity=f"{name[0].upper()}{name[1:]}", before=before, after=after)
         alone = day.get("recalibrated", np.inf)

@@ -32,14 +32,9 @@ from igrow.core.telemetry import Telemetry, concatenate
 from igrow.core.whole_files import write_whole
 
 ONE_DAY = np.timedelta64(1, "D")
-_EVENTS = pa.schema(
-    [
-        ("time", pa.timestamp("ms", tz="UTC")),
-        ("sequence", pa.int64()),
-        ("category", pa.string()),
-        ("body", pa.string()),
-    ]
-)
+_EVENTS = pa.schema({
+    "time": pa.timestamp("ms", tz="UTC"), "sequence": pa.int64(), "category": pa.string(), "body": pa.string()
+})  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -48,8 +48,6 @@ class Collected:
     site: str
     segments: int = 0
     rows: int = 0
-    records: int = 0
-    reports: int = 0
     bytes: int = 0
     newest: datetime | None = None
     """Time of the newest row that was ever collected of this site."""
@@ -157,7 +155,6 @@ def _add(archive: Archive, segment: Segment, data: bytes, now: datetime, done: C
         done.notes.append(f"segment {name.number}: its records are not used: {error}; set aside in {path}")
     done.segments += 1
     done.rows += len(telemetry)
-    done.records += len(segment.events)
 
 
 def _span(telemetry: Telemetry, latest: np.datetime64) -> str:
@@ -180,7 +177,6 @@ def _collect_reports(place: Place, site: str, archive: Archive, done: Collected)
         if content is not None:
             archive.add_file("reports", site, entry.name, content)
             place.delete(f"{site}/reports/{entry.name}")
-            done.reports += 1
 
 
 @contextmanager

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -33,12 +33,6 @@ def alike(paths: Sequence[Path], sheet: str | None = None) -> list[list[Path]]:
             layout, cells = find_layout(path, sheet)
             groups.append((replace(layout, sheet=sheet), head_of(cells, layout), [path]))
     return [files for _, _, files in groups]
-
-
-def further_cells(paths: Sequence[Path], layout: Layout, head: Head) -> Iterator[Cells]:
-    """Yield the cells of files of one layout."""
-    for path in paths:
-        yield from cells_like(path, layout, head).values()
 
 
 def cells_like(path: Path, layout: Layout, head: Head) -> dict[str, Cells]:

@@ -16,7 +16,7 @@ from igrow.trainer.data.importing import columns as names
 from igrow.trainer.data.importing.capacity import add_lamp_power, by_capacity
 from igrow.trainer.data.importing.compartments import chosen_compartment, rows_of_one
 from igrow.trainer.data.importing.error_codes import MEASURED, error_codes
-from igrow.trainer.data.importing.folder import further_cells, head_of, joined, table_of, whole
+from igrow.trainer.data.importing.folder import cells_like, head_of, joined, table_of, whole
 from igrow.trainer.data.importing.layout import Layout, find_layout
 from igrow.trainer.data.importing.long_table import find_long, units_beside
 from igrow.trainer.data.importing.odd_times import what_is_odd
@@ -103,8 +103,8 @@ def propose(
     head, sheets = head_of(cells, layout), {answers.sheet or "": cells}
     if answers.sheet is None:
         layout, sheets = whole(path, layout, cells)
-    of_layout = (*sheets.values(), *further_cells(further, layout, head))
-    tables = [table_of(one, layout) for one in of_layout]
+    of_layout = [sheets, *(cells_like(one, layout, head) for one in further)]
+    tables = [table_of(one, layout) for found in of_layout for one in found.values()]
     read_sheets = tuple(filter(None, sheets))
     table = joined(tables)
     unit_line = _unit_line(cells.rows, cells.lines, layout, table)

@@ -32,11 +32,7 @@ def understood(proposal: Proposal, checked: Checked) -> list[str]:
     units = f", units in {line.rsplit(maxsplit=1)[-1]} {layout.units}" if layout.units else ""
     kind = _kind(proposal)
     lines.append(f"layout: {kind}, decimal {_shown(layout.decimal)}, {names}{units}")
-    day = (
-        mapping.time.column
-        if mapping.time.time_of_day is None
-        else f"{mapping.time.column} + {mapping.time.time_of_day}"
-    )
+    day = " + ".join(name for name in (mapping.time.column, mapping.time.time_of_day) if name is not None)
     lines.append(f"time: {day!r}, as {mapping.time.format}, in {mapping.time.time_zone}")
     lines += [f"rows: {name} is {text!r}" for name, text in mapping.only.items()]
     lines += ["", f"{'quantity':24}{'column':32}{'unit there':16}{'lowest':>9}{'median':>9}{'highest':>9}  our unit"]

@@ -90,10 +90,7 @@ def against_the_sun(telemetry: Telemetry, site: Site) -> list[DataFault]:
     daylight = _daylight(telemetry.time, values, site)
     if len(daylight.day) < LEAST_DAYS:
         return []
-    clock = _clock(telemetry, daylight, site)
-    if clock:
-        return clock
-    found = other_hemisphere(telemetry, site) or _unit(telemetry, site)
+    found = _clock(telemetry, daylight, site) or other_hemisphere(telemetry, site) or _unit(telemetry, site)
     return [found] if found is not None else []
 
 
@@ -132,24 +129,24 @@ def _complex_sum(index: Integers, values: NDArray[np.complex128], count: int) ->
     )
 
 
-def _clock(telemetry: Telemetry, daylight: _Daylight, site: Site) -> list[DataFault]:
+def _clock(telemetry: Telemetry, daylight: _Daylight, site: Site) -> DataFault | None:
     length = abs(daylight.vector.sum()) / daylight.total.sum()
     if length < LEAST_LENGTH * float(np.average(daylight.length, weights=daylight.total)):
         seen = "global_radiation does not follow the sun: as much of it comes by night as by day"
         mend = "its column is another quantity, or day and month of the dates are exchanged"
-        return [DataFault("no_daylight", "global_radiation", seen, mend)]
+        return DataFault("no_daylight", "global_radiation", seen, mend)
     jump = _change_of_clocks(telemetry, daylight, site)
     if jump is not None:
-        return [jump]
+        return jump
     offset = daylight.offset()
     if abs(offset) <= LARGEST_OFFSET + own_step(telemetry.time) / 7200.0 + ERRORS * daylight.error():
-        return []
+        return None
     hours = f"{offset:.1f} h late" if offset > 0.0 else f"{-offset:.1f} h early"
     seen = f"noon comes {hours} by the log's clock: the sun over {site.latitude:g}, {site.longitude:g} says so"
     if _fits_as_wall_time(telemetry, site):
-        return [DataFault("local_time", "", seen, _name_zone(site.time_zone))]
+        return DataFault("local_time", "", seen, _name_zone(site.time_zone))
     mend = "give the time zone of the export (`time_zone` in the mapping), or set right the longitude of the site"
-    return [DataFault("clock", "", seen, mend)]
+    return DataFault("clock", "", seen, mend)
 
 
 def _name_zone(zone: str) -> str:

@@ -15,8 +15,8 @@ import numpy as np
 from igrow.core import gaps
 from igrow.core.arrays import Floats, Integers, Times
 from igrow.core.errors import IgrowError
-from igrow.trainer.data.public import agc2018, excel_tables
-from igrow.trainer.data.public.challenge import COLUMNS, daily
+from igrow.trainer.data.public import agc2018, challenge, excel_tables
+from igrow.trainer.data.public.challenge import daily
 
 LAMP_EFFICACY_2019 = 100.0 / 81.0
 """umol per J: 100 umol m-2 s-1 from HPS lamps of 81 W m-2; the LEDs give 97 from 62 W m-2."""
@@ -78,9 +78,8 @@ def read_2019(folder: Path) -> list[Compartment]:
         raise IgrowError(f"{folder}: Weather/Weather.csv is needed, gzip or not")
     outside = excel_tables.read(weather)
     time = excel_tables.excel_times(outside["time"].to_numpy(dtype=np.float64), weather)
-    names = [child.name for child in sorted(folder.iterdir()) if excel_tables.find(child, "Production") is not None]
-    compartments, columns = [], COLUMNS["agc2019"]
-    for name in names:
+    compartments, columns = [], challenge.COLUMNS["agc2019"]
+    for name in challenge.compartments(folder, "Production"):
         resources = daily(excel_tables.find(folder / name, "Resources"), columns["resources"])
         crop = daily(excel_tables.find(folder / name, "CropParameters"), columns["crop"])
         quality = daily(excel_tables.find(folder / name, "TomQuality"), columns["quality"])
@@ -122,9 +121,8 @@ def read_2019(folder: Path) -> list[Compartment]:
 
 def read_2018(folder: Path) -> list[Compartment]:
     """Return the compartments of the first challenge (cucumber), sorted by name."""
-    names = [child.name for child in sorted(folder.iterdir()) if excel_tables.find(child, "Production") is not None]
     compartments = []
-    for name in names:
+    for name in challenge.compartments(folder, "Production"):
         log = agc2018.read(folder, name)
         if log.harvests is None or log.resources is None:
             raise IgrowError(f"{folder / name}: Production and ResourceCalculations are needed")
