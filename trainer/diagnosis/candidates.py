@@ -148,8 +148,8 @@ def patterns(record: Record, longitude: float) -> list[tuple[str, tuple[str, ...
     table.append(("working days", ("weekday",), working))
     for index, name in enumerate(WEEKDAYS):
         for first, last in ((0, 6), (6, 10), (10, 14), (14, 19), (19, 24)):
-            course: Floats = window(first, last) * (weekday == index).astype(np.float64)
-            table.append((f"{first:02d} to {last:02d} h on {name}s", ("hour", "weekday"), course))
+            text = f"{first:02d} to {last:02d} h on {name}s"
+            table.append((text, ("hour", "weekday"), window(first, last) * (weekday == index)))
     outdoor = np.asarray(record.inputs["outdoor_temperature"], dtype=np.float64)
     cold: Floats = np.maximum(8.0 - outdoor, 0.0) / 8.0
     table.append(("cold weather", ("outdoor_temperature",), cold))
@@ -159,8 +159,7 @@ def patterns(record: Record, longitude: float) -> list[tuple[str, tuple[str, ...
         table.append((text, ("outdoor_temperature", "hour"), cold * window(first, last)))
     for name, scale in (("wind_speed", 5.0), ("global_radiation", 300.0), ("rain", 1.0)):
         if name not in record.missing:
-            weather: Floats = np.asarray(record.inputs[name], dtype=np.float64) / scale
-            table.append((name.replace("_", " "), (name,), weather))
+            table.append((name.replace("_", " "), (name,), np.asarray(record.inputs[name], dtype=np.float64) / scale))
     if "outdoor_humidity" not in record.missing:
         table.append(
             ("dry weather", ("outdoor_humidity",), (80.0 - np.asarray(record.inputs["outdoor_humidity"])) / 20.0)
@@ -176,11 +175,9 @@ def patterns(record: Record, longitude: float) -> list[tuple[str, tuple[str, ...
             text = driver.replace("_", " ")
             table.append((text if driver == SWITCHES[name] else f"{text} on", (driver,), running))
             keep = float(np.exp(-record.step / 3600.0))
-            late: Floats = lfilter([1.0 - keep], [1.0, -keep], running)
-            table.append((f"an hour after {text}", (driver,), late))
+            table.append((f"an hour after {text}", (driver,), lfilter([1.0 - keep], [1.0, -keep], running)))
     days = np.arange(len(record)) * record.step / 86_400.0
-    month: Floats = np.asarray(days / 30.0, dtype=np.float64)
-    table.append(("from day to day", ("time",), month))
+    table.append(("from day to day", ("time",), np.asarray(days / 30.0)))
     table.append(("all the time", (), np.ones(len(record))))
     return table
 

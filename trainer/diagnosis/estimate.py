@@ -67,6 +67,8 @@ def estimate(found: Round, rng: np.random.Generator) -> Estimated | None:
     wide = reach(design.rules) * linear.deviation_by_day(design.grams, found.named)
     onset = onset_interval(design, null, hypothesis.term)
     shape = _shape(design, null, hypothesis)
+    count = len(design.block("parameter"))
+    change = found.named.solution.coefficients[:count] - null.solution.coefficients[:count]
     return Estimated(
         hypothesis,
         ActiveTerm(hypothesis.effect, amplitude, shape, None if onset is None else onset.time),
@@ -75,7 +77,7 @@ def estimate(found: Round, rng: np.random.Generator) -> Estimated | None:
         onset,
         _confounded(design, null, hypothesis, gain, rng),
         found.cause.bootstrap_p,
-        _shift(design, null, found.named),
+        dict(zip(design.prior.names, change.tolist(), strict=True)),
     )
 
 
@@ -126,12 +128,6 @@ def _confounded(
     hidden = frozenset[str]() if design.history is None else design.history.without
     as_good = [one.effect for one in scored if one.gain >= gain - margin and one.effect not in hidden]
     return (hypothesis.effect, *(name for name in as_good if name != hypothesis.effect))
-
-
-def _shift(design: Design, null: Fit, named: Fit) -> dict[str, float]:
-    count = len(design.block("parameter"))
-    change = named.solution.coefficients[:count] - null.solution.coefficients[:count]
-    return dict(zip(design.prior.names, change.tolist(), strict=True))
 
 
 def _shape(design: Design, null: Fit, hypothesis: Hypothesis) -> dict[str, float]:

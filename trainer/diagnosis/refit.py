@@ -181,13 +181,9 @@ class _View:
     average: Averaging
     fitted: Mask
 
-    def white(self, values: Floats) -> Floats:
-        """Turn means over intervals, (k, b, r, intervals), into white noise of the same shape."""
-        return np.asarray(self.whitening(values) * self.fitted)
-
     def flat(self, values: Floats) -> Floats:
-        """Return the same as rows of a least-squares problem, (n, k)."""
-        return self.white(values).reshape(len(values), -1).T
+        """Turn means over intervals, (k, b, r, intervals), into white rows of a least-squares problem, (n, k)."""
+        return np.asarray(self.whitening(values) * self.fitted).reshape(len(values), -1).T
 
 
 def _unknowns(design: Design, terms: Sequence[ActiveTerm], before: Sequence[ActiveTerm]) -> _Unknowns:

@@ -31,18 +31,18 @@ class Picture:
 
 def overview(result: Diagnosis, language: Language) -> list[Picture]:
     """Return the log at a glance, with what was set aside; empty where there is nothing to show."""
-    if result.log is None:
-        return []
     log = result.log
+    if log is None:
+        return []
     draw = partial(plot_log, log.name, log.telemetry, log.screened, only=OVERVIEW, language=language, width=WIDTH)
     return list(_drawn([(language.text("The log; what was set aside is red"), draw)], language))
 
 
 def evidence(result: Diagnosis, language: Language) -> list[Picture]:
     """Return every figure that a diagnosis has."""
-    if result.evidence is None:
-        return []
     seen = result.evidence
+    if seen is None:
+        return []
     wanted: list[tuple[str, Callable[[], Figure]]] = [
         (language.text("What is missing, from day to day"), partial(plots.residual_by_date, seen, language))
     ]

@@ -19,8 +19,6 @@ from igrow.core.whole_files import sync_folder, write_whole
 
 KEPT = 100
 """Newest segments of a chain whose digests are remembered; what is older and comes again is merged again."""
-
-
 RETURNS = 3
 """So often a chain goes on after another one, until two gateways are said to seal them."""
 

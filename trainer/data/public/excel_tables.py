@@ -54,8 +54,7 @@ def read(path: Path) -> Any:
 
 def column(frame: Any, name: str) -> Floats | None:
     """Return a column that is there and not empty, as float64, else None."""
-    found = columns(frame, {name: name})
-    return found.get(name)
+    return columns(frame, {name: name}).get(name)
 
 
 def columns(frame: Any, names: Mapping[str, str]) -> dict[str, Floats]:

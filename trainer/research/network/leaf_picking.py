@@ -17,8 +17,6 @@ SMOOTHING_WINDOW = 999
 SMOOTHING_ORDER = 2
 BASES = tuple(0.5 * step for step in range(17))
 """Base temperatures that are tried, degC."""
-
-
 CERTAIN, FADED = 55.0, 75.0
 """Days: on the selection seasons, later pickings are missed by more days than their mean costs."""
 

@@ -28,14 +28,8 @@ HARVEST_DRIVERS = (
     "air_temperature", "leaf_area_index", "plant_load", "net_growth", "crop_age", "thermal_time",
 )  # fmt: skip
 
-
 CLIMATE = StageLayout(
-    "climate",
-    ("air_temperature", "air_humidity", "air_co2"),
-    CLIMATE_DRIVERS,
-    (1.0, 3.0, 24.0),
-    (128, 128),
-    clock=True,
+    "climate", ("air_temperature", "air_humidity", "air_co2"), CLIMATE_DRIVERS, (1.0, 3.0, 24.0), (128, 128), clock=True
 )
 # Net growth falls in dark hours, when the crop respires more than it assimilates: it is not cumulative here.
 GROWTH = StageLayout(

@@ -44,8 +44,7 @@ CANOPY_LIGHT = 0.75
 
 def mean_of_others(others: Sequence[Compartment], crop: Compartment) -> Floats:
     """Return the mean cumulative harvest of the other compartments, (days,)."""
-    days = crop.day.size
-    rows = np.arange(days)
+    rows = np.arange(crop.day.size)
     return np.asarray(np.mean([np.interp(rows, np.arange(o.day.size), o.cumulative()) for o in others], axis=0))
 
 

@@ -21,8 +21,6 @@ from igrow.trainer.research.network.leaf_picking import smooth
 
 FAULTY_DAYS = (15, 75)
 """Days of 24 rows, counted from 0, on which the settings that worked differ from the requested ones."""
-
-
 NEEDED = (
     "global_radiation", "outdoor_temperature", "outdoor_humidity", "wind_speed", "sky_temperature",
     "air_temperature", "air_humidity", "air_co2", "par", "leaf_area_index", "plant_load", "net_growth_rate",
