@@ -48,7 +48,7 @@ _SPEAKING = (
     )),
     _CORE / "separating_tests" / "definition.py",
     *(_TRAINER / name for name in (
-        "data/plausibility", "data/rows.py", "data/screening.py", "diagnosis/diagnosed_days.py",
+        "data/plausibility", "data/rows.py", "data/screening.py", "diagnosis/crop.py", "diagnosis/diagnosed_days.py",
         "diagnosis/open_vents.py",
     )),
 )  # fmt: skip
