@@ -114,3 +114,6 @@ def test_a_model_is_completed_only_when_it_is_asked() -> None:
     assert "1.2" in told[1]
     assert "0.8" in told[1]
     assert told[-1] != sentences.omission(lacking.omission, speak("en"), completed=True)[-1]
+    # An error of 1.2 K is none of 34 degF.
+    assert "2.2" in sentences.omission(lacking.omission, speak("en", units="us"), completed=False)[1]
+    assert " K" in told[1]

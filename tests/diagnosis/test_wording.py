@@ -9,6 +9,7 @@ import pytest
 
 from igrow.core.bundle import Estimate
 from igrow.core.effects import EFFECTS
+from igrow.core.language import speak
 from igrow.core.site import Site
 from igrow.trainer.diagnosis import wording
 from igrow.trainer.diagnosis.candidates import Candidate, Pattern
@@ -18,6 +19,7 @@ from igrow.trainer.diagnosis.linear import Term
 from igrow.trainer.diagnosis.result import plain
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.report import sentences
 
 BEGAN = np.datetime64("2020-03-14T06:00:00", "s")
 
@@ -49,6 +51,17 @@ def test_the_sentence_names_the_size_and_the_day_on_which_it_began() -> None:
     for began in ("2020-03-13T23:42:00", "2020-03-14T05:00:00"):
         time = np.datetime64(began, "s")
         assert "Since 14 March" in wording.sentence(replace(leak(), onset=OnsetInterval(time, time, time)))
+
+
+@pytest.mark.parametrize(
+    ("zone", "began"),
+    [("UTC", "2020-03-13T23:42:00"), ("Asia/Tokyo", "2020-03-13T14:41:00"), ("America/Toronto", "2020-03-14T05:45:00")],
+)
+def test_the_report_tells_the_day_of_the_sentence(zone: str, began: str) -> None:
+    time = np.datetime64(began, "s")
+    found = wording.finding(replace(leak(), onset=OnsetInterval(time, time, time)))
+    assert found.sentence.startswith("Since 14 March ")
+    assert sentences.cause(found, speak("en", zone)).startswith("Since 14 March 2020:")
 
 
 def test_a_finding_holds_size_shapes_balances_and_test_of_its_effect() -> None:

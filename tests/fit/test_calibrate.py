@@ -149,6 +149,8 @@ def test_a_model_tells_what_it_is(model: FittedModel) -> None:
     assert "transmissivity" in text
     assert "90 % interval" in text
     assert "persistence" in text
+    (day,) = (line for line in text.splitlines() if line.startswith("air_temperature") and "24_h" in line)
+    assert day.endswith("  K")
 
 
 @pytest.mark.usefixtures("quick")

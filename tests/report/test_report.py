@@ -77,7 +77,8 @@ def test_no_verdict_says_that_a_model_fits_where_its_errors_say_that_it_does_not
     )
     told = list(sentences.warnings(bad, speak("en")))
     assert any("The model does not fit air humidity: a day ahead it is off by 35 %" in one for one in told)
-    assert "does not fit air_humidity" in bad.summary()
+    (misfit,) = (line for line in bad.summary().splitlines() if "does not fit air_humidity" in line)
+    assert misfit.endswith(" %")
 
 
 def test_yesterdays_readings_are_taken_on_unseen_days_alone(leak: Diagnosis) -> None:

@@ -98,6 +98,7 @@ def test_the_command_prints_a_table_and_writes_it(
     assert main(["evaluate", *given, "--out", str(tmp_path / "errors.json")]) == 0
     shown = capsys.readouterr().out
     assert all(word in shown for word in ("persistence", "by actuators", "by setpoints", "air_co2", "24_h"))
+    assert all(line.endswith("  K") for line in shown.splitlines() if line.startswith("air_temperature"))
     assert "7_d" not in shown, "four days hold no run of a week"
     written = json.loads((tmp_path / "errors.json").read_text())
     assert written["by actuators"]["air_temperature"]["24_h"]["mae"] < 0.2

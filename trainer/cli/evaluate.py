@@ -58,5 +58,7 @@ def table(found: Mapping[str, Evaluation]) -> str:
                 one = scores.get(quantity, {}).get(horizon)
                 text = f"{one.mae:.3g} [{one.mae_low:.3g}, {one.mae_high:.3g}]" if one else "-"
                 cells += f"{text:>30}"
-            lines.append(f"{quantity:18}{horizon:>8}{naive.persistence:13.3g}{cells}  {QUANTITIES[quantity].unit}")
+            lines.append(
+                f"{quantity:18}{horizon:>8}{naive.persistence:13.3g}{cells}  {QUANTITIES[quantity].difference_unit}"
+            )
     return "\n".join(lines)

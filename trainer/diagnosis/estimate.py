@@ -28,6 +28,11 @@ class OnsetInterval:
     low: np.datetime64
     high: np.datetime64
 
+    @property
+    def noon(self) -> np.datetime64:
+        """Noon of the day it began on, which tells its date: solar midnight may be on the day before by the clock."""
+        return self.time + np.timedelta64(12, "h")
+
 
 @dataclass(frozen=True)
 class Estimated:

@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from igrow.core.bundle import Estimate
+from igrow.core.effects import EFFECTS
 from igrow.core.language import Language, speak
 from igrow.core.quantities import QUANTITIES
 from igrow.trainer.data.screening import Screened
 from igrow.trainer.diagnosis.persistence import persistence_errors
 from igrow.trainer.diagnosis.uncalibrated import FIRST, NO_NAME, how_to_calibrate
+from igrow.trainer.diagnosis.visible_parameters import VISIBLE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -133,7 +135,7 @@ class Diagnosis:
         """A sentence for every quantity that the corrected model predicts worse than recalibration alone does."""
         return tuple(
             f"{quantity.replace('_', ' ')} gets worse by it: {plain(day['recalibrated'])} to {plain(day['corrected'])} "
-            f"{QUANTITIES[quantity].unit.replace('degC', 'K')}, 24 h ahead on unseen days"
+            f"{QUANTITIES[quantity].difference_unit}, 24 h ahead on unseen days"
             for quantity, horizons in self.errors.items()
             if (day := horizons.get("24_h", {})) and day["corrected"] > (1.0 + WORSE) * day["recalibrated"]
         )
@@ -161,10 +163,10 @@ class Diagnosis:
             text, command = how_to_calibrate(self.log.days if self.log is not None else 0.0, typed)
             lines = [FIRST, text.format(command=command), *lines]
             lines += [f"  {NO_NAME}"] if self.unsure else []
-        lines += [f"  {one.sentence}" for one in self.findings]
-        lines += [
-            f"  as well it could be {', '.join(one.confounded[1:])}" for one in self.findings if one.confounded[1:]
-        ]
+        for one in self.findings:
+            lines.append(f"  {one.sentence}")
+            if one.confounded[1:]:
+                lines.append(f"  as well it could be {' or '.join(map(_title, one.confounded[1:]))}")
         if self.missing:
             lines.append(f"  the log lacks {', '.join(self.missing)}: usual values stand in")
         lines += [f"  {note}" for note in self.notes]
@@ -173,11 +175,11 @@ class Diagnosis:
             day = horizons.get("24_h")
             if day:
                 stages = ", ".join(f"{stage} {value:.3g}" for stage, value in day.items())
-                lines.append(f"  {quantity}, 24 h ahead on unseen days: {stages}")
-        for one in self.misfits:
-            lines.append(
-                f"  the model does not fit {one.quantity}: yesterday's readings are off by {one.persistence:.3g}"
-            )
+                unit = QUANTITIES[quantity].difference_unit
+                lines.append(f"  {quantity}, 24 h ahead on unseen days: {stages} {unit}")
+        for misfit in self.misfits:
+            yesterday = f"{misfit.persistence:.3g} {QUANTITIES[misfit.quantity].difference_unit}"
+            lines.append(f"  the model does not fit {misfit.quantity}: yesterday's readings are off by {yesterday}")
         return "\n".join(lines)
 
     def plot_errors(self, quantity: str = "air_temperature") -> Figure:
@@ -248,6 +250,12 @@ def plain(value: float) -> str:
     """Return a number with two significant digits, as people write it."""
     rounded = float(f"{value:.2g}")
     return f"{rounded:.0f}" if abs(rounded) >= 10.0 else f"{rounded:.10f}".rstrip("0").rstrip(".")
+
+
+def _title(cause: str) -> str:
+    """Return what people call a cause that is confounded with another."""
+    known = EFFECTS.get(cause) or VISIBLE.get(cause)
+    return cause.replace("_", " ") if known is None else known.title
 
 
 def _json(value: Any) -> Any:

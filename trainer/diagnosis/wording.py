@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from igrow.core.bundle import Estimate
 from igrow.core.effects import EFFECTS
 from igrow.core.language import N_
@@ -128,8 +126,7 @@ def sentence(one: Estimated) -> str:
 
 
 def _day(onset: OnsetInterval) -> str:
-    # A day begins at solar midnight, which may be before midnight in UTC: its noon tells the date.
-    time = (onset.time + np.timedelta64(12, "h")).astype("datetime64[D]").item()
+    time = onset.noon.astype("datetime64[D]").item()
     return f"{time.day} {time:%B}"
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from igrow.core.arrays import Floats
 from igrow.core.bundle import EffectRecord, HeldOutError, Span
 from igrow.core.planner.season import SeasonPlan
+from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator import actuation, holding
 from igrow.core.simulator.crop import CropStages
 from igrow.core.simulator.growth import prior_of
@@ -156,7 +157,8 @@ class FittedModel:
             for error in self.errors:
                 naive = "-" if error.persistence is None else f"{error.persistence:.3g}"
                 cells = (error.horizon, naive, f"{error.before:.3g}", f"{error.after:.3g}")
-                lines.append(f"{error.quantity:28}" + "".join(f"{cell:>12}" for cell in cells) + f"  {error.unit}")
+                unit = QUANTITIES[error.quantity].difference_unit
+                lines.append(f"{error.quantity:28}" + "".join(f"{cell:>12}" for cell in cells) + f"  {unit}")
         return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
 
 

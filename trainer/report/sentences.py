@@ -60,7 +60,7 @@ def cause(finding: Finding, language: Language) -> str:
 
 def _since(finding: Finding, told: str, language: Language) -> str:
     if finding.onset is not None:
-        return language.text("Since {day}: {told}.", day=language.day(finding.onset.time), told=told)
+        return language.text("Since {day}: {told}.", day=language.day(finding.onset.noon), told=told)
     return language.text("{told}.", told=f"{told[0].upper()}{told[1:]}")
 
 
@@ -80,12 +80,13 @@ def omission(one: Omission, language: Language, *, completed: bool) -> list[str]
     lines = [language.text("The log of the calibration says what the model lacks: {told}.", told="; ".join(told))]
     for error in one.errors:
         if error.horizon == "24_h":
+            unit = QUANTITIES[error.quantity].difference_unit
             lines.append(
                 language.text(
                     "{quantity}: without it {before}, with it {after} off a day ahead, in weeks that no fit saw.",
                     quantity=language.name(error.quantity),
-                    before=language.amount(error.before, error.unit),
-                    after=language.amount(error.after, error.unit),
+                    before=language.amount(error.before, unit),
+                    after=language.amount(error.after, unit),
                 )
             )
     added = N_("It is in the bundle now.")
