@@ -98,3 +98,18 @@ def test_odds_compare_what_the_rules_say_with_standing_still(value: float, devia
     share = actuators.Share(value, deviation)
     exact = 0.5 * (value / deviation) ** 2 - 0.5 * ((value - 1.0) / deviation) ** 2
     assert share.log_odds == pytest.approx(odds) == pytest.approx(exact)
+
+
+@pytest.mark.parametrize(
+    ("missing", "hiding"),
+    [
+        ((), False),
+        (("vent_wind",), False),
+        (("vent_lee", "leaf_area_index"), False),
+        (("vent_lee", "vent_wind"), True),
+        (("vent_wind", "lamp_power"), True),
+        (("energy_screen",), True),
+    ],
+)
+def test_a_greenhouse_with_one_row_of_vents_lacks_no_actuator(missing: tuple[str, ...], *, hiding: bool) -> None:
+    assert actuators.may_hide_in_parameters(missing) is hiding

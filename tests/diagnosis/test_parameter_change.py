@@ -78,6 +78,23 @@ def test_parameters_that_one_thing_changes_together_are_named_as_one() -> None:
     assert alone is not None and alone.parameter == "vent_stack"
 
 
+def test_a_torn_screen_saves_less_and_lets_more_air_through() -> None:
+    names = ("energy_screen_saving", "screen_air_blocking", "mass_heat_capacity")
+    found = find(with_parameters(Truth({}, {}, (-6.0, -6.0, 0.0)), 1, names=names), np.random.default_rng(0))
+    assert found is not None and (found.parameter, found.leads) == ("screens", True)
+    assert found.share.low < -0.6 < found.share.high
+
+
+def test_a_small_change_is_named_only_where_it_leads() -> None:
+    """A washed cover: 15 % more light. Named an effect in its place it would be a sensor in the sun."""
+    washed, cleaned = (with_parameters(Truth({}, {}, (tenths, 0.0, 0.0)), 1) for tenths in (1.5, 0.6))
+    found = find(washed, np.random.default_rng(0))
+    assert found is not None and (found.parameter, found.leads) == ("transmissivity", True)
+    assert find(cleaned, np.random.default_rng(0)) is None
+    beside = with_parameters(Truth({"lamp_heat": 4.0}, {}, (-1.5, 0.0, 0.0)), 4)
+    assert find(beside, np.random.default_rng(0)) is None
+
+
 def test_nothing_is_named_where_nothing_has_changed() -> None:
     for seed in range(5):
         assert find(with_parameters(Truth({}, {}), 10 + seed), np.random.default_rng(0)) is None

@@ -10,7 +10,7 @@ other causes then goes on with it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,6 +33,7 @@ from igrow.trainer.fit.solver import DivergenceError
 
 REPLACEABLE = (*actuation.POSITIONS, "lamp_power")
 """Actuators that move the balances; without a dose the CO2 of a log tells nothing."""
+VENTS = frozenset({"vent_lee", "vent_wind"})
 
 
 @dataclass(frozen=True)
@@ -105,6 +106,12 @@ def complete(log: Log, days: LogDays, model: FittedModel, knowledge: Knowledge, 
         found.append(judged)
         current = trial
     return Completed(current, tuple(found), plain if found else None)
+
+
+def may_hide_in_parameters(missing: Collection[str]) -> bool:
+    """Tell whether an actuator is among the columns that a log lacks; a greenhouse may have one row of vents alone."""
+    lacking = set(REPLACEABLE).intersection(missing)
+    return bool(lacking if lacking >= VENTS else lacking - VENTS)
 
 
 def courses(log: Log, seen: Record, model: FittedModel) -> dict[str, Floats]:

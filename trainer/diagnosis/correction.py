@@ -208,8 +208,8 @@ def _sized(change: ParameterChange, before: Gaussian, after: Gaussian, rules: De
     now, names = after.marginal(members(change.parameter)), members(change.parameter)
     was, (low, high) = before.marginal(names).mean, bounds(names)
     edge = _AT_BOUND * (high - low)
-    share = float(np.mean(now.mean / was - 1.0))
-    if np.any((now.mean <= low + edge) | (now.mean >= high - edge)) or abs(share) < rules.least_parameter_change:
+    share, least = float(np.mean(now.mean / was - 1.0)), rules.least_parameter_change(leads=change.leads)
+    if np.any((now.mean <= low + edge) | (now.mean >= high - edge)) or abs(share) < least:
         return None
     weights = 1.0 / (len(names) * was)
     deviation = float(np.sqrt(weights @ now.covariance @ weights))

@@ -19,7 +19,7 @@ from igrow.core.effects import EFFECTS
 from igrow.core.errors import IgrowError
 from igrow.trainer.data.log import Log
 from igrow.trainer.diagnosis import history, wording
-from igrow.trainer.diagnosis.actuators import REPLACEABLE, Completed, complete
+from igrow.trainer.diagnosis.actuators import Completed, complete, may_hide_in_parameters
 from igrow.trainer.diagnosis.candidates import hidden_by_missing_weather
 from igrow.trainer.diagnosis.correction import Corrected, correct, corrected_model, may_give_way, with_parameter
 from igrow.trainer.diagnosis.crop import has_new_crop, of_one_crop, with_its_drift
@@ -122,8 +122,8 @@ class _Question:
         unseen = hidden_by_missing_weather(first.design.line)
         found = [replace(one, confounded=(*one.confounded, *unseen)) for one in found]
         # A parameter can stand in for an actuator that the log lacks, found or not.
-        lacking = not set(REPLACEABLE).isdisjoint(logged.record.missing)
-        parameter = None if lacking or new_crop else search.changed_parameter(rng) or asked
+        hiding = may_hide_in_parameters(logged.record.missing)
+        parameter = None if hiding or new_crop else search.changed_parameter(rng) or asked
         if parameter is not None and parameter.leads and parameter.onset is not None:
             if (told := self._since(parameter, parameter.onset.time, log, notes)) is not None:
                 return told
@@ -206,7 +206,9 @@ class _Question:
             return None
         # A sensor that drifts has drifted since the whole log began.
         rivals = [one if one.onset is not None else replace(one, onset=log.telemetry.time[0]) for one in rivals]
-        told = self.answer(later, replace(change, onset=None, leads=False) if rivals else None, rivals)
+        # Without the days before there is less to see: what leads in the whole log, unseen days alone must bear out.
+        asked = replace(change, onset=None, leads=change.leads and not rivals)
+        told = self.answer(later, asked if rivals or change.leads else None, rivals)
         findings = tuple(begun(one, change) if is_same(one, change) else one for one in told.findings)
         if findings == told.findings:
             return None

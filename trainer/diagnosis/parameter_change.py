@@ -65,17 +65,18 @@ def find(design: Design, rng: np.random.Generator) -> ParameterChange | None:
     if max(net.values()) > net[best.parameter] + margin:
         # One that nobody can look at explains it clearly better.
         return None
+    effects = search.score_candidates(design, null, onsets, rng)
+    largest = max((change.net_gain(design, one) for one in effects), default=0.0)
+    leads = best.gain >= rules.parameter_over_effect * largest
     named = linear.fit(design.grams, null.model.with_term(best.term))
     value, low, high = _range(design, best.parameter)
     wide = reach(rules) * linear.deviation_by_day(design.grams, named)
     size = float(named.amplitudes[0])
-    beyond = rules.beyond_bound
-    if abs(size) < rules.least_parameter_change * value or not beyond * (low - value) < size < beyond * (high - value):
+    beyond, least = rules.beyond_bound, rules.least_parameter_change(leads=leads)
+    if abs(size) < least * value or not beyond * (low - value) < size < beyond * (high - value):
         # What asks for more than there can be is something else.
         return None
-    least, most = sorted(((size - wide) / value, (size + wide) / value))
-    effects = search.score_candidates(design, null, onsets, rng)
-    largest = max((change.net_gain(design, one) for one in effects), default=0.0)
+    lowest, highest = sorted(((size - wide) / value, (size + wide) / value))
     as_good = [
         one.parameter
         for one in scored
@@ -85,11 +86,11 @@ def find(design: Design, rng: np.random.Generator) -> ParameterChange | None:
     ]
     return ParameterChange(
         best.parameter,
-        Estimate(size / value, least, most, "1"),
+        Estimate(size / value, lowest, highest, "1"),
         onset_interval(design, null, best.term),
         best.p_value,
         (best.parameter, *as_good),
-        best.gain >= rules.parameter_over_effect * largest,
+        leads,
     )
 
 

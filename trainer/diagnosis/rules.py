@@ -72,7 +72,8 @@ class DecisionRules:
     least_left_by_hour: float = _tuned(25.0, "gain of a pattern by the hour beside a change that unmakes its name")
 
     # Which parameter has changed, where no effect is missing or none explains as much.
-    least_parameter_change: float = _chosen(0.2, "share of its value by which a parameter must change to be named")
+    least_leading_change: float = _chosen(0.1, "share of its value by which a parameter that leads must have changed")
+    least_other_change: float = _chosen(0.2, "the same of one that explains no more than an effect does")
     least_parameter_gain: float = _tuned(20.0, "gain that its change must bring, all else changing by physics alone")
     parameter_over_null: float = _tuned(2.0, "times its largest gain where nothing had changed that it must bring")
     parameter_over_effect: float = _tuned(
@@ -159,6 +160,10 @@ class DecisionRules:
     def learns_history(self, days: float) -> bool:
         """Tell whether a calibration log of so many days is to teach what is missing in this greenhouse."""
         return self.history and days >= self.least_history_days
+
+    def least_parameter_change(self, *, leads: bool) -> float:
+        """Return the share of its value by which a parameter must have changed to be named."""
+        return self.least_leading_change if leads else self.least_other_change
 
     def gain_of_cause(self, *, time_steps: bool, transferred: bool) -> float:
         """Return what a cause must gain."""

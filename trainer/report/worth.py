@@ -18,14 +18,14 @@ from igrow.core.economics import co2_cost, electricity_price
 from igrow.core.simulator.hybrid import climate
 from igrow.core.simulator.hybrid.record import Record, observe
 from igrow.trainer.diagnosis.freerun import Stage
-from igrow.trainer.diagnosis.knowledge import activate
+from igrow.trainer.diagnosis.knowledge import CROP, activate
 from igrow.trainer.diagnosis.result import DISCREPANCY, Diagnosis, Finding
 from igrow.trainer.diagnosis.visible_parameters import VISIBLE, members
 
 _WEEK = 604_800.0
 _PAID: Mapping[str, str] = {"heating_valve_leak": "heat", "co2_valve_leak": "co2"}
 """Effects that bring something in which is paid for, whether it is wanted or not."""
-OF_THE_CROP = frozenset(name for name in VISIBLE if name.startswith(("assimilation", "respiration", "transpiration")))
+OF_THE_CROP = frozenset(name for name in VISIBLE if CROP.issuperset(members(name)))
 """Parameters whose change costs growth, which no balance counts: less CO2 taken up saves nothing."""
 _PAR_PER_GLOBAL = 2.1
 """Photons of PAR in outdoor radiation, umol J-1."""
