@@ -14,7 +14,8 @@ from igrow.core.errors import IgrowError
 from igrow.core.site import Site, load_site
 from igrow.core.telemetry import concatenate
 from igrow.core.whole_files import write_whole
-from igrow.trainer.data.importing.archive import is_archive, unpack
+from igrow.trainer.data.cells import is_archive
+from igrow.trainer.data.importing.archive import unpack
 from igrow.trainer.data.importing.check import Checked, check
 from igrow.trainer.data.importing.folder import alike
 from igrow.trainer.data.importing.proposal import Proposal, propose

@@ -8,7 +8,7 @@ import gzip
 import io
 import re
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
@@ -30,6 +30,11 @@ def may_be_table(name: str) -> bool:
     return name.lower().endswith(ENDINGS) and not name.lower().startswith((".", "readme", "license", "licence"))
 
 
+def is_archive(path: Path) -> bool:
+    """Tell whether a file is called an archive."""
+    return path.is_file() and path.name.lower().endswith(ARCHIVE)
+
+
 @dataclass(frozen=True)
 class Cells:
     """The rows of a file, each a list of texts as long as it happens to be."""
@@ -44,9 +49,17 @@ class Cells:
 
 _MARKS = (b"\xff\xfe", b"\xfe\xff")
 """Of texts in UTF-16, which are full of zeros."""
-_ZIP, _OLD_WORKBOOK, _PDF = b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"%PDF"
-_OTHER_ARCHIVES = (b"7z\xbc\xaf\x27\x1c", b"Rar!")
-_TAR, _TAR_AT = b"ustar", 257
+_OTHER_ARCHIVE = rb"7z\xbc\xaf\x27\x1c|Rar!|.{257}ustar"
+_PAGE, _JSON = rb"\s*<(?i:!doctype|html|table|\?xml)", rb'\s*(\{\s*"|\[\s*[\[{])'
+_NO_TEXT: Mapping[bytes, str] = {
+    rb"PK\x03\x04": "a zip archive or a workbook: let its name end in .zip or .xlsx",
+    rb"\xd0\xcf\x11\xe0": "a workbook: let its name end in .xls",
+    rb"%PDF": "a PDF: a table is needed, such as CSV or Excel",
+    _OTHER_ARCHIVE: "an archive that is not read: unpack it, and give the folder, or a zip archive of it",
+    _PAGE: "a page of HTML or XML: open it in a spreadsheet and save it as CSV or .xlsx",
+    _JSON: "JSON: a table is needed, such as CSV with a row for each time and a column for each sensor",
+}
+"""How files begin that are something else than text: what they are, and what would be right."""
 
 
 def is_text(path: Path) -> bool:
@@ -64,18 +77,7 @@ def is_text(path: Path) -> bool:
 
 def _refuse_what_is_no_text(path: Path, data: bytes) -> None:
     """Raise IgrowError that names what a file is, where it is something else than text."""
-    what = {
-        _ZIP: "a zip archive or a workbook: let its name end in .zip or .xlsx",
-        _OLD_WORKBOOK: "a workbook: let its name end in .xls",
-        _PDF: "a PDF: a table is needed, such as CSV or Excel",
-    }
-    told = next((text for start, text in what.items() if data.startswith(start)), None)
-    if data.startswith(_OTHER_ARCHIVES) or data[_TAR_AT:].startswith(_TAR):
-        told = "an archive that is not read: unpack it, and give the folder, or a zip archive of it"
-    if told is None and re.match(rb"\s*<(!doctype|html|table|\?xml)", data[:200], re.IGNORECASE):
-        told = "a page of HTML or XML: open it in a spreadsheet and save it as CSV or .xlsx"
-    if told is None and re.match(rb"\s*(\{\s*\"|\[\s*[\[{])", data[:200]):
-        told = "JSON: a table is needed, such as CSV with a row for each time and a column for each sensor"
+    told = next((text for start, text in _NO_TEXT.items() if re.match(start, data[:300], re.DOTALL)), None)
     if told is not None:
         raise IgrowError(f"{path}: is {told}")
 

@@ -14,7 +14,7 @@ from igrow.core.errors import IgrowError
 from igrow.core.quantities import QUANTITIES
 from igrow.core.yaml_schema import load
 from igrow.trainer.data import export
-from igrow.trainer.data.cells import ARCHIVE, ENDINGS, EXCEL, may_be_table, read_frame
+from igrow.trainer.data.cells import ENDINGS, EXCEL, is_archive, may_be_table, read_frame
 from igrow.trainer.data.mapping import ExportMapping
 from igrow.trainer.data.rows import Merged, joined, merge
 from igrow.trainer.data.source import Source
@@ -43,7 +43,7 @@ def read(paths: Sequence[Path], translation: Path | None = None) -> Source:
 
 def unpacked(path: Path) -> Path:
     """Return the folder of an archive that was unpacked beside it, any other path as it is; raises IgrowError."""
-    if not (path.is_file() and path.name.lower().endswith(ARCHIVE)):
+    if not is_archive(path):
         return path
     folder = path.with_suffix("")
     if not folder.is_dir():

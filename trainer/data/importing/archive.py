@@ -52,11 +52,6 @@ def _unpacked(archive: Path, opened: zipfile.ZipFile, into: Path, room: int, dep
     return size
 
 
-def is_archive(path: Path) -> bool:
-    """Tell whether a file is called an archive."""
-    return path.is_file() and path.name.lower().endswith(ARCHIVE)
-
-
 def _own(name: str) -> str:
     """Return a file's own name by its name in an archive; empty for files that a Mac adds."""
     parts = PurePosixPath(name).parts

@@ -56,9 +56,7 @@ class TimeForm:
 def looks_like_time(text: str) -> bool:
     """Tell whether a cell may be a date, or a date and a time."""
     text = with_english_months(without_weekday(text.strip()))
-    if _COMPACT.fullmatch(text):
-        return True
-    if _DATE.fullmatch(text) and not re.fullmatch(r"\d{8}", text):
+    if _COMPACT.fullmatch(text) or (_DATE.fullmatch(text) and not re.fullmatch(r"\d{8}", text)):
         return True
     if re.fullmatch(r"\d{8}", text) and not 1900 <= int(text[:4]) <= 2100:
         return False

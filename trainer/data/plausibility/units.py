@@ -48,14 +48,9 @@ def wrong_units(telemetry: Telemetry) -> list[DataFault]:
         ("lamp_power",): _power,
         ("lamp_on", "irrigation_on", "rain"): _switch,
     }
-    found = []
-    for names, check in checks.items():
-        for name in names:
-            values = readings(telemetry, name)
-            fault = check(name, values) if len(values) >= LEAST_VALUES else None
-            if fault is not None:
-                found.append(fault)
-    return found
+    read = [(name, check, readings(telemetry, name)) for names, check in checks.items() for name in names]
+    faults = (check(name, values) for name, check, values in read if len(values) >= LEAST_VALUES)
+    return [fault for fault in faults if fault is not None]
 
 
 def changed(name: str, remedy: Remedy) -> str:
