@@ -227,15 +227,12 @@ def _unjudged(result: Diagnosis, language: Language) -> Iterator[str]:
     for quantity in PREDICTED:
         if quantity in result.errors:
             continue
-        name = language.name(quantity)
-        if any(one.quantity == quantity for one in log.screened) and not np.isfinite(log.telemetry[quantity]).any():
-            yield language.text("{quantity} cannot be judged: its readings were set aside.", quantity=name)
-        elif quantity not in log.telemetry or not np.isfinite(log.telemetry[quantity]).any():
-            yield language.text("{quantity} cannot be judged: the log does not have it.", quantity=name)
-        elif quantity == "air_co2" and dosing and "co2_dosing" in result.missing:
-            yield language.text("CO2 cannot be judged: the log does not tell how much CO2 was dosed.")
+        if quantity not in log.telemetry or not np.isfinite(log.telemetry[quantity]).any():
+            why = "set aside" if any(one.quantity == quantity for one in log.screened) else "lacking"
         else:
-            yield language.text("{quantity} cannot be judged: no unseen day of it is whole.", quantity=name)
+            why = "undosed" if quantity == "air_co2" and dosing and "co2_dosing" in result.missing else "not whole"
+        text = TEXTS["unjudged"][why]
+        yield language.text(text, quantity=language.name(quantity))
 
 
 def set_aside(result: Diagnosis, language: Language) -> Iterator[str]:
