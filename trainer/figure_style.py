@@ -15,19 +15,8 @@ from typing import Any
 
 import numpy as np
 import yaml
-from matplotlib import rc_context
+from matplotlib import dates, rc_context
 from matplotlib.axes import Axes
-from matplotlib.dates import (
-    DAILY,
-    HOURLY,
-    MICROSECONDLY,
-    MINUTELY,
-    MONTHLY,
-    SECONDLY,
-    YEARLY,
-    AutoDateLocator,
-    num2date,
-)
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator, ScalarFormatter
 
@@ -43,7 +32,10 @@ STROKES: Mapping[str, str] = {"measured": "-", "deployed": ":", "recalibrated": 
 """So that nobody depends on colours."""
 WIDTH = 4.3
 """Inches: as wide as a telephone shows at the size that it is drawn in."""
-_MOST_TICKS = {YEARLY: 6, MONTHLY: 7, DAILY: 6, HOURLY: 7, MINUTELY: 8, SECONDLY: 8, MICROSECONDLY: 8}
+_MOST_TICKS = {
+    dates.YEARLY: 6, dates.MONTHLY: 7, dates.DAILY: 6, dates.HOURLY: 7, dates.MINUTELY: 8, dates.SECONDLY: 8,
+    dates.MICROSECONDLY: 8,
+}  # fmt: skip
 """As few as a telephone has room for; with fewer, matplotlib finds no step for some spans and draws every tick."""
 
 
@@ -69,12 +61,12 @@ def name_above(axes: Axes, text: str) -> None:
     axes.set_title(text, loc="left", fontsize=9, pad=3)
 
 
-def legend(axes: Axes, columns: int = 2) -> None:
+def legend(axes: Axes) -> None:
     """Put the legend above the panel: it hides nothing there."""
     axes.legend(
         loc="lower left",
         bbox_to_anchor=(0.0, 1.0),
-        ncols=columns,
+        ncols=2,
         borderaxespad=0.2,
         handlelength=1.6,
         frameon=False,
@@ -84,12 +76,12 @@ def legend(axes: Axes, columns: int = 2) -> None:
 
 def date_axis(axes: Axes, language: Language) -> None:
     """Label an axis of local times (`local`) with days."""
-    locator = AutoDateLocator(minticks=3, maxticks=_MOST_TICKS)  # type: ignore[no-untyped-call]
+    locator = dates.AutoDateLocator(minticks=3, maxticks=_MOST_TICKS)  # type: ignore[no-untyped-call]
     axes.xaxis.set_major_locator(locator)
     clock = Language(language.code, language.translations)
 
     def label(value: float, _position: int | None = None) -> str:
-        moment = num2date(value).replace(tzinfo=None)  # type: ignore[no-untyped-call]
+        moment = dates.num2date(value).replace(tzinfo=None)  # type: ignore[no-untyped-call]
         return clock.short_day(np.datetime64(moment, "s")) if moment.time() == datetime.time() else f"{moment:%H:%M}"
 
     axes.xaxis.set_major_formatter(FuncFormatter(label))

@@ -48,11 +48,8 @@ def collect_site(
         "command": "collect",
         "site": site,
         "verdict": "done",
-        "segments": done.segments,
-        "rows": done.rows,
-        "bytes": done.bytes,
+        **asdict(done),
         "newest": None if done.newest is None else done.newest.strftime("%Y-%m-%dT%H:%M:%SZ"),
-        "notes": done.notes,
     }
     folder = site_folder(Path(state), site)
     folder.mkdir(parents=True, exist_ok=True)

@@ -27,9 +27,7 @@ LONGEST = timedelta(days=364)
 def lacking(bundle: Bundle, site: Site, now: datetime) -> bool:
     """Tell whether a site's crop stands in a season of which the bundle in force knows nothing."""
     crop, today = site.crop, now.astimezone(ZoneInfo(site.time_zone)).date()
-    if crop.end_date is None or today < crop.planting_date:
-        return False
-    if (crop.end_date - today).days < SHORTEST:
+    if crop.end_date is None or today < crop.planting_date or (crop.end_date - today).days < SHORTEST:
         return False
     season = SeasonPlan.of(bundle) if bundle.manifest.site == site.name else None
     return season is None or not season.covers(np.datetime64(now.replace(tzinfo=None), "s"))
