@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from igrow.core.arrays import Floats
-from igrow.core.greenhouse import Disturbances, GreenhouseParameters, Sensors, climate, tomato
+from igrow.core.greenhouse import Disturbances, GreenhouseParameters, Sensors, climate_state, tomato
 from igrow.core.greenhouse.climate_computer import ClimateComputer
 from igrow.core.greenhouse.parameters import stack
 from igrow.core.greenhouse.plant import Plant
@@ -175,7 +175,8 @@ def free_run(days: Days, parameters: GreenhouseParameters, copies: int = 1) -> d
     start = {name: spread(values) for name, values in days.start.items()}
     count = len(start["air_temperature"])
     outdoor = table.at(0.0).outdoor_temperature
-    state = climate.initial(np, start["air_temperature"], start["air_humidity"], start["air_co2"], outdoor)._replace(
+    rest = climate_state.initial(np, start["air_temperature"], start["air_humidity"], start["air_co2"], outdoor)
+    state = rest._replace(
         floor=spread(days.floor), soil_1=spread(days.soil), soil_2=spread(days.soil), soil_3=spread(days.soil)
     )
     crop = tomato.mature_crop(parameters, np.ones(count), start["leaf_area_index"])

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from igrow.core.air import LATENT_HEAT
 from igrow.core.arrays import Array
-from igrow.core.greenhouse import climate, tomato
-from igrow.core.greenhouse.climate import Climate, Ledger
+from igrow.core.greenhouse import climate_state, tomato
+from igrow.core.greenhouse.climate_state import Climate, Ledger
 from igrow.core.greenhouse.light import Light
 from igrow.core.greenhouse.parameters import GreenhouseParameters
 from igrow.core.greenhouse.state import ACCUMULATED, PlantState, add
@@ -107,11 +107,11 @@ def residuals(parameters: GreenhouseParameters, state: PlantState, before: Mappi
 
 def stored_energy(p: GreenhouseParameters, state: Climate, leaf_area_index: Array) -> Array:
     """Return sensible and latent heat in the greenhouse above 0 degC, J m-2."""
-    air, top, canopy, cover, screen, floor = climate.capacities(p, leaf_area_index)
+    air, top, canopy, cover, screen, floor = climate_state.capacities(p, leaf_area_index)
     soil = p.soil_heat_capacity * (
-        climate.SOIL_LAYERS[0] * state.soil_1
-        + climate.SOIL_LAYERS[1] * state.soil_2
-        + climate.SOIL_LAYERS[2] * state.soil_3
+        climate_state.SOIL_LAYERS[0] * state.soil_1
+        + climate_state.SOIL_LAYERS[1] * state.soil_2
+        + climate_state.SOIL_LAYERS[2] * state.soil_3
     )
     sensible = (
         air * state.air

@@ -15,9 +15,9 @@ import numpy as np
 from igrow.core.air import co2_fraction, saturation_pressure
 from igrow.core.arrays import Array
 from igrow.core.errors import IgrowError
-from igrow.core.greenhouse import books, canopy, climate, observation, tomato, ventilation
-from igrow.core.greenhouse.climate import Climate, Conditions
+from igrow.core.greenhouse import books, canopy, climate, climate_state, observation, tomato, ventilation
 from igrow.core.greenhouse.climate_computer import ClimateComputer, at_rest, control
+from igrow.core.greenhouse.climate_state import Climate, Conditions
 from igrow.core.greenhouse.disturbances import Disturbances
 from igrow.core.greenhouse.hidden import EffectBank, HiddenEffect
 from igrow.core.greenhouse.light import distribute
@@ -73,7 +73,7 @@ class Plant:
         like: Array = 1.0 if count is None else np.ones(count)
         now = weather.at(start)
         grown = _planted(parameters, crop, like)
-        rest = climate.initial(self.xp, 19.0 * like, 75.0 * like, 550.0 * like, now.outdoor_temperature * like)
+        rest = climate_state.initial(self.xp, 19.0 * like, 75.0 * like, 550.0 * like, now.outdoor_temperature * like)
         crop_rates = tomato.rates(self.xp, parameters, grown, 19.0 * like)
         self.state = PlantState(
             seconds=start,

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from igrow.core.arrays import Array
-from igrow.core.greenhouse.climate import Climate
 from igrow.core.greenhouse.climate_computer import Control
+from igrow.core.greenhouse.climate_state import Climate
 from igrow.core.greenhouse.light import Light
 from igrow.core.greenhouse.parameters import GreenhouseParameters
 from igrow.core.greenhouse.tomato import Crop, Rates

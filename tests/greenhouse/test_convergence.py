@@ -31,7 +31,8 @@ def test_half_the_step_gives_the_same_day(season: str, request: pytest.FixtureRe
 
 
 def test_the_error_of_the_climate_step_is_of_second_order(winter: Telemetry) -> None:
-    from igrow.core.greenhouse.climate import Conditions, advance, initial
+    from igrow.core.greenhouse.climate import advance
+    from igrow.core.greenhouse.climate_state import Conditions, initial
     from igrow.core.greenhouse.namespace import FloatNamespace
 
     conditions = Conditions(
@@ -54,7 +55,8 @@ def test_the_error_of_the_climate_step_is_of_second_order(winter: Telemetry) -> 
 
 @pytest.mark.parametrize("wind", [0.0, 40.0])
 def test_no_weather_makes_the_step_unstable(wind: float) -> None:
-    from igrow.core.greenhouse.climate import Conditions, advance, initial
+    from igrow.core.greenhouse.climate import advance
+    from igrow.core.greenhouse.climate_state import Conditions, initial
     from igrow.core.greenhouse.namespace import FloatNamespace
 
     state = initial(FloatNamespace, 19.0, 75.0, 600.0, -20.0)
