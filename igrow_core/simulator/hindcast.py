@@ -11,8 +11,9 @@ import numpy as np
 from igrow.core import gaps
 from igrow.core.arrays import Floats, Integers, Times
 from igrow.core.bundle import Bundle, BundleError, open_session
+from igrow.core.simulator.hybrid.log_record import make_record
 from igrow.core.simulator.hybrid.measurement import PREDICTED
-from igrow.core.simulator.hybrid.record import Record, make_record
+from igrow.core.simulator.hybrid.record import Record
 from igrow.core.telemetry import Telemetry
 
 SETTLING = 86_400.0

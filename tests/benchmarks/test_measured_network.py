@@ -9,7 +9,8 @@ import pytest
 
 from benchmarks import measured_network
 from benchmarks.measured_network import network_predictor
-from igrow.core.simulator.hybrid.record import Record, make_record
+from igrow.core.simulator.hybrid.log_record import make_record
+from igrow.core.simulator.hybrid.record import Record
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.training.stage import TrainingPlan
 

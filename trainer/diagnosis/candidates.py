@@ -21,7 +21,8 @@ from igrow.core.arrays import Floats
 from igrow.core.effects import EFFECTS, Effect
 from igrow.core.effects.definition import Parameter
 from igrow.core.quantities import WEATHER
-from igrow.core.simulator.hybrid.record import SWITCHES, Record
+from igrow.core.simulator.hybrid.log_record import SWITCHES
+from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.diagnosis.sensitivity import (
     Linearisation,
     flux_sensitivities,

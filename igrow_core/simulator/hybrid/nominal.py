@@ -9,8 +9,9 @@ import numpy as np
 
 from igrow.core.air import thinness
 from igrow.core.arrays import Floats, Times
+from igrow.core.simulator.hybrid.log_record import make_record
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
-from igrow.core.simulator.hybrid.record import Record, make_record
+from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 

@@ -1,4 +1,4 @@
-"""A log made ready to drive the hybrid stage, the states it implies, and free runs from any of its instants.
+"""A log as it drives the hybrid stage, the states it implies, and free runs from any of its instants.
 
 Row k of a record holds the measurements at its time, and the inputs from that time to the next row's.
 """
@@ -11,43 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from igrow.core import gaps, sun
+from igrow.core import gaps
 from igrow.core.arrays import Array, Floats, Integers, Mask, Times
 from igrow.core.effects import EFFECTS
 from igrow.core.effects.definition import Values
 from igrow.core.simulator.hybrid import climate, measurement
 from igrow.core.simulator.hybrid.climate import ActiveEffects, memory_name
-from igrow.core.telemetry import Telemetry, to_grid
 
-LONGEST_FILL = 1800.0
-"""Inputs are bridged over gaps of at most this many seconds; longer ones make their rows unusable."""
 SUBSTEP = 900.0
 """Longest step of the balances in seconds."""
-
-_MEANS = ("outdoor_temperature", "outdoor_humidity", "global_radiation", "wind_speed", "sky_temperature", "rain")
-"""Inputs that change smoothly, taken as the mean of both ends of the interval."""
-_ABSENT: Mapping[str, float] = {
-    "outdoor_co2": 420.0,
-    "wind_speed": 3.0,
-    "outdoor_humidity": 80.0,
-    "global_radiation": 0.0,
-    "rail_pipe_temperature": 0.0,
-    "grow_pipe_temperature": 0.0,
-    "vent_lee": 0.0,
-    "vent_wind": 0.0,
-    "energy_screen": 0.0,
-    "blackout_screen": 0.0,
-    "lamp_power": 0.0,
-    "co2_dosing": 0.0,
-    "irrigation": 0.0,
-    "wind_direction": 0.0,
-    "rain": 0.0,
-}
-"""What stands in for a column that the log lacks; the record names it in `missing`."""
-SWITCHES: Mapping[str, str] = {"lamp_power": "lamp_on", "irrigation": "irrigation_on"}
-"""What a log may tell of equipment whose own column it lacks: the balances cannot use it, a diagnosis can."""
-_SKY_BELOW_AIR = 12.0
-"""K, sky below outdoor air under a half-clouded sky, where no sky temperature is measured."""
 
 
 @dataclass(frozen=True)
@@ -101,73 +73,6 @@ class Record:
         return replace(self, inputs=dict(self.inputs) | {"elapsed_days": np.maximum(elapsed, 0.0)})
 
 
-def make_record(
-    telemetry: Telemetry,
-    *,
-    step: float,
-    latitude: float,
-    longitude: float,
-    mean_height: float,
-    lamp_efficacy: float,
-    leaf_area_index: float,
-) -> Record:
-    """Return the record of a log.
-
-    Args:
-        telemetry: any columns of the registry; outdoor and air temperature must be among them.
-        step: seconds between rows of the record.
-        latitude: degrees north.
-        longitude: degrees east.
-        mean_height: m, air volume per floor area.
-        lamp_efficacy: umol J-1.
-        leaf_area_index: m2 m-2, for rows without one.
-
-    Raises:
-        TelemetryError: the log has no outdoor_temperature or no air_temperature.
-    """
-    table = to_grid(telemetry, int(step))
-    count = len(table)
-    usable = np.ones(count, dtype=bool)
-    longest = max(1, round(LONGEST_FILL / step))
-    inputs: dict[str, Floats] = {}
-    missing: list[str] = []
-    outdoor, bridged = _bridge(table["outdoor_temperature"], longest, smooth=True)
-    inputs["outdoor_temperature"] = outdoor
-    usable &= bridged
-    if _present(table, "sky_temperature"):
-        inputs["sky_temperature"], bridged = _bridge(table["sky_temperature"], longest, smooth=True)
-        usable &= bridged
-    else:
-        inputs["sky_temperature"] = outdoor - _SKY_BELOW_AIR
-        missing.append("sky_temperature")
-    for name, stand_in in _ABSENT.items():
-        if _present(table, name):
-            inputs[name], bridged = _bridge(table[name], longest, smooth=name in _MEANS)
-            usable &= bridged
-        else:
-            inputs[name] = np.full(count, stand_in)
-            missing.append(name)
-    for name, switch in SWITCHES.items():
-        if name in missing and _present(table, switch):
-            inputs[switch] = _bridge(table[switch], longest, smooth=False)[0]
-    if _present(table, "leaf_area_index"):
-        inputs["leaf_area_index"] = _bridge(table["leaf_area_index"], count, smooth=True)[0]
-    else:
-        inputs["leaf_area_index"] = np.full(count, leaf_area_index)
-        missing.append("leaf_area_index")
-    for name in _MEANS:
-        values = inputs[name]
-        inputs[name] = np.append(0.5 * (values[1:] + values[:-1]), values[-1:])
-    inputs["mean_height"] = np.full(count, mean_height)
-    middle = sun.unix_seconds(table.time) + 0.5 * step
-    elevation, azimuth, hour = sun.position(np, middle, latitude, longitude)
-    inputs |= {"sun_elevation": elevation, "sun_azimuth": azimuth, "hour": hour, "elapsed_days": np.zeros(count)}
-    nothing = np.full(count, np.nan)
-    measured = {name: np.array(table.columns.get(name, nothing)) for name in measurement.PREDICTED}
-    measured["air_temperature"] = np.array(table["air_temperature"])
-    return Record(table.time, float(step), inputs, measured, usable, tuple(missing), lamp_efficacy).since(None)
-
-
 def observe(record: Record, parameters: Values, effects: ActiveEffects) -> dict[str, Floats]:
     """Return the states that the log implies, by name, (n,): the measured ones without sensor faults, the rest run.
 
@@ -175,7 +80,7 @@ def observe(record: Record, parameters: Values, effects: ActiveEffects) -> dict[
     measurements the last value stands. Parameters are floats or arrays of shape (n,); or of shape (m, 1) for m
     variants at once, and then the floor's temperature has shape (m, n).
     """
-    clean = {name: _bridge(values, len(record), smooth=True)[0] for name, values in record.measured.items()}
+    clean = {name: bridge(values, len(record), smooth=True)[0] for name, values in record.measured.items()}
     for name, stand_in in (("air_humidity", 75.0), ("air_co2", 500.0)):
         clean[name] = np.where(np.isfinite(clean[name]), clean[name], stand_in)
     if any(EFFECTS[name].kind == "sensor" for name in effects):
@@ -286,11 +191,7 @@ def _at_rows(effects: ActiveEffects, rows: Integers, count: int) -> ActiveEffect
     }
 
 
-def _present(table: Telemetry, name: str) -> bool:
-    return name in table and bool(np.isfinite(table[name]).any())
-
-
-def _bridge(values: Floats, longest: int, *, smooth: bool) -> tuple[Floats, Mask]:
+def bridge(values: Floats, longest: int, *, smooth: bool) -> tuple[Floats, Mask]:
     """Fill gaps (linearly or by the last value) and tell which rows were measured or lay in a gap of <= longest."""
     return (gaps.interpolated if smooth else gaps.held)(values), gaps.short_gaps(values, longest)
 
