@@ -56,6 +56,14 @@ class Bundle:
             raise BundleError(f"{self.folder}: the bundle holds no {file}")
         return self.folder / file
 
+    def content(self, name: str) -> bytes:
+        """Return what one of the files holds; raises BundleError where it cannot be read."""
+        path = self.folder / name
+        try:
+            return path.read_bytes()
+        except OSError as error:
+            raise BundleError(f"{path}: not readable: {error.strerror}") from None
+
     @property
     def label(self) -> str:
         """A name for people: site, day made, identity."""

@@ -176,11 +176,7 @@ def _history_of(bundle: Bundle) -> Discrepancy | None:
     """Return what a bundle knows of its greenhouse's discrepancy; None where it knows nothing."""
     if DISCREPANCY_FILE not in bundle.manifest.files:
         return None
-    path = bundle.folder / DISCREPANCY_FILE
-    try:
-        return Discrepancy.from_bytes(path.read_bytes(), where=str(path))
-    except OSError as error:
-        raise BundleError(f"{path}: not readable: {error.strerror}") from None
+    return Discrepancy.from_bytes(bundle.content(DISCREPANCY_FILE), where=str(bundle.folder / DISCREPANCY_FILE))
 
 
 def _constants(site: Site) -> dict[str, float]:

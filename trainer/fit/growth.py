@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from igrow.core.arrays import Floats, Integers
-from igrow.core.bundle import Bundle, BundleError, default_bundle_folder, read_bundle
+from igrow.core.bundle import Bundle, default_bundle_folder, read_bundle
 from igrow.core.local_time import to_local
 from igrow.core.simulator.crop import CropStages
 from igrow.core.simulator.growth import Count, GrowthDays, GrowthFit, fit_growth, prior_of, warmth
@@ -39,12 +39,7 @@ COVERED = 0.8
 
 def crop_of(bundle: Bundle) -> CropStages:
     """Return the growth and yield stages that a bundle carries; raises BundleError where they cannot be read."""
-    path = bundle.folder / CROP_FILE
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise BundleError(f"{path}: not readable: {error.strerror}") from None
-    stages, _ = stages_from_bytes(content, where=str(path))
+    stages, _ = stages_from_bytes(bundle.content(CROP_FILE), where=str(bundle.folder / CROP_FILE))
     settings = bundle.manifest.simulator
     growth = float(settings.get("conversion", 0.0)), float(settings.get("maintenance", 0.0))
     covariance = settings.get("growth_covariance")

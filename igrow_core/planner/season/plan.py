@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -176,11 +175,7 @@ class SeasonPlan:
         """Return that of a bundle; None where it carries none. Raises BundleError where it cannot be read."""
         if SEASON_FILE not in bundle.manifest.files:
             return None
-        path: Path = bundle.folder / SEASON_FILE
-        try:
-            return cls.from_json(path.read_text(encoding="utf-8"), str(path))
-        except OSError as error:
-            raise BundleError(f"{path}: not readable: {error.strerror}") from None
+        return cls.from_json(bundle.content(SEASON_FILE).decode(), str(bundle.folder / SEASON_FILE))
 
 
 def valued(season: Season, strategy: Strategy, genes: Genes, crop: Crop) -> SeasonPlan:
