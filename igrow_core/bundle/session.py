@@ -10,6 +10,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from igrow.core.bundle.manifest import BundleError
+from igrow.core.errors import first_line
 
 
 def new_session(graph: Path | bytes) -> Any:
@@ -32,7 +33,7 @@ def open_session(path: Path) -> Any:
     try:
         return new_session(path)
     except Exception as error:
-        raise BundleError(f"{path}: onnxruntime cannot load the graph: {_first_line(error)}") from None
+        raise BundleError(f"{path}: onnxruntime cannot load the graph: {first_line(error)[:200]}") from None
 
 
 def run_graph(session: Any, inputs: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
@@ -41,8 +42,4 @@ def run_graph(session: Any, inputs: Mapping[str, NDArray[Any]]) -> dict[str, NDA
     try:
         return dict(zip(names, session.run(names, dict(inputs)), strict=True))
     except Exception as error:
-        raise BundleError(f"the graph does not run: {_first_line(error)}") from None
-
-
-def _first_line(error: Exception) -> str:
-    return (str(error).strip().splitlines() or [type(error).__name__])[0][:200]
+        raise BundleError(f"the graph does not run: {first_line(error)[:200]}") from None

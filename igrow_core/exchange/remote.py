@@ -6,6 +6,7 @@ import importlib
 from pathlib import Path
 from typing import Any
 
+from igrow.core.errors import first_line
 from igrow.core.exchange.address import Address, parse_address
 from igrow.core.exchange.errors import ExchangeError
 from igrow.core.exchange.place import Entry, FolderPlace
@@ -85,8 +86,7 @@ class RemotePlace:
 
     def _failed(self, error: Exception) -> ExchangeError:
         # What libraries of this kind raise is known to nobody: their own errors, their transports', the system's.
-        text = (str(error).strip().splitlines() or [type(error).__name__])[0]
-        return ExchangeError(f"{self._name}: {text[:200]}")
+        return ExchangeError(f"{self._name}: {first_line(error)[:200]}")
 
 
 def _last(path: str) -> str:
@@ -125,8 +125,7 @@ def open_remote(address: Address, *, known_hosts: Path | None = None, identity: 
     except ExchangeError:
         raise
     except Exception as error:
-        text = (str(error).strip().splitlines() or [type(error).__name__])[0]
-        raise ExchangeError(f"{address}: {text[:200]}") from None
+        raise ExchangeError(f"{address}: {first_line(error)[:200]}") from None
     return RemotePlace(system, address.path, str(address), renames=True)
 
 

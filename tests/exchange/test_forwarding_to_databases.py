@@ -20,7 +20,7 @@ import pytest
 from igrow.core.errors import IgrowError
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.service.archive import Archive
-from igrow.trainer.service.forwarding import Forwarded, forward, line_protocol
+from igrow.trainer.service.forwarding import forward, line_protocol
 from tests import needs
 from tests.exchange.peers import INSTALL, _wait_for_port, free_port
 
@@ -70,8 +70,8 @@ def ask(server: str, query: str) -> dict:
 
 def test_influxdb_holds_each_value_once(archive: Archive, influx: str) -> None:
     target = f"{influx}/write?db=igrow"
-    assert forward(archive, "house 1", target, TODAY) == Forwarded(2, 95)
-    assert forward(archive, "house 1", target, TODAY) == Forwarded(0, 0), "unchanged days are left out"
+    assert forward(archive, "house 1", target, TODAY) == (2, 95)
+    assert forward(archive, "house 1", target, TODAY) == (0, 0), "unchanged days are left out"
     shutil.rmtree(archive.root / "ledger")
     (archive.root / "ledger").mkdir()
     forward(archive, "house 1", target, TODAY)
@@ -88,7 +88,7 @@ def test_a_day_that_changes_is_written_again(archive: Archive, influx: str) -> N
     forward(archive, "house 1", target, TODAY)
     late = Telemetry(np.array([START + 90], dtype="datetime64[s]"), {"air_temperature": np.array([30.0])})
     archive.add_telemetry("house 1", late)
-    assert forward(archive, "house 1", target, TODAY).days == 1
+    assert forward(archive, "house 1", target, TODAY)[0] == 1
 
 
 def test_a_database_that_is_not_there_or_refuses_is_one_sentence(archive: Archive, influx: str, tmp_path: Path) -> None:
@@ -152,7 +152,7 @@ def connected(target: str):
 
 def test_postgresql_holds_each_value_once(archive: Archive, postgresql: str, tmp_path: Path) -> None:
     connected(postgresql).close()
-    assert forward(archive, "house 1", postgresql, TODAY) == Forwarded(2, 95)
+    assert forward(archive, "house 1", postgresql, TODAY) == (2, 95)
     shutil.rmtree(archive.root / "ledger")
     (archive.root / "ledger").mkdir()
     forward(archive, "house 1", postgresql, TODAY)

@@ -14,7 +14,7 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
-from igrow.core.errors import IgrowError
+from igrow.core.errors import IgrowError, first_line
 from igrow.trainer.data import fixed_places
 
 EXCEL = (".xlsx", ".xls", ".xlsm", ".xlsb", ".ods")
@@ -173,8 +173,7 @@ def _open_workbook(path: Path) -> Any:
     try:
         return python_calamine.CalamineWorkbook.from_path(str(path))
     except (OSError, python_calamine.CalamineError) as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise IgrowError(f"{path}: cannot be read as a workbook: {reason}") from None
+        raise IgrowError(f"{path}: cannot be read as a workbook: {first_line(error)}") from None
 
 
 def _workbook(path: Path, sheet: str | None) -> list[tuple[list[str], int]]:
@@ -199,7 +198,7 @@ def read_frame(path: Path) -> Any:
     try:
         return pd.read_parquet(path)
     except (OSError, ValueError) as error:
-        raise IgrowError(f"{path}: cannot be read as Parquet: {str(error).splitlines()[0]}") from None
+        raise IgrowError(f"{path}: cannot be read as Parquet: {first_line(error)}") from None
 
 
 def _parquet(path: Path) -> list[tuple[list[str], int]]:

@@ -17,7 +17,9 @@ def with_english_halves(text: str) -> str:
             return found[0]
         # A clock that counts from 0 to 11 has no 12.
         hour = re.sub(r"^0?0(?=\D)", "12", found["clock"])
-        return f"{hour}{' ' if found['before'] else found['blank']}{_half(word)}"
+        halves = halves_of_day().items()
+        half = next(half for spelling, half in halves if re.fullmatch(_pattern(spelling), word, re.IGNORECASE))
+        return f"{hour}{' ' if found['before'] else found['blank']}{half}"
 
     return text if text.isascii() and not any(map(str.isalpha, text)) else _clock().sub(english, text)
 
@@ -25,12 +27,6 @@ def with_english_halves(text: str) -> str:
 def is_half(text: str) -> bool:
     """Tell whether a text is a word for a half of the day, and nothing else."""
     return re.fullmatch("|".join(map(_pattern, halves_of_day())), text, re.IGNORECASE) is not None
-
-
-def _half(word: str) -> str:
-    return next(
-        half for spelling, half in halves_of_day().items() if re.fullmatch(_pattern(spelling), word, re.IGNORECASE)
-    )
 
 
 @cache

@@ -77,8 +77,7 @@ def read_table(table: ExportTable, mapping: ExportMapping) -> Merged:
 
 def read_tables(tables: Sequence[ExportTable], mapping: ExportMapping) -> Merged:
     """Return the telemetry of several tables of one layout, joined in time; raises IgrowError as `read` does."""
-    parts = [read_table(chosen_rows(table, mapping.only), mapping) for table in tables]
-    return joined(parts)
+    return joined([read_table(chosen_rows(table, mapping.only), mapping) for table in tables])
 
 
 def readings(table: ExportTable, time: TimeColumn) -> tuple[ExportTable, tuple[str, ...]]:

@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 
 from joblib import Parallel, delayed
 
-from igrow.core.errors import IgrowError
+from igrow.core.errors import IgrowError, first_line
 from igrow.trainer.fleet.registry import Backend
 from igrow.trainer.fleet.tasks import Task, TaskOutcome
 from igrow.trainer.fleet.worker import close_all, run_limited
@@ -60,7 +60,7 @@ def _on_ray(tasks: Sequence[Task], workers: int, address: str | None) -> Iterato
             ready, waiting = ray.wait(waiting, num_returns=1)
             yield ray.get(ready[0])
     except ray.exceptions.RayError as error:
-        raise IgrowError(f"the Ray cluster: {_first_line(error)}") from None
+        raise IgrowError(f"the Ray cluster: {first_line(error)}") from None
     finally:
         if began:
             ray.shutdown()
@@ -82,8 +82,4 @@ def _connect(ray: Any, workers: int, address: str | None) -> None:
     except Exception as error:  # whatever it is, Ray raises it as a bare Exception too
         ray.shutdown()
         where = "Ray does not start on this machine" if address is None else f"no Ray cluster at {address}"
-        raise IgrowError(f"{where}: {_first_line(error)}") from None
-
-
-def _first_line(error: Exception) -> str:
-    return (str(error).strip().splitlines() or [type(error).__name__])[0]
+        raise IgrowError(f"{where}: {first_line(error)}") from None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import html
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
 
 from matplotlib.figure import Figure
@@ -19,14 +18,8 @@ from igrow.trainer.figure_style import WIDTH, svg, with_signs_of
 
 OVERVIEW = ("air_temperature", "air_humidity", "air_co2", "outdoor_temperature", "global_radiation")
 """What the overview of a log shows."""
-
-
-@dataclass(frozen=True)
-class Picture:
-    """One figure of the page."""
-
-    title: str
-    svg: str
+Picture = dict[str, str]
+"""One figure of the page: its title and its svg."""
 
 
 def overview(result: Diagnosis, language: Language) -> list[Picture]:
@@ -81,4 +74,4 @@ def _drawn(wanted: list[tuple[str, Callable[[], Figure]]], language: Language) -
         except IgrowError:
             continue  # The log has nothing to show there.
         label = f'<svg role="img" aria-label="{html.escape(title)}"'
-        yield Picture(title, drawn.replace("<svg", label, 1))
+        yield {"title": title, "svg": drawn.replace("<svg", label, 1)}

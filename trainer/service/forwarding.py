@@ -20,14 +20,13 @@ import os
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
-from dataclasses import dataclass
 from datetime import date, timedelta
 from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
 
-from igrow.core.errors import IgrowError
+from igrow.core.errors import IgrowError, first_line
 from igrow.core.exchange.documents import read_object
 from igrow.core.telemetry import Telemetry
 from igrow.core.whole_files import write_whole
@@ -50,16 +49,8 @@ INSERT = (
 _HYPERTABLE = "SELECT create_hypertable('telemetry', 'time', if_not_exists => TRUE, migrate_data => TRUE)"
 
 
-@dataclass(frozen=True)
-class Forwarded:
-    """What went to a target."""
-
-    days: int
-    values: int
-
-
-def forward(archive: Archive, site: str, target: str, today: date) -> Forwarded:
-    """Write the days of a site that are new or changed to a target.
+def forward(archive: Archive, site: str, target: str, today: date) -> tuple[int, int]:
+    """Write the days of a site that are new or changed to a target; returns how many they were, and their values.
 
     Raises IgrowError where the target refuses them; they follow at the next call.
     """
@@ -77,7 +68,7 @@ def forward(archive: Archive, site: str, target: str, today: date) -> Forwarded:
         marks[str(day)] = stamp
         oldest = str(today - timedelta(days=DAYS))
         write_whole(marks_file, json.dumps({key: mark for key, mark in marks.items() if key >= oldest}).encode())
-    return Forwarded(days, values)
+    return days, values
 
 
 def line_protocol(site: str, rows: Telemetry) -> Iterator[str]:
@@ -147,8 +138,7 @@ def _insert(target: str, site: str, rows: Telemetry) -> None:
                 cursor.execute(_HYPERTABLE)
             cursor.executemany(INSERT, sql_rows(site, rows))
     except psycopg.Error as error:
-        text = (str(error).strip().splitlines() or [type(error).__name__])[0]
-        raise IgrowError(f"{target.rsplit('@', 1)[-1]}: {text}") from None
+        raise IgrowError(f"{target.rsplit('@', 1)[-1]}: {first_line(error)}") from None
 
 
 def _script(site: str, rows: Telemetry) -> str:

@@ -51,8 +51,7 @@ def read(folder: Path, compartment: str | None = None) -> Source:
         share = np.clip(0.01 * lamp, 0.0, 1.0)
         columns |= {"lamp_power": _LAMP_POWER * share, "lamp_on": share}
     notes = ["no CO2 dosing signal: only its daily sums are known", *_setpoints(folder / name, local, columns)]
-    empty = ~np.isfinite(table[["Tair", "VentLee", "EnScr"]].to_numpy(dtype=np.float64)).any(axis=1)
-    telemetry = challenge.to_telemetry(local, columns, empty)
+    telemetry = challenge.to_telemetry(local, columns, table)
     used = challenge.daily(excel_tables.find(folder / name, "ResourceCalculations"), _COLUMNS["resources"])
     site = replace(challenge.site("agc2018"), name=f"agc2018-{name.lower().replace('_', '-')}")
     return Source(f"agc2018 {name}", telemetry, _harvests(folder / name), used, site, tuple(notes))

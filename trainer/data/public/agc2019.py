@@ -45,9 +45,7 @@ def read(folder: Path, compartment: str | None = None) -> Source:
     outside = excel_tables.read(weather_path)
     weather_local = excel_tables.excel_times(outside["time"].to_numpy(dtype=np.float64), weather_path)
     columns |= challenge.at_times(local, weather_local, challenge.weather(outside))
-    # Rows without any measurement hold computed numbers that mean nothing.
-    empty = ~np.isfinite(table[["Tair", "VentLee", "EnScr"]].to_numpy(dtype=np.float64)).any(axis=1)
-    telemetry = challenge.to_telemetry(local, columns, empty)
+    telemetry = challenge.to_telemetry(local, columns, table)
     harvests, notes = _harvests(excel_tables.find(folder / name, "Production"))
     resources = challenge.daily(excel_tables.find(folder / name, "Resources"), _COLUMNS["resources"])
     site = replace(challenge.site("agc2019"), name=f"agc2019-{name.lower()}")

@@ -11,7 +11,7 @@ import numpy as np
 import yaml
 
 from igrow.core.air import STEFAN_BOLTZMANN
-from igrow.core.arrays import Floats, Mask, Times
+from igrow.core.arrays import Floats, Times
 from igrow.core.errors import IgrowError
 from igrow.core.local_time import from_local
 from igrow.core.site import Site, load_site
@@ -94,10 +94,12 @@ def at_times(local: Times, time: Times, columns: Mapping[str, Floats]) -> dict[s
     return {ours: np.where(there, values[row], np.nan) for ours, values in columns.items()}
 
 
-def to_telemetry(local: Times, columns: Mapping[str, Floats], empty: Mask) -> Telemetry:
-    """Return telemetry in UTC of rows in wall time; rows that are `empty` or at times that never were are dropped."""
+def to_telemetry(local: Times, columns: Mapping[str, Floats], frame: Any) -> Telemetry:
+    """Return telemetry in UTC of rows of a climate table in wall time; rows at times that never were are dropped."""
     time = from_local(local, TIME_ZONE)
-    keep = ~np.isnat(time) & ~empty
+    # Rows without any measurement hold computed numbers that mean nothing.
+    measured = np.isfinite(frame[["Tair", "VentLee", "EnScr"]].to_numpy(dtype=np.float64)).any(axis=1)
+    keep = ~np.isnat(time) & measured
     return from_rows(time[keep], {name: values[keep] for name, values in columns.items()})
 
 

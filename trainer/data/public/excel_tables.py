@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from igrow.core.arrays import Floats, Times
-from igrow.core.errors import IgrowError
+from igrow.core.errors import IgrowError, first_line
 
 _ENDINGS = (".csv.gz", ".csv", ".parquet")
 _EPOCH = np.datetime64("1899-12-30T00:00:00", "s")
@@ -46,8 +46,7 @@ def read(path: Path) -> Any:
                 warnings.simplefilter("ignore", pd.errors.ParserWarning)
                 frame = pd.read_csv(path, skipinitialspace=True, index_col=False)
     except (OSError, ValueError, EOFError) as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise IgrowError(f"{path}: cannot be read as a table: {reason}") from None
+        raise IgrowError(f"{path}: cannot be read as a table: {first_line(error)}") from None
     frame.columns = [str(name).strip().lstrip("%").strip() for name in frame.columns]
     return frame.apply(pd.to_numeric, errors="coerce")
 
