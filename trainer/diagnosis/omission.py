@@ -162,8 +162,7 @@ def examine(
             found = Omission(tuple(_estimated(fitted, effect, rules) for effect in terms), parameters, errors)
             named = usual.outstanding(gains_of(record, site, parameters, rules, _active(fitted, terms)))
     except DivergenceError:
-        # What was found before stands without the term that the model cannot run with.
-        return found
+        pass  # What was found before stands without the term that the model cannot run with.
     return found
 
 

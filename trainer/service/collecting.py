@@ -28,7 +28,6 @@ from igrow.core.exchange import (
     open_segment,
 )
 from igrow.core.exchange.segment import LARGEST_SEGMENT
-from igrow.core.telemetry import Telemetry
 from igrow.trainer.service.archive import Archive
 from igrow.trainer.service.claim import claim
 from igrow.trainer.service.ledger import SiteLedger, read_ledger
@@ -129,12 +128,13 @@ def _add(archive: Archive, segment: Segment, data: bytes, now: datetime, done: C
     """Add what a segment holds to the archive."""
     site, name = segment.seal.site, segment.name
     latest = np.datetime64((now + AHEAD).astimezone(UTC).replace(tzinfo=None), "s")
-    telemetry = segment.telemetry.select(EARLIEST, latest)
-    outside = len(segment.telemetry) - len(telemetry)
-    if outside:
+    telemetry, time = segment.telemetry.select(EARLIEST, latest), segment.telemetry.time
+    wrong = time[(time < EARLIEST) | (time >= latest)]
+    if len(wrong):
+        span = f"{wrong[0]}" if len(wrong) == 1 else f"{wrong[0]} to {wrong[-1]}"
         path = archive.add_file("refused", site, str(name), data)
         done.notes.append(
-            f"segment {name.number}: {outside} rows dated {_span(segment.telemetry, latest)}, when the trainer's clock "
+            f"segment {name.number}: {len(wrong)} rows dated {span}, when the trainer's clock "
             f"shows {now:%Y-%m-%d}: a clock was wrong; set aside in {path}"
         )
     conflicts = archive.add_telemetry(site, telemetry)
@@ -155,11 +155,6 @@ def _add(archive: Archive, segment: Segment, data: bytes, now: datetime, done: C
         done.notes.append(f"segment {name.number}: its records are not used: {error}; set aside in {path}")
     done.segments += 1
     done.rows += len(telemetry)
-
-
-def _span(telemetry: Telemetry, latest: np.datetime64) -> str:
-    wrong = telemetry.time[(telemetry.time < EARLIEST) | (telemetry.time >= latest)]
-    return f"{wrong[0]}" if len(wrong) == 1 else f"{wrong[0]} to {wrong[-1]}"
 
 
 def _collect_reports(place: Place, site: str, archive: Archive, done: Collected) -> None:
