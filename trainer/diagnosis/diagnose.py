@@ -123,15 +123,19 @@ class _Question:
         found = [replace(one, confounded=(*one.confounded, *unseen)) for one in found]
         # A parameter can stand in for an actuator that the log lacks, found or not.
         hiding = may_hide_in_parameters(logged.record.missing)
+        waiting: tuple[str, ...] = ()
         parameter = None if hiding or new_crop else search.changed_parameter(rng) or asked
         if parameter is not None and parameter.leads and parameter.onset is not None:
             if (told := self._since(parameter, parameter.onset.time, log, notes)) is not None:
                 return told
-            # What the days since then alone do not bear out, or are too few to, is left to a later log.
+            # What the days since then alone do not bear out, or are too few to, is left to a later log; of too few days
+            # all is left, since what an effect explains of them the parameter explains better.
+            if log.select(parameter.onset.time).days < rules.least_days:
+                waiting = (wording.WAITING,)
             parameter = None
         leads = parameter is not None and parameter.leads
         progress("correcting the model")
-        found, patterns = ([], ()) if leads or new_crop else (found, last.patterns)
+        found, patterns = ([], ()) if leads or waiting or new_crop else (found, last.patterns)
         result = correct(days, knowledge, found, patterns, site.longitude, rules)
         if parameter is not None and not patterns and may_give_way(result.kept):
             faults = [one.term for one in result.kept] or rivals
@@ -151,6 +155,7 @@ class _Question:
         notes = (
             *notes,
             *left_out,
+            *waiting,
             *((wording.NEW_CROP,) if new_crop else ()),
             *((wording.NOT_CALIBRATED,) if knowledge.transferred else ()),
             *((wording.NEWEST,) if log is not since else ()),

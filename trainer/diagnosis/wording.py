@@ -26,6 +26,7 @@ NEWEST = N_(
     "Within more than six weeks a crop changes: what has changed since the calibration was looked for in the newest "
     "six."
 )
+WAITING = N_("Something began less than a week ago: what it is, a later log tells.")
 NEW_CROP = N_(
     "A new crop was planted since the calibration: what it does otherwise cannot be told from a fault, so that none is "
     "looked for. Calibrate once four weeks of the new crop are there (igrow-trainer calibrate)."
