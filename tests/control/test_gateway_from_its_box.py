@@ -23,9 +23,7 @@ def test_the_installed_configuration_begins_with_a_bundle_that_is_there():
 
 
 def test_check_config_reads_the_bundle_that_it_names(tmp_path, capsys):
-    path = write_files(tmp_path, 5020)
-    with path.open("a") as file:
-        file.write("bundle: empty\n")
+    path = write_files(tmp_path, 5020, bundle="empty")
     (tmp_path / "empty").mkdir()
     assert main(["check-config", str(path)]) == 2
     assert "manifest.json" in capsys.readouterr().err

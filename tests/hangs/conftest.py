@@ -18,6 +18,7 @@ from igrow.edge.store import read_records
 from igrow.edge.virtual_plc.pace import Realtime
 from tests.control.daemon_bench import Plant, control_of, free_port, until, write_files
 from tests.patience import PATIENCE
+from tests.tiny_bundle import write_tiny_bundle
 
 SAFE = {"heating_setpoint": 18.0, "co2_setpoint": 400.0}
 PROMPT = "minimum_interval: 0 s, dead_band: 0.1}\n"
@@ -38,7 +39,7 @@ class Bench:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.port = free_port()
-        self.configuration = write_files(folder, self.port, clock="system", interval="1 s")
+        self.configuration = write_files(folder, self.port, clock="system", interval="1 s", bundle="first")
         site = folder / "site.yaml"
         site.write_text(site.read_text() + "  heating_setpoint: {low: 12, high: 28, safe: 18, slew: null, " + PROMPT)
         self.plant = Plant(folder, self.port, pace=Realtime())
@@ -90,4 +91,5 @@ class Bench:
 @pytest.fixture
 def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
     monkeypatch.setattr(daemon_module, "CLOSE_SECONDS", 8.0)
+    write_tiny_bundle(tmp_path / "first", site="test-house")
     return Bench(tmp_path)

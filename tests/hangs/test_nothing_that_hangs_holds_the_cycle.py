@@ -156,9 +156,7 @@ async def test_updates_whose_trust_lies_on_a_disk_that_hangs(bench: Bench) -> No
 
 
 async def test_a_bundle_on_a_disk_that_hangs(bench: Bench, disk) -> None:
-    write_tiny_bundle(bench.folder / "first", site="test-house")
     first = disk("first")
-    bench.add("bundle: first\n")
     first.hang()
     async with bench.running() as daemon:
         await bench.controls()
@@ -169,8 +167,8 @@ async def test_a_bundle_on_a_disk_that_hangs(bench: Bench, disk) -> None:
 
 
 async def test_a_bundle_whose_self_test_never_ends(bench: Bench) -> None:
-    write_tiny_bundle(bench.folder / "first", site="test-house", graph=endless_graph())
-    bench.add("bundle: first\n")
+    write_tiny_bundle(bench.folder / "endless", site="test-house", graph=endless_graph())
+    bench.configuration.write_text(bench.configuration.read_text().replace("bundle: first", "bundle: endless"))
     async with bench.running() as daemon:
         await bench.controls()
         await until(lambda: daemon.services.graphs.pid is not None, PATIENCE)

@@ -48,6 +48,7 @@ DAEMON = """
 site: site.yaml
 register_map: map.yaml
 state: state
+bundle: null
 status: {port: 0}
 cycle: {interval: 1 s}
 planning: {enabled: false}

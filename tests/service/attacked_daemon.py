@@ -53,6 +53,7 @@ DAEMON = """
 site: site.yaml
 register_map: map.yaml
 state: state
+bundle: null
 status: {port: 0}
 planning: {enabled: false}
 cycle: {interval: 1 s, respect_hand: 10 min}

@@ -17,7 +17,7 @@ ENDS_WITHIN = 60.0
 """Seconds, on however busy a machine; what hangs, hangs for ever."""
 
 
-NO_PLANS = "planning: {enabled: false}\n"
+NO_PLANS = "bundle: null\nplanning: {enabled: false}\n"
 """A simulated plant would wait for them."""
 
 

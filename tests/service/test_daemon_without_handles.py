@@ -49,6 +49,8 @@ def test_a_daemon_that_is_started_without_standard_files_gives_their_numbers_to_
 ) -> None:
     """What is said to people, and by its processes, would go into the file or the line that has the number."""
     (attacked.folder / "daemon.log").touch()
+    with_bundle = attacked.configuration.read_text().replace("bundle: null\n", "")  # so that it has processes
+    attacked.configuration.write_text(with_bundle)
     attacked.process = subprocess.Popen(
         ["sh", "-c", 'exec "$@" 0<&- 1>&- 2>&-', "sh", *COMMAND, "run", str(attacked.configuration)],
         env={**os.environ, "PYTHONPATH": str(ROOT)},

@@ -56,7 +56,7 @@ def test_the_day_programme_follows_the_wall_clock_through_the_night_in_which_it_
 ) -> None:
     """The daemon as a process, on a machine whose own zone changes in that night."""
     begin, right = NIGHTS[night]
-    extra = "planning: {enabled: false}\nrecipe:\n" + programme("irrigation_on", lambda share: share)
+    extra = "bundle: null\nplanning: {enabled: false}\nrecipe:\n" + programme("irrigation_on", lambda share: share)
     plant = RunningDaemon(tmp_path, days=1, extra=extra, begin=str(begin - 2 * HOUR))
     try:
         plant.start(TZ="Europe/Amsterdam")
