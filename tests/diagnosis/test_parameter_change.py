@@ -26,6 +26,7 @@ from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.report import sentences
 from igrow.trainer.report.worth import worth
 from tests.diagnosis.synthetic_design import BALANCES, PLAIN, Truth, make_design
+from tests.made_once import made_once
 from tests.virtual_log import SITE, disturbances, virtual_log
 
 NAMES = ("transmissivity", "mass_heat_capacity", "leakage_wind")
@@ -141,6 +142,7 @@ def log() -> tuple[Telemetry, Telemetry]:
 
 
 @pytest.fixture(scope="module")
+@made_once
 def model(log: tuple[Telemetry, Telemetry]) -> FittedModel:
     """Calibrated on the weeks before, with its history."""
     plain, _ = log

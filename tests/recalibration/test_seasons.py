@@ -22,8 +22,9 @@ from igrow.trainer.season import plan_season
 from igrow.trainer.service import recalibration, seasons
 from igrow.trainer.service.archive import Archive
 from igrow.trainer.service.recalibration import Diagnosed, recalibrate
+from tests.made_once import made_once
 
-CROP = Crop(planting_date=datetime.date(2020, 2, 10), end_date=datetime.date(2020, 4, 5))
+CROP = Crop(planting_date=datetime.date(2020, 2, 21), end_date=datetime.date(2020, 3, 31))
 SITE = Site(name="house", latitude=52.0, longitude=4.5, crop=CROP)
 NOON = datetime.datetime(2020, 3, 1, 12, tzinfo=datetime.UTC)
 
@@ -34,6 +35,7 @@ def _a_short_search(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(scope="module")
+@made_once
 def planned() -> FittedModel:
     """The built-in simulator with the season of a young crop."""
     with pytest.MonkeyPatch.context() as patched:
@@ -53,7 +55,7 @@ def with_crop(**changed: Any) -> Site:
         {"end_date": None},
         {"planting_date": datetime.date(2020, 3, 2)},
         {"end_date": datetime.date(2020, 3, 20)},
-        {"end_date": datetime.date(2020, 2, 20)},
+        {"end_date": datetime.date(2020, 2, 25)},
     ],
     ids=["no end", "not planted yet", "nearly over", "over"],
 )
@@ -76,7 +78,7 @@ def test_a_season_that_cannot_be_planned_is_said_and_the_one_before_stays(planne
 def test_the_season_of_a_crop_that_bears_begins_today_and_that_of_a_young_one_with_its_planting(
     planned: FittedModel,
 ) -> None:
-    assert planned.season is not None and planned.season.start == np.datetime64("2020-02-10T00:00:00")
+    assert planned.season is not None and planned.season.start == np.datetime64("2020-02-21T00:00:00")
     old = replace(planned, season=None, site=with_crop(planting_date=datetime.date(2019, 12, 1)))
     bearing, _ = seasons.with_season(old, NOON)
     assert bearing.season is not None and bearing.season.start == np.datetime64("2020-03-01T00:00:00")

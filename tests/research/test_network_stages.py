@@ -26,6 +26,7 @@ from igrow.trainer.training.stage import (
     untrained,
 )
 from igrow.trainer.training.stage_file import stages_to_bytes
+from tests.made_once import made_once
 
 HOURS = 600
 
@@ -72,6 +73,7 @@ AIR = StageLayout("air", ("air_temperature",), ("heating_setpoint",), (3.0,), (8
 
 
 @pytest.fixture(scope="module")
+@made_once
 def trained():
     columns, hour = seasons(6)
     training = {name: values[:4] for name, values in columns.items()}

@@ -22,15 +22,17 @@ from igrow.core.site import Crop, Site
 from igrow.edge.cli.plan import reasons
 from igrow.edge.planning.make_plan import make_plan
 from igrow.trainer import export, read_model, season
+from tests.made_once import made_once
 from tests.planning.test_plan_from_bundle import START, request
 
 FIRST = datetime.date(2026, 5, 20)
 SITE = Site(
-    name="demo", latitude=52.0, longitude=4.3, crop=Crop(planting_date=FIRST, end_date=datetime.date(2026, 7, 8))
+    name="demo", latitude=52.0, longitude=4.3, crop=Crop(planting_date=FIRST, end_date=datetime.date(2026, 6, 21))
 )
 
 
 @pytest.fixture(scope="module")
+@made_once
 def planned() -> SeasonPlan:
     return season.plan_season(SITE, read_bundle(default_bundle_folder()), generations=3)
 
@@ -47,7 +49,7 @@ def test_a_bundle_carries_its_season_and_the_day_s_plan_speaks_of_it(
     monkeypatch.setattr("igrow.edge.planning.make_plan.Budget", lambda: Budget(generations=4))
     plan = make_plan(SITE, replace(request(), bundle=bundle.folder))
     told = "\n".join(reasons(plan, ZoneInfo("UTC")))
-    assert "day 9 of 50 of the season" in told
+    assert "day 9 of 33 of the season" in told
     assert "its strategy for this day: day temperature" in told
     assert "EUR for a kg of fruit that is nearly ripe" in told
     later = datetime.date.fromordinal(datetime.date(1970, 1, 1).toordinal() + START // 86_400 + 400)
