@@ -13,10 +13,9 @@ import pytest
 from igrow.edge import daemon as daemon_module
 from igrow.edge.configuration import load_configuration
 from igrow.edge.daemon import Daemon
-from igrow.edge.pace import TickPace
 from igrow.edge.store import read_records
 from igrow.edge.virtual_plc.pace import Realtime
-from tests.control.daemon_bench import Plant, control_of, free_port, until, write_files
+from tests.control.daemon_bench import Plant, free_port, hurry, until, write_files
 from tests.patience import PATIENCE
 from tests.tiny_bundle import write_tiny_bundle
 
@@ -24,13 +23,6 @@ SAFE = {"heating_setpoint": 18.0, "co2_setpoint": 400.0}
 PROMPT = "minimum_interval: 0 s, dead_band: 0.1}\n"
 CYCLES = 25
 """That have to follow while something hangs."""
-
-
-def hurry(daemon: Daemon) -> None:
-    """Let its cycles follow one another quickly."""
-    pace = control_of(daemon).pace
-    assert isinstance(pace, TickPace)
-    pace._interval = 0.05
 
 
 class Bench:

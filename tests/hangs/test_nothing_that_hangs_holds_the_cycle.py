@@ -23,8 +23,8 @@ from igrow.edge.planning import GraphProcess, PlanningProcess
 from igrow.edge.sources.override import Lease, write_leases
 from igrow.edge.status.server import StatusServer
 from igrow.edge.systemd_notify import SystemdNotifier
-from tests.control.daemon_bench import plan_at_once, until
-from tests.hangs.conftest import Bench, hurry
+from tests.control.daemon_bench import hurry, plan_at_once, until
+from tests.hangs.conftest import Bench
 from tests.hangs.hanging_disk import HangingDisk
 from tests.patience import PATIENCE
 from tests.tiny_bundle import endless_graph, write_tiny_bundle

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
+from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
 
 from igrow.edge.clock import SystemClock
+from igrow.edge.daemon import Daemon
 from igrow.edge.store import read_telemetry
 from igrow.edge.virtual_plc.pace import Realtime
-from tests.control.daemon_bench import MAP, Plant, control_of, free_port, last, running, until, write_files
+from tests.control.daemon_bench import MAP, Plant, control_of, free_port, hurry, last, running, until, write_files
 
 YEAR = 365 * 86_400.0
 HAND = 555.0
@@ -32,6 +35,15 @@ class Machine:
 
         monkeypatch.setattr("igrow.edge.wiring.SystemClock", Clock)
         monkeypatch.setattr("igrow.edge.clock.SETTLE_SECONDS", 2.0)
+
+
+@contextlib.asynccontextmanager
+async def hurried(path: Path) -> AsyncIterator[Daemon]:
+    """A running daemon whose cycles follow one another quickly."""
+    async with running(path) as daemon:
+        await until(lambda: daemon._control is not None)
+        hurry(daemon)
+        yield daemon
 
 
 def rows(folder: Path, around: float) -> int:
@@ -57,7 +69,7 @@ async def test_control_hands_and_log_outlive_a_clock_that_is_a_year_off(
         assert 18.0 < plant.shows("heating_setpoint") <= 19.0, "on its way from the safe value, or there"
         assert control_of(daemon).cycle.readback.hands(last(daemon).image.monotonic)["co2_setpoint"].seconds > 6000.0
 
-    async with running(path) as daemon:
+    async with hurried(path) as daemon:
         await until(lambda: plant.shows("co2_setpoint") == 700.0 and plant.shows("heating_setpoint") == 19.0)
         await until(lambda: daemon.cycles >= 4)
         plant.plc.memory.set_value("co2_setpoint", HAND)
@@ -69,7 +81,7 @@ async def test_control_hands_and_log_outlive_a_clock_that_is_a_year_off(
         await lives_on(daemon)
         machine.off = years * YEAR
         await until(lambda: last(daemon).image.true_time is None)
-    async with running(path) as daemon:  # at a start
+    async with hurried(path) as daemon:  # at a start
         await until(lambda: daemon.cycles >= 1)
         await lives_on(daemon, 8)
         machine.off = 0.0  # and a time service sets it right
@@ -79,7 +91,7 @@ async def test_control_hands_and_log_outlive_a_clock_that_is_a_year_off(
         alarms = {alarm.name for alarm in daemon._journal.alarms.active}
     assert "clock" not in alarms
     logged = rows(tmp_path, time.time())
-    async with running(path) as daemon:
+    async with hurried(path) as daemon:
         await until(lambda: daemon.cycles >= 4)
         await lives_on(daemon)
     assert rows(tmp_path, time.time()) > logged > 0
