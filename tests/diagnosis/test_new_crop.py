@@ -11,8 +11,8 @@ import pytest
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import Log
 from igrow.trainer.diagnosis import diagnose, wording
-from igrow.trainer.diagnosis.crop import has_new_crop, of_one_crop, with_its_drift
-from igrow.trainer.diagnosis.knowledge import OF_CROP, knowledge_of
+from igrow.trainer.diagnosis.crop import LEAVES_AND_LIGHT, has_new_crop, of_one_crop, with_its_drift
+from igrow.trainer.diagnosis.knowledge import knowledge_of
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.fit import FittedModel
 from igrow.trainer.fit.discrepancy import Discrepancy
@@ -97,7 +97,9 @@ def test_a_crop_may_differ_more_than_the_walls() -> None:
     assert not {"transmissivity", "leakage_wind", "vent_wind", "cover_heat_transfer"} & wider
 
 
-def test_of_a_crop_that_may_be_another_no_parameter_of_its_own_is_told() -> None:
-    known = {"transpiration_deficit", "assimilation_light", "respiration", "deficit_stomata_closure"}
-    assert known <= OF_CROP
-    assert not {"humidity_offset", "wind_infiltration", "soil_respiration", "transmissivity"} & OF_CROP
+def test_of_a_crop_that_may_be_another_neither_leaves_nor_light_are_asked() -> None:
+    of_leaves = {"transpiration_deficit", "assimilation_light", "respiration", "deficit_stomata_closure"}
+    of_light = {"transmissivity", "lamp_radiation_share", "structure_shade", "cover_ageing"}
+    assert of_leaves | of_light <= LEAVES_AND_LIGHT
+    known = {"humidity_offset", "wind_infiltration", "soil_respiration", "leakage_wind", "rail_pipe_heat_transfer"}
+    assert LEAVES_AND_LIGHT.isdisjoint(known)

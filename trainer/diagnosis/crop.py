@@ -11,11 +11,21 @@ from dataclasses import replace
 import numpy as np
 
 from igrow.core.arrays import Times
+from igrow.core.effects import EFFECTS
 from igrow.core.simulator.hybrid.nominal import leaf_area_curve, measures_leaf_area
 from igrow.core.site import Site
 from igrow.trainer.data.log import Log
+from igrow.trainer.diagnosis.knowledge import CROP
 from igrow.trainer.diagnosis.rules import DecisionRules
+from igrow.trainer.diagnosis.visible_parameters import VISIBLE
 from igrow.trainer.fit.model import FittedModel
+
+_OF_LEAVES = frozenset({"leaf_area_index", "transpiration", "assimilation"})
+LEAVES_AND_LIGHT = CROP.union(
+    (name for name, one in EFFECTS.items() if "light" in one.balances or _OF_LEAVES.intersection(one.drivers)),
+    (name for name, one in VISIBLE.items() if "light" in one.balances),
+)
+"""Parameters and effects of the crop and of the light, which the leaves share out between air, floor and growth."""
 
 
 def of_one_crop(log: Log, rules: DecisionRules) -> tuple[Log, tuple[str, ...]]:

@@ -22,13 +22,13 @@ from igrow.trainer.diagnosis import history, wording
 from igrow.trainer.diagnosis.actuators import Completed, complete, may_hide_in_parameters
 from igrow.trainer.diagnosis.candidates import hidden_by_missing_weather
 from igrow.trainer.diagnosis.correction import Corrected, correct, corrected_model, may_give_way, with_parameter
-from igrow.trainer.diagnosis.crop import has_new_crop, of_one_crop, with_its_drift
+from igrow.trainer.diagnosis.crop import LEAVES_AND_LIGHT, has_new_crop, of_one_crop, with_its_drift
 from igrow.trainer.diagnosis.diagnosed_days import newest_weeks, since_calibration
 from igrow.trainer.diagnosis.drift import Drift
 from igrow.trainer.diagnosis.estimate import normal_quantile
 from igrow.trainer.diagnosis.evidence import Evidence
 from igrow.trainer.diagnosis.freerun import HORIZONS, FreeRuns, LogDays, Stage, log_days, mean_absolute_errors
-from igrow.trainer.diagnosis.knowledge import OF_CROP, ActiveTerm, knowledge_of
+from igrow.trainer.diagnosis.knowledge import ActiveTerm, knowledge_of
 from igrow.trainer.diagnosis.nuisance import NuisanceSubspace
 from igrow.trainer.diagnosis.open_vents import under_open_vents
 from igrow.trainer.diagnosis.parameter_change import ParameterChange
@@ -113,8 +113,8 @@ class _Question:
         completed = complete(log, logged, model, knowledge, rules)
         days, opened = completed.days, under_open_vents(logged.record, rules)
         off = opened is not None and opened.is_offset(rules)
-        # Of a crop that may be another by now nothing is asked.
-        of_crop = OF_CROP if rules.crop_drift > self.rules.crop_drift else frozenset[str]()
+        # Of a crop that may be another by now nothing is asked, nor of the light, which its leaves take up.
+        of_crop = LEAVES_AND_LIGHT if rules.crop_drift > self.rules.crop_drift else frozenset[str]()
         hidden = self.without | (frozenset({"co2_drift"}) if off else frozenset()) | of_crop
         search = search_of(days, site, knowledge, hidden, rules, self.nuisance, self.drift)
         progress("searching for causes")

@@ -32,10 +32,6 @@ CROP = frozenset({
     "assimilation_maximum", "assimilation_light", "assimilation_co2", "respiration",
 })  # fmt: skip
 """Parameters that change as the crop does."""
-OF_CROP = CROP | {
-    name for name, one in EFFECTS.items() if {"leaf_area_index", "transpiration", "assimilation"} & set(one.drivers)
-}
-"""These, and effects of the crop."""
 
 
 @dataclass(frozen=True)
