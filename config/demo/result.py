@@ -73,7 +73,7 @@ def summarise(out: Path, effect: str, days: Days) -> str:
                 "first_bundle_since_it_broke": mean(live["first"][name][days.broken : days.diagnosed]),
                 "first_bundle_after": mean(live["first"][name][since:]) if since else None,
                 "bundle_in_force_after": mean(live["corrected"][name][since:]) if since else None,
-                "unit": QUANTITIES[name].unit,
+                "unit": QUANTITIES[name].difference_unit,
             }
             for name in PREDICTED
         },
@@ -261,7 +261,7 @@ def draw(path: Path, live: Any, since: int | None, days: Days, log: Telemetry, d
             axis.plot(day[since:], corrected[since:], color="#1f8a4c", lw=2.2, label=label)
         for moment, _, colour in moments:
             axis.axvline(moment, color=colour, lw=0.9, ls="--")
-        axis.set_ylabel(f"{title}\n{QUANTITIES[name].unit}")
+        axis.set_ylabel(f"{title}\n{QUANTITIES[name].difference_unit}")
         axis.set_ylim(0, 1.25 * float(np.nanmax(first)))
         axis.grid(alpha=0.25)
         axis.spines[["top", "right"]].set_visible(False)

@@ -76,6 +76,16 @@ def test_of_a_new_crop_nothing_is_named_and_the_model_follows_it(leaky_log: Log)
     assert day["corrected"] == day["recalibrated"] < day["deployed"]
 
 
+def test_what_is_not_asked_of_a_crop_that_grew_is_said(quiet_log: Log) -> None:
+    site = quiet_log.known_site
+    planted = quiet_log.telemetry.time[0].astype("datetime64[D]").item() - datetime.timedelta(days=60)
+    log = replace(quiet_log, site=replace(site, crop=replace(site.crop, planting_date=planted)))
+    result = diagnose(log, calibrated(np.datetime64(f"{planted}T00:00:00") + np.timedelta64(20, "D")))
+    assert wording.GROWN_CROP in result.notes
+    assert wording.NEW_CROP not in result.notes
+    assert "structure_shade" in result.untestable
+
+
 def test_a_crop_that_grew_unmeasured_may_differ_as_far_as_its_usual_course_says(quiet_log: Log) -> None:
     log = log_of(quiet_log, 56, 84)
     measured = replace(log, telemetry=Telemetry(log.telemetry.time, {"leaf_area_index": np.full(28 * 24, 3.0)}))

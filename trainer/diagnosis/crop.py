@@ -57,8 +57,10 @@ def has_new_crop(time: Times, site: Site, model: FittedModel) -> bool:
 def with_its_drift(rules: DecisionRules, log: Log, model: FittedModel) -> DecisionRules:
     """Return rules by which a crop may differ as far as its leaf area does, where only the usual course tells that."""
     site, known, telemetry = log.known_site, model.history, log.telemetry
-    if known is None or (measures_leaf_area(telemetry) and not has_new_crop(telemetry.time, site, model)):
+    if has_new_crop(telemetry.time, site, model):
+        return replace(rules, crop_drift=rules.new_crop_drift)
+    if known is None or measures_leaf_area(telemetry):
         return rules
     then, now = (float(leaf_area_curve(site, time).mean()) for time in (np.array([known.middle]), telemetry.time))
-    grown = 1.0 if has_new_crop(telemetry.time, site, model) else abs(now - then) / max(now, then)
+    grown = abs(now - then) / max(now, then)
     return replace(rules, crop_drift=max(rules.crop_drift, grown * rules.new_crop_drift))

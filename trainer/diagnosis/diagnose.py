@@ -105,6 +105,7 @@ class _Question:
         model, rules, progress, site = self.model, self.rules, self.progress, log.known_site
         since, notes = since_calibration(log, model, rules)
         since, left_out = of_one_crop(since, rules)
+        notes = (*notes, *left_out)
         new_crop, rules = has_new_crop(since.telemetry.time, site, model), with_its_drift(rules, since, model)
         knowledge = knowledge_of(model, site, rules)
         log = newest_weeks(since, knowledge, rules)
@@ -154,9 +155,8 @@ class _Question:
         corrected = corrected_model(model, result, findings, errors, knowledge.discrepancy, (start, end), crop)
         notes = (
             *notes,
-            *left_out,
             *waiting,
-            *((wording.NEW_CROP,) if new_crop else ()),
+            *((wording.NEW_CROP,) if new_crop else (wording.GROWN_CROP,) if of_crop else ()),
             *((wording.NOT_CALIBRATED,) if knowledge.transferred else ()),
             *((wording.NEWEST,) if log is not since else ()),
             *wording.thin_air(site),

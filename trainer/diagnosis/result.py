@@ -235,7 +235,7 @@ class Diagnosis:
             "findings": [{key: _json(getattr(one, key)) for key in _TOLD} for one in self.findings],
             "errors": {
                 quantity: {
-                    horizon: {**_json(by_stage), "unit": QUANTITIES[quantity].unit}
+                    horizon: {**_json(by_stage), "unit": QUANTITIES[quantity].difference_unit}
                     for horizon, by_stage in horizons.items()
                 }
                 for quantity, horizons in self.errors.items()
