@@ -18,6 +18,7 @@ from igrow.trainer.cli import main
 from igrow.trainer.data import read_log
 from tests.virtual_log import virtual_log
 
+pytestmark = pytest.mark.usefixtures("without_picture")
 AMSTERDAM = "Europe/Amsterdam"
 EXPECTED = ("air_temperature", "air_humidity", "air_co2", "outdoor_temperature", "global_radiation", "wind_speed")
 Frame = tuple[pd.DataFrame, dict[str, object]]

@@ -21,6 +21,7 @@ from igrow.trainer.data.number_texts import number
 from tests.data.test_exports_of_elsewhere import AMSTERDAM, PLAIN, assert_reads_as, imported, moved, written
 from tests.virtual_log import virtual_log
 
+pytestmark = pytest.mark.usefixtures("without_picture")
 TERSE = ("Time", "AirTemp_C", "RH_%", "CO2_ppm", "OutsideTemp_C", "Radiation_W/m2", "Wind_speed")
 
 

@@ -19,6 +19,7 @@ from igrow.trainer.data.vocabulary import find_units, unknown_unit
 from tests.data.test_exports_of_elsewhere import AMSTERDAM, assert_reads_as, imported, written
 from tests.virtual_log import virtual_log
 
+pytestmark = pytest.mark.usefixtures("without_picture")
 DUTCH = (
     "Tijd", "Kastemperatuur (°C)", "RV kas (%)", "CO2 (ppm)", "Buitentemperatuur (°C)", "Straling (W/m2)",
     "Windsnelheid (m/s)",

@@ -14,6 +14,8 @@ from igrow.trainer.data import read_log
 from tests.data.test_exports_of_elsewhere import EXPECTED, PLAIN, assert_reads_as, imported, written
 from tests.virtual_log import virtual_log
 
+pytestmark = pytest.mark.usefixtures("without_picture")
+
 
 @pytest.fixture(scope="module")
 def log() -> Telemetry:

@@ -16,6 +16,7 @@ from igrow.core.telemetry import read_csv
 from igrow.trainer.cli import main
 from igrow.trainer.data import read_log
 
+pytestmark = pytest.mark.usefixtures("without_picture")
 LAYOUTS = Path(__file__).parent / "layouts"
 FOLDERS = sorted(folder for folder in LAYOUTS.iterdir() if folder.is_dir())
 TRUTH = read_csv(LAYOUTS / "truth.csv")

@@ -9,7 +9,7 @@ import pytest
 
 from igrow.trainer.data import Log, prepare_log
 from igrow.trainer.diagnosis import Diagnosis, diagnose
-from igrow.trainer.report import render_report
+from igrow.trainer.report import figures, render_report
 from tests.diagnosis.conftest import DAYS, STEP, greenhouse_log, model_in_force
 from tests.made_once import made_once
 from tests.virtual_log import SITE, weather
@@ -44,6 +44,13 @@ def undosed() -> Log:
     """A log without its CO2 dosing."""
     log = greenhouse_log(1)
     return replace(log, site=HOME).without("co2_dosing")
+
+
+@pytest.fixture
+def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reports of words alone: to draw the figures takes more than a second for each page."""
+    for name in ("overview", "evidence"):
+        monkeypatch.setattr(figures, name, lambda *_: [])
 
 
 @pytest.fixture(scope="session")

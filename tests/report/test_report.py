@@ -108,6 +108,7 @@ def test_a_leak_costs_what_the_outdoor_air_that_comes_in_must_be_heated(leak: Di
     assert worth(leak, half).spread == (0.5, 1.5)  # type: ignore[union-attr]
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_the_document_tells_what_a_finding_takes_from_the_whole_greenhouse(leak: Diagnosis, tmp_path: Path) -> None:
     (finding,) = leak.findings
     found = worth(leak, finding)
@@ -118,6 +119,7 @@ def test_the_document_tells_what_a_finding_takes_from_the_whole_greenhouse(leak:
     assert document["findings"][0]["eur_per_week"] == pytest.approx(area * found.money, abs=0.01)
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_a_greenhouse_without_lamps_is_told_what_a_cause_costs(leak: Diagnosis, tmp_path: Path) -> None:
     (finding,) = leak.findings
     lit, evidence, site = worth(leak, finding), leak.evidence, leak.model.site
@@ -150,6 +152,7 @@ def test_a_greenhouse_that_is_never_heated_pays_for_no_heat(leak: Diagnosis) -> 
     assert worth(replace(tunnel, model=replace(leak.model, site=cold)), finding) is None
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_rivals_are_sentences_and_each_has_its_check(leak: Diagnosis) -> None:
     rivals = ("wind_infiltration", "vent_backlash", "screen_gap")
     page = render_report(replace(leak, findings=(replace(leak.findings[0], confounded=rivals),)))
@@ -176,6 +179,7 @@ def test_a_sensor_that_reads_too_much_saves_heat_since_the_greenhouse_is_colder(
     assert sentences.costs(off, nothing, 100.0, speak("en"))[0].startswith("It takes no heat and no CO2 worth counting")
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_an_actuator_that_the_log_lacks_is_told_in_every_language(leak: Diagnosis) -> None:
     share = {"share": Estimate(0.9, 0.8, 1.0, "1")}
     lamps = replace(
@@ -266,6 +270,7 @@ def test_errors_and_differences_of_an_american_site_are_in_its_degrees(leak: Dia
     assert bands[1] == pytest.approx(bands[0] * 1.8 + 32.0)
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_the_size_of_a_cause_goes_with_its_unit(leak: Diagnosis) -> None:
     offset = Estimate(1.0, 0.5, 1.5, "K")
     finding = replace(leak.findings[0], effect="air_temperature_offset", parameters={"offset": offset}, onset=None)

@@ -15,6 +15,7 @@ from igrow.trainer.diagnosis.uncalibrated import FIRST, NO_NAME, how_to_calibrat
 from igrow.trainer.report import render_report
 from igrow.trainer.report.page import priced
 
+pytestmark = pytest.mark.usefixtures("without_pictures")
 TYPED = ("my log.csv", "--site", "tunnel.yaml")
 COMMAND = "igrow-trainer calibrate 'my log.csv' --site tunnel.yaml --fit-weeks 4 --out bundle"
 
