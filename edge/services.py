@@ -17,7 +17,7 @@ from igrow.edge.ports import Exchange, PlanningService, StatusService, Store, Up
 from igrow.edge.status import StatusServer
 from igrow.edge.status.client import STATUS_FILE
 from igrow.edge.store import StoreAside, StoreError, StoreLimits
-from igrow.edge.updates import BundleUpdates, SignedSource, UpdateRules
+from igrow.edge.updates import BundleUpdates, UpdateRules
 
 SIMULATED_PATIENCE = 60.0
 """Seconds that a simulated plant waits for its disk, as it runs so fast that a share of its time would be none."""
@@ -69,6 +69,8 @@ def open_services(configuration: Configuration) -> Services:
     graphs = GraphProcess()
     source = None
     if exchange is not None and file.updates.enabled and configuration.trusted_root is not None:
+        from igrow.edge.updates.signed_source import SignedSource  # noqa: PLC0415 - slow to import
+
         source = SignedSource(exchange.bundles, state / "updates" / "trust", configuration.trusted_root)
     updates = BundleUpdates(
         state / "updates",

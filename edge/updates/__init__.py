@@ -12,18 +12,17 @@
 `BundleUpdates` is all that as the daemon has it: in a thread of its own, which no cycle waits for.
 """
 
+from igrow.edge.updates.fetched import UpdateError
 from igrow.edge.updates.rules import UpdateRules
 from igrow.edge.updates.service import BundleUpdates
 from igrow.edge.updates.shadow import Comparison, Predictor, compare, hindcast_errors
 from igrow.edge.updates.shelf import Shelf
-from igrow.edge.updates.signed_source import SignedSource, UpdateError
 
 __all__ = [
     "BundleUpdates",
     "Comparison",
     "Predictor",
     "Shelf",
-    "SignedSource",
     "UpdateError",
     "UpdateRules",
     "compare",

@@ -13,9 +13,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from igrow.core.bundle import MANIFEST_FILE, Bundle, BundleError
+from igrow.edge.updates.fetched import BundleRefusedError, Fetched, UpdateError
 from igrow.edge.updates.rules import Graphs
 from igrow.edge.updates.shelf import Shelf
-from igrow.edge.updates.signed_source import BundleRefusedError, Fetched, UpdateError
 from igrow.edge.updates.state import UpdateState, load_state, save_in_place, save_state
 from igrow.edge.updates.telling import Teller, Verdict
 

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import contextlib
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from igrow.core.bundle import Bundle, BundleError
 from igrow.core.telemetry import TelemetryError
 from igrow.edge.planning.graph_process import ProcessError
 from igrow.edge.updates.bundles import WENT_DOWN, Bundles, identity_of
+from igrow.edge.updates.fetched import BundleRefusedError, Fetched, UpdateError
 from igrow.edge.updates.rules import Graphs, UpdateRules
 from igrow.edge.updates.shadow import Comparison, Predictor
-from igrow.edge.updates.signed_source import BundleRefusedError, Fetched, SignedSource, UpdateError
 from igrow.edge.updates.telling import Teller, Verdict
 from igrow.edge.updates.wishes import Wishes
+
+if TYPE_CHECKING:
+    from igrow.edge.updates.signed_source import SignedSource
 
 HOUR = 3600.0
 FIRST_LOOK = 25 * HOUR

@@ -6,6 +6,7 @@ import contextlib
 from collections.abc import Mapping
 from concurrent.futures import Future
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from igrow.core.bundle import BundleError
 from igrow.core.errors import IgrowError
@@ -13,14 +14,17 @@ from igrow.edge.hand_off import HandOff, LateError, settled
 from igrow.edge.planning.graph_process import ProcessError
 from igrow.edge.ports import ActiveBundle
 from igrow.edge.updates.bundles import Bundles
+from igrow.edge.updates.fetched import BundleRefusedError, UpdateError
 from igrow.edge.updates.life import HOUR, BundleLife
 from igrow.edge.updates.rules import Graphs, ReportBox, UpdateRules, UpdateStore
 from igrow.edge.updates.shadow import Predictor
 from igrow.edge.updates.shelf import Shelf
-from igrow.edge.updates.signed_source import BundleRefusedError, SignedSource, UpdateError
 from igrow.edge.updates.telling import Teller
 from igrow.edge.updates.wishes import Wishes, read_wishes
 from igrow.edge.updates.worsening import Worsening, find_worsening, worsening_sentence
+
+if TYPE_CHECKING:
+    from igrow.edge.updates.signed_source import SignedSource
 
 LATE_AFTER = 1800.0
 """Seconds after which the thread counts as held by a share: longer than the longest comparison."""

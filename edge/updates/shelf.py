@@ -10,7 +10,7 @@ from pathlib import Path
 
 from igrow.core.bundle import Bundle, BundleError, read_bundle, self_test
 from igrow.core.quantities import QUANTITIES
-from igrow.edge.updates.signed_source import LARGEST_BUNDLE, BundleRefusedError, UpdateError
+from igrow.edge.updates.fetched import LARGEST_BUNDLE, BundleRefusedError, UpdateError
 
 SPARE_BYTES = 16 * 2**20
 """Left free on the disk after unpacking, for the log."""

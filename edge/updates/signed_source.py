@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote, unquote, urlsplit
 
@@ -25,28 +24,8 @@ from tuf.api.exceptions import (
 from tuf.ngclient.fetcher import FetcherInterface
 from tuf.ngclient.updater import Updater
 
-from igrow.core.errors import IgrowError
 from igrow.edge.clock import EARLIEST_PLAUSIBLE
-
-LARGEST_BUNDLE = 512 * 2**20
-"""Bytes."""
-
-
-class UpdateError(IgrowError):
-    """A bundle that was not let in, and why; another attempt may succeed."""
-
-
-class BundleRefusedError(UpdateError):
-    """A bundle that is not meant for this gateway, whenever it is tried."""
-
-
-@dataclass(frozen=True)
-class Fetched:
-    """A packed bundle whose signatures hold."""
-
-    archive: Path
-    identity: str
-    """The identity that the publisher signed for it; empty where it named none."""
+from igrow.edge.updates.fetched import LARGEST_BUNDLE, Fetched, UpdateError
 
 
 class _FolderFetcher(FetcherInterface):

@@ -84,7 +84,7 @@ def test_the_trainer_sees_whose_folders_are_there(sides: tuple[Place, Place]) ->
 
 def test_a_log_arrives_once_is_receipted_and_a_bundle_comes_back(sides: tuple[Place, Place], tmp_path: Path) -> None:
     from igrow.core.exchange import Below
-    from igrow.edge.updates import SignedSource
+    from igrow.edge.updates.signed_source import SignedSource
     from tests.tiny_bundle import write_tiny_bundle
 
     gateway, trainer = sides

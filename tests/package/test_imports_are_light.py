@@ -41,6 +41,11 @@ def test_the_process_that_sends_a_message_fits_into_its_little_memory() -> None:
     assert (HEAVY | {"numpy"}) & {name.split(".")[0] for name in found} == set()
 
 
+def test_a_command_of_the_gateway_does_not_load_what_fetches_bundles() -> None:
+    found = loaded_by("import igrow.edge.cli.run")
+    assert (HEAVY | {"tuf", "securesystemslib"}) & {name.split(".")[0] for name in found} == set()
+
+
 def test_the_interface_of_a_notebook_is_whole() -> None:
     import igrow.trainer
 

@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from igrow.core.bundle import BundleError
-from igrow.edge.updates import Shelf, SignedSource, UpdateError
+from igrow.edge.updates import Shelf, UpdateError
+from igrow.edge.updates.signed_source import SignedSource
 from igrow.trainer.publishing import PublishingError, create_keys, initialise, publish_in, refresh
 from tests.tiny_bundle import write_tiny_bundle
 

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from igrow.edge.updates import SignedSource, UpdateError
+from igrow.edge.updates import UpdateError
+from igrow.edge.updates.signed_source import SignedSource
 from igrow.trainer.cli import main
 from igrow.trainer.fleet.work import publish_site
 from igrow.trainer.publishing import PublishingError, create_keys, publish_in, refresh

@@ -16,8 +16,9 @@ from igrow.edge.exchange import ExchangeService
 from igrow.edge.image import Quality, Value
 from igrow.edge.ports import ActiveBundle
 from igrow.edge.store import SqliteStore, StoreLimits
-from igrow.edge.updates import BundleUpdates, SignedSource, UpdateRules
+from igrow.edge.updates import BundleUpdates, UpdateRules
 from igrow.edge.updates.rules import Graphs
+from igrow.edge.updates.signed_source import SignedSource
 from igrow.trainer.publishing import create_keys, initialise
 
 START = 1_780_012_800.0
