@@ -138,6 +138,7 @@ def test_without_wind_a_leak_is_among_what_it_could_be_whatever_is_named(leaky_l
     kept = [name for name in leaky_log.telemetry.columns if name not in lacking]
     result = diagnose(prepare_log(leaky_log.telemetry.only(kept), SITE), model_in_force())
     assert result.verdict == "ambiguous"
+    assert set(result.errors) == {"air_temperature", "air_humidity"}, "of CO2 the dose is not known"
     assert all("wind_infiltration" in one.confounded[1:] for one in result.findings)
     assert "calm with a windy night" in result.findings[0].separating_test
     assert "it could be air that the wind presses in through gaps" in result.summary()
@@ -182,15 +183,11 @@ def test_a_log_without_humidity_and_co2_is_diagnosed_on_what_it_has(quiet_log: L
     assert "co2_offset" in result.untestable
 
 
-def test_co2_is_left_out_where_its_dose_is_not_known(quiet_log: Log) -> None:
+def test_co2_is_judged_without_a_log_of_its_dose_where_none_can_be_dosed(quiet_log: Log) -> None:
     undosed = replace(SITE, greenhouse=replace(SITE.greenhouse, co2_dosing_capacity=0.0))
-    for site, quantities in (
-        (SITE, {"air_temperature", "air_humidity"}),
-        (undosed, {"air_temperature", "air_humidity", "air_co2"}),
-    ):
-        log = replace(quiet_log.without("co2_dosing"), site=site)
-        result = diagnose(log, replace(model_in_force(), site=site))
-        assert set(result.errors) == quantities
+    log = replace(quiet_log.without("co2_dosing"), site=undosed)
+    result = diagnose(log, replace(model_in_force(), site=undosed))
+    assert set(result.errors) == {"air_temperature", "air_humidity", "air_co2"}
     assert "co2_offset" not in result.untestable
 
 

@@ -200,6 +200,7 @@ def test_plans_are_not_held_to_what_the_weeks_of_a_log_happened_to_hold(short: T
     assert united({"a": (0.0, 1.0)}, {}, {"a": (0.5, 2.0), "b": (1.0, 3.0)}) == {"a": (0.0, 2.0), "b": (1.0, 3.0)}
 
 
+@pytest.mark.usefixtures("quick")
 def test_a_log_of_less_than_four_weeks_is_fitted_without_errors_on_unseen_days(short: Telemetry) -> None:
     told: list[str] = []
     model = calibrate(prepare_log(short, SITE), progress=told.append)
@@ -252,6 +253,7 @@ def test_a_spoiled_log_is_fitted_without_a_warning_or_a_wild_parameter(
     assert away[heat].max() < 2.0
 
 
+@pytest.mark.usefixtures("quick")
 def test_a_stuck_co2_sensor_is_told_and_teaches_nothing(short: Telemetry) -> None:
     log = prepare_log(short.with_columns({"air_co2": np.full(len(short), 640.0)}), SITE)
     assert any("air_co2" in note and "nothing is said of it" in note for note in log.notes)

@@ -6,6 +6,7 @@ import hashlib
 import io
 import json
 import re
+import tempfile
 import zipfile
 from collections.abc import Callable
 from html import unescape
@@ -17,6 +18,7 @@ from igrow.core.exchange import FolderPlace, Seal, SegmentName
 from igrow.trainer.cli import main
 from igrow.trainer.service import history
 from tests.fleet.fleet_of_sites import DAY, START, leave_day, make_fleet
+from tests.made_once import made_once
 
 NAMES = [f"house-{number:02}" for number in range(50)]
 OF_SECONDS = 4_000_000
@@ -110,22 +112,28 @@ BROKEN: dict[str, tuple[Callable[[Path, str], None], str]] = {
 }
 
 
-@pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+@made_once
+def collected_and_shown() -> dict[str, str]:
     """Collect and show a fleet of which some are broken; returns the cells of each row, in the order of the page."""
-    folder = tmp_path_factory.mktemp("fleet")
-    fleet = make_fleet(
-        folder, NAMES, limits="{memory: 1000, retries: 0}",
-        sites="{house-12: {exchange: sftp://trainer@127.0.0.1:1/srv}, house-99: {paused: true}}", known_hosts="nowhere",
-    )  # fmt: skip
-    for name in NAMES:
-        leave_day(folder / "exchange", name, 1, step=3600)
-    for name, (break_it, _) in BROKEN.items():
-        break_it(fleet, name)
-    assert main(["fleet", "collect", str(fleet)]) == 1
-    assert main(["fleet", "status", str(fleet), "--page", str(folder / "www")]) == 0
-    text = (folder / "www" / "index.html").read_text()
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        fleet = make_fleet(
+            folder, NAMES, limits="{memory: 1000, retries: 0}", known_hosts="nowhere",
+            sites="{house-12: {exchange: sftp://trainer@127.0.0.1:1/srv}, house-99: {paused: true}}",
+        )  # fmt: skip
+        for name in NAMES:
+            leave_day(folder / "exchange", name, 1, step=3600)
+        for name, (break_it, _) in BROKEN.items():
+            break_it(fleet, name)
+        assert main(["fleet", "collect", str(fleet)]) == 1
+        assert main(["fleet", "status", str(fleet), "--page", str(folder / "www")]) == 0
+        text = (folder / "www" / "index.html").read_text()
     return {name: unescape(cells) for name, cells in re.findall(r'<tr id="(.*?)">(.*?)</tr>', text, re.DOTALL)}
+
+
+@pytest.fixture(scope="module")
+def page() -> dict[str, str]:
+    return collected_and_shown()
 
 
 def test_every_site_has_its_row_and_those_that_are_well_have_their_data(page: dict[str, str]) -> None:

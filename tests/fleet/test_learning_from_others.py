@@ -50,8 +50,7 @@ def in_march(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_what_three_sites_share_is_the_fourths_prior_and_no_row_of_a_log_is_in_it(
     fleet: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for name in ("one", "two"):
-        assert main(["fleet", "learn", str(fleet), "--site", name]) == 2
+    assert main(["fleet", "learn", str(fleet), "--site", "one"]) == 2
     assert "1 sites have shared what they learned; 3 are needed" in capsys.readouterr().err
     assert main(["fleet", "learn", str(fleet), "--site", "one", "--site", "two", "--site", "three"]) == 0
     population = read_population(fleet / "state" / "population.json")

@@ -98,8 +98,9 @@ def test_of_a_crop_that_stands_for_years_a_year_is_planned(monkeypatch: pytest.M
 
 
 def test_a_model_in_force_that_has_no_season_is_published_once_with_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, planned: FittedModel
 ) -> None:
+    monkeypatch.setattr(seasons, "plan_season", lambda *_, **__: planned.season)
     archive = Archive(tmp_path / "archive")
     time = np.datetime64("2020-02-20T00:00:00") + np.arange(0, 9 * 86_400, 600).astype("timedelta64[s]")
     archive.add_telemetry("house", Telemetry(time, {"air_temperature": np.full(len(time), 20.0)}))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -54,6 +56,12 @@ def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(scope="session")
-def page(leak: Diagnosis) -> str:
+def page_in(leak: Diagnosis) -> Callable[[str], str]:
+    """The report of the leak in a language, drawn once."""
+    return functools.cache(lambda code: render_report(leak, code))
+
+
+@pytest.fixture(scope="session")
+def page(page_in: Callable[[str], str]) -> str:
     """The report of the leak."""
-    return render_report(leak)
+    return page_in("en")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -24,13 +24,17 @@ def browser() -> Iterator[Browser]:
         one.close()
 
 
+@pytest.fixture(scope="module")
+def texts(page_in: Callable[[str], str], stuck: Diagnosis) -> dict[str, str]:
+    """A report with causes, and one of a data fault."""
+    return {"leak": page_in("nl"), "stuck": render_report(stuck)}
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [390, 1280])
-def test_a_report_reads_well(
-    browser: Browser, leak: Diagnosis, stuck: Diagnosis, tmp_path: Path, width: int, scheme: Any
-) -> None:
-    for name, result, code in (("leak", leak, "nl"), ("stuck", stuck, "en")):
-        (tmp_path / f"{name}.html").write_text(render_report(result, code), encoding="utf-8")
+def test_a_report_reads_well(browser: Browser, texts: dict[str, str], tmp_path: Path, width: int, scheme: Any) -> None:
+    for name, text in texts.items():
+        (tmp_path / f"{name}.html").write_text(text, encoding="utf-8")
         page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
         asked: list[str] = []
         page.on("request", lambda request: asked.append(request.url))  # noqa: B023  (each page is closed in its turn)

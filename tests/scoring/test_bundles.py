@@ -19,6 +19,7 @@ from igrow.trainer.scoring.bundles import ACTUATORS, BY_SETPOINTS, score_bundle,
 from tests.virtual_log import SITE, virtual_log
 
 DAYS = 12
+JUDGED_TOO = ("air_humidity", "air_co2")
 SITE_FILE = "name: virtual\nlatitude: 52.0\nlongitude: 4.5\n"
 
 
@@ -82,7 +83,8 @@ def test_a_diagnosis_leaves_out_the_days_that_its_bundle_was_calibrated_on(
     (tmp_path / "site.yaml").write_text(SITE_FILE)
 
     given = ["--site", str(tmp_path / "site.yaml"), "--bundle", str(bundle), "--out", str(tmp_path / "out")]
-    write_csv(tmp_path / "log.csv", telemetry)
+    # Of the temperature alone a diagnosis takes a third of the time.
+    write_csv(tmp_path / "log.csv", telemetry.only([name for name in telemetry.columns if name not in JUDGED_TOO]))
     assert main(["diagnose", str(tmp_path / "log.csv"), *given]) in {0, 10, 11, 12}
     told = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
     assert told["span"]["start"] == f"{telemetry.time[4 * 96 + 1]}Z"
