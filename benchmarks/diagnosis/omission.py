@@ -2,8 +2,8 @@
 
 Every greenhouse of a nursery is calibrated on its own weeks with the whole model, and then with one term after the
 other taken out: its parameter is held at its lowest value, and all others are fitted without it. A name with the
-whole model is a false claim. With `--tuning` what terms gain where nothing was taken out is learned, from seeds that
-no benchmark has. With a folder of data the same is asked of the public logs.
+whole model is a false claim. With `--tuning` it is learned by how much a term makes unseen weeks better where nothing
+was taken out, from seeds that no benchmark has. With a folder of data the same is asked of the public logs.
 """
 
 from __future__ import annotations
@@ -11,9 +11,8 @@ from __future__ import annotations
 import json
 import sys
 from argparse import Namespace
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
-from importlib.resources import files
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +20,7 @@ import numpy as np
 from benchmarks.diagnosis import real
 from benchmarks.diagnosis.cases import SEASONS
 from benchmarks.diagnosis.nurseries import calibration_logs, nursery
+from benchmarks.diagnosis.rules import RULES, write_rules
 from benchmarks.jobs import Jobs
 from benchmarks.provenance import provenance
 from igrow.core.effects import EFFECTS
@@ -30,7 +30,7 @@ from igrow.core.site import Site
 from igrow.trainer.data import prepare_log
 from igrow.trainer.data.splits import held_out_weeks
 from igrow.trainer.diagnosis import DEFAULT, omission
-from igrow.trainer.diagnosis.omission import TERMS, USUAL_DEVIATION, UsualGains, root_gain
+from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.fit.climate import fit_climate, site_prior
 from igrow.trainer.fit.evaluation import evaluate
 from igrow.trainer.fit.gaussian import Gaussian
@@ -54,12 +54,10 @@ ON_REAL_LOGS = ("lamp_heat_share", "leakage_wind", "transpiration_night_share")
 MATTERS = 1.05
 """Times by which the 24 h error of held-out weeks must rise for a term to count as one that the greenhouse has."""
 CONFOUNDED = ({"co2_valve_leak", "soil_respiration"},)
-LEAST, MOST = 3.0, 8.0
-"""Scores between which the bound is set."""
 FALSE_CLAIMS = 0.02
 """Of calibrations in which nothing was taken out."""
-COUNTS_AS = 3.0
-"""Greenhouses that the deviation of a root gain before any greenhouse counts as."""
+ANY = replace(DEFAULT, least_omission_fall=0.0, most_causes=1)
+"""Under which that term is named which makes unseen weeks better at all."""
 HELD = 1e-6
 """Relative standard deviation of a parameter that is held."""
 
@@ -73,25 +71,10 @@ class Told:
     """The effect that is missing; empty for none."""
     named: tuple[str, ...]
     """Causes, that which stands out most first."""
-    gains: dict[str, float]
+    fall: float
+    """By which share they lessen the 24 h error of unseen weeks."""
     rise: float
     """Of the 24 h error on held-out weeks, over that of the whole model: mean ratio of all quantities."""
-
-
-def learn(gains: Mapping[str, Sequence[Mapping[str, float]]]) -> dict[str, tuple[float, float]]:
-    """Return mean and predictive deviation of the root gain of every term.
-
-    Args:
-        gains: by greenhouse, those of its calibrations in which nothing was taken out.
-    """
-    found = {}
-    for effect in TERMS:
-        roots = np.array([np.mean([root_gain(one.get(effect, 0.0)) for one in own]) for own in gains.values()])
-        count, mean = len(roots), float(roots.mean())
-        # An inverse chi-squared prior keeps few greenhouses that happen to agree from counting as all there are.
-        variance = (COUNTS_AS * USUAL_DEVIATION**2 + float(np.sum((roots - mean) ** 2))) / (COUNTS_AS + count - 1.0)
-        found[effect] = (round(mean, 2), round(float(np.sqrt(variance * (1.0 + 1.0 / count))), 2))
-    return found
 
 
 def without(prior: Gaussian, parameter: str) -> Gaussian:
@@ -104,19 +87,16 @@ def without(prior: Gaussian, parameter: str) -> Gaussian:
 
 
 def calibrations(
-    record: Record, site: Site, name: str, taken_out: Sequence[str], usual: UsualGains | None
+    record: Record, site: Site, name: str, taken_out: Sequence[str], rules: DecisionRules
 ) -> Iterator[Told]:
-    """Calibrate with the whole model, then with each parameter taken out, and say what each calibration names.
-
-    Without usual gains nothing is named: what terms gain is all that is asked.
-    """
+    """Calibrate with the whole model, then with each parameter taken out, and say what each calibration names."""
     prior, held_out = site_prior(site), held_out_weeks(record.time)
     whole = None
     for parameter in ("", *taken_out):
         known = without(prior, parameter) if parameter else prior
         try:
             posterior = fit_climate([(record, None)], known)
-            gains = omission.gains_of(record, site, posterior, DEFAULT)
+            found = omission.examine(record, site, posterior, rules)
         except DivergenceError as error:
             print(f"{name} without {parameter or 'nothing'}: {error}", file=sys.stderr)
             continue
@@ -125,12 +105,11 @@ def calibrations(
             for quantity, by_horizon in evaluate(record, posterior.values, {}, (omission.DAY,), held_out).items()
         }
         whole = whole or errors
-        found = None if usual is None else omission.examine(record, site, posterior, DEFAULT, usual)
         yield Told(
             name,
             TAKEN_OUT.get(parameter, ""),
             () if found is None else tuple(effect.name for effect in found.effects),
-            {effect: round(gain, 1) for effect, gain in gains.items()},
+            0.0 if found is None else omission.fall(found.errors),
             float(np.mean([errors[quantity] / whole[quantity] for quantity in errors])),
         )
 
@@ -139,12 +118,12 @@ def season(job: tuple[str, str, int, tuple[str, ...]]) -> list[Told]:
     """Simulate the nursery of a season and calibrate its greenhouses."""
     kind, name, count, taken_out = job
     known = nursery(name, count, SEEDS[kind] + 10_000 * list(SEASONS).index(name))
-    usual = None if kind == "tuning" else omission.read_usual_gains()
+    rules = ANY if kind == "tuning" else DEFAULT
     told: list[Told] = []
     for greenhouse, (log, _) in zip(known.greenhouses, calibration_logs(known), strict=True):
         seen = prepare_log(log, greenhouse.site)
         record = seen.record(seen.best_shift(site_prior(greenhouse.site).values))
-        for one in calibrations(record, greenhouse.site, greenhouse.site.name, taken_out, usual):
+        for one in calibrations(record, greenhouse.site, greenhouse.site.name, taken_out, rules):
             told.append(one)
             names = ", ".join(one.named) or "-"
             print(f"{one.greenhouse} without {one.taken_out or 'nothing'}: {names}", file=sys.stderr)
@@ -181,19 +160,11 @@ def show(told: Sequence[Told]) -> None:
         print(f"{effect:24}{shares}{mattering / max(len(matter), 1):45.2f}{len(matter):5}")
 
 
-def learned(told: Sequence[Told]) -> UsualGains:
-    """Return what terms gain in calibrations with the whole model, and the least score, each judged by the others'."""
-    gains: dict[str, list[dict[str, float]]] = {}
-    for one in told:
-        gains.setdefault(one.greenhouse, []).append(one.gains)
-    largest = []
-    for greenhouse, own in gains.items():
-        rest = UsualGains(learn({name: one for name, one in gains.items() if name != greenhouse}), 0.0)
-        largest += [max(rest.score(effect, gain) for effect, gain in one.items()) for one in own]
-    print(f"largest scores, each by the gains of the others: {', '.join(f'{one:.1f}' for one in sorted(largest))}")
-    least = float(np.clip(np.quantile(largest, 1.0 - FALSE_CLAIMS), LEAST, MOST))
-    seeds = {name: SEEDS["tuning"] + 10_000 * place for place, name in enumerate(SEASONS)}
-    return UsualGains(learn(gains), round(least, 1), provenance(COMMAND, seeds))
+def learned(told: Sequence[Told]) -> float:
+    """Return the share of unseen weeks' error that a term must remove: more than in nearly all that lack nothing."""
+    falls = sorted(one.fall for one in told)
+    print(f"falls where nothing was taken out: {', '.join(f'{100.0 * one:.1f} %' for one in falls)}")
+    return round(float(np.quantile(falls, 1.0 - FALSE_CLAIMS)), 3)
 
 
 def on_real_logs(data: Path, only: str) -> int:
@@ -204,12 +175,11 @@ def on_real_logs(data: Path, only: str) -> int:
             continue
         site = one.site
         record = one.before.record(one.before.best_shift(site_prior(site).values))
-        for found in calibrations(record, site, one.name, ON_REAL_LOGS, omission.read_usual_gains()):
+        for found in calibrations(record, site, one.name, ON_REAL_LOGS, DEFAULT):
             told.append(found)
-            ranked = sorted(found.gains, key=found.gains.__getitem__, reverse=True)[:3]
-            gains = ", ".join(f"{name} {found.gains[name]:.0f}" for name in ranked)
             missing, names = found.taken_out or "nothing", ", ".join(found.named) or "-"
-            print(f"{one.name:24} without {missing:22} {names:40} error x {found.rise:.2f}; gains {gains}")
+            errors = f"error x {found.rise:.2f}, beside what was named x {1.0 - found.fall:.2f}"
+            print(f"{one.name:24} without {missing:22} {names:40} {errors}")
     print()
     show(told)
     return 0
@@ -230,8 +200,8 @@ def main(options: Namespace) -> int:
     if not options.tuning:
         show(told)
         return 0
-    usual = learned(told)
-    path = Path(str(files("igrow.trainer.diagnosis"))) / omission.FILE
-    path.write_text(json.dumps(asdict(usual), indent=1) + "\n", encoding="utf-8")
-    print(f"least score {usual.least_score:g}; wrote {path}")
+    least = learned(told)
+    seeds = {name: SEEDS["tuning"] + 10_000 * place for place, name in enumerate(SEASONS)}
+    write_rules(RULES, {"least_omission_fall": least}, provenance(COMMAND, seeds))
+    print(f"least fall {least:g}; wrote {RULES}")
     return 0

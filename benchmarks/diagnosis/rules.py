@@ -128,15 +128,16 @@ def fitted_names() -> tuple[str, ...]:
 
 
 def write_rules(path: Path, values: Mapping[str, float], provenance: Mapping[str, Any]) -> None:
-    """Write fitted rules, each with its provenance.
+    """Write fitted rules, each with its provenance; those that other commands fit stay as they are.
 
     Raises:
-        ValueError: a fitted rule is missing, or a chosen one is among them.
+        ValueError: a rule is none that is fitted.
     """
-    if set(values) != set(fitted_names()):
+    if not set(values) <= set(fitted_names()):
         raise ValueError(f"fitted rules are {', '.join(fitted_names())}; given were {', '.join(values)}")
     meanings = {one.name: one.metadata["meaning"] for one in fields(DecisionRules)}
-    document = {name: {"value": values[name], "meaning": meanings[name], **provenance} for name in values}
+    document = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    document |= {name: {"value": values[name], "meaning": meanings[name], **provenance} for name in values}
     path.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
 
 

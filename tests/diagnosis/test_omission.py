@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.diagnosis.omission import learn
+from benchmarks.diagnosis.omission import Told, learned
 from igrow.core.bundle import EffectRecord, Estimate, HeldOutError
 from igrow.core.language import speak
 from igrow.core.simulator.hybrid.nominal import site_record
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.diagnosis import DEFAULT, history, omission
-from igrow.trainer.diagnosis.omission import TERMS, UsualGains
+from igrow.trainer.diagnosis.omission import TERMS
 from igrow.trainer.fit import FittedModel
 from igrow.trainer.fit.climate import bounds, fit_climate, site_prior
 from igrow.trainer.fit.gaussian import Gaussian
@@ -57,7 +57,7 @@ def test_a_term_that_was_taken_out_gains_and_one_that_is_there_does_not(record: 
 def test_a_term_that_hides_behind_a_larger_one_is_named_beside_it() -> None:
     month = site_record(virtual_log(28, seed=3), SITE, 3600.0)
     lacking = held("transpiration_night_share", "leakage_wind")
-    found = omission.examine(month, SITE, lacking, DEFAULT)
+    found = omission.examine(month, SITE, lacking, replace(DEFAULT, most_omission_fits=2))
     assert found is not None
     assert {effect.name for effect in found.effects} == {"night_transpiration", "wind_infiltration"}
     assert np.mean([one.after / one.before for one in found.errors if one.horizon == omission.DAY]) < 0.9
@@ -77,19 +77,26 @@ def test_the_size_of_a_term_is_fitted_beside_the_parameters(record: Record) -> N
     assert found.values["leakage_wind"] == 0.0
 
 
-def test_a_gain_stands_out_only_from_what_greenhouses_that_lack_nothing_show() -> None:
-    gains = [{"cover_condensation": gain, "night_transpiration": 0.5} for gain in (40.0, 10.0, 25.0, 60.0)]
-    usual = UsualGains(learn({str(place): [one] for place, one in enumerate(gains)}), 3.5)
-    assert usual.outstanding({"cover_condensation": 60.0, "night_transpiration": 1.0}) is None
-    named = usual.outstanding({"cover_condensation": 60.0, "night_transpiration": 60.0})
-    assert named == "night_transpiration"
-    assert UsualGains({}, 3.5).outstanding({}) is None
+def test_a_term_that_gains_little_in_the_linear_model_is_not_fitted() -> None:
+    rules = replace(DEFAULT, most_omission_fits=2, least_omission_gain=5.0)
+    gains = {"lamp_heat": 9.0, "sky_cooling": 4.0, "soil_respiration": 30.0, "screen_gap": 12.0}
+    assert [one.name for one in omission._promising(gains, rules)] == ["soil_respiration", "screen_gap"]
+    assert omission._promising({"sky_cooling": 4.0}, rules) == []
 
 
-def test_what_came_with_the_trainer_knows_every_term() -> None:
-    usual = omission.read_usual_gains()
-    assert set(usual.root_gains) == set(TERMS)
-    assert usual.provenance
+def test_a_fall_is_that_of_a_day_ahead_and_the_mean_of_all_quantities() -> None:
+    errors = [
+        HeldOutError("air_temperature", "24_h", 1.0, 0.8, "degC"),
+        HeldOutError("air_co2", "24_h", 50.0, 50.0, "ppm"),
+        HeldOutError("air_co2", "1_h", 50.0, 10.0, "ppm"),
+    ]
+    assert omission.fall(errors) == pytest.approx(0.1)
+    assert omission.fall([]) == 0.0
+
+
+def test_what_a_term_must_remove_is_more_than_where_nothing_was_taken_out() -> None:
+    told = [Told("a", "", (), fall, 1.0) for fall in (0.0, 0.012, 0.0, 0.021)]
+    assert learned(told) == pytest.approx(0.02, abs=0.002)
 
 
 def test_a_model_is_completed_only_when_it_is_asked() -> None:

@@ -52,9 +52,16 @@ def test_rules_are_written_each_with_its_meaning(tmp_path: Path) -> None:
     assert [one["meaning"] for one in stored.values()] == [row[3] for row in table(DEFAULT) if row[0] in stored]
 
 
-def test_a_fit_that_leaves_a_rule_out_or_fits_a_chosen_one_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="fitted rules are"):
-        write_rules(tmp_path / "rules.json", {"least_gain": 1.0}, {})
+def test_a_fit_leaves_the_rules_of_other_commands_as_they_are(tmp_path: Path) -> None:
+    before = dict.fromkeys(fitted_names(), 1.0)
+    write_rules(tmp_path / "rules.json", before, {"command": "make them"})
+    write_rules(tmp_path / "rules.json", {"least_gain": 2.0}, {"command": "make one"})
+    stored = json.loads((tmp_path / "rules.json").read_text())
+    assert {name: one["value"] for name, one in stored.items()} == {**before, "least_gain": 2.0}
+    assert stored["least_gain"]["command"] == "make one"
+
+
+def test_a_fit_of_a_rule_that_is_chosen_is_refused(tmp_path: Path) -> None:
     everything = dict.fromkeys((one.name for one in fields(DecisionRules)), 1.0)
     with pytest.raises(ValueError, match="fitted rules are"):
         write_rules(tmp_path / "rules.json", everything, {})

@@ -1,18 +1,17 @@
 """What a model lacks, asked of its calibration log: terms of the physics that are not in it.
 
 A diagnosis asks what has changed since the calibration; what was missing then is asked here. Each term that an effect
-of the catalogue can stand in for is scored against all parameters under the prior of the site's description, so that
-parameters which a missing term drives to unphysical values speak for it too. Every structure misses something of every
-greenhouse: what calibrations of greenhouses in which nothing was taken out gain is learned (`learned/omission.json`),
-and a term must stand out from that. It must then make weeks better that no fit saw. A large one hides others, so the
-question is asked again beside each that was found.
+of the catalogue can stand in for is scored against all parameters under the prior of the site's description. Where
+parameters were driven far to make up for a term, what it gains in a model that is linear about them says little of what
+it is worth: so those that gain most are fitted beside the parameters, and that which brings the fitted weeks closest
+to what was measured must make weeks better that no fit saw. Every structure misses something of every greenhouse: how
+much better, greenhouses tell in which nothing was taken out. A large term hides others, so the question is asked again
+beside each that was found.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -29,55 +28,19 @@ from igrow.trainer.diagnosis.candidates import Candidate
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.estimate import normal_quantile
 from igrow.trainer.diagnosis.linear import LinearModel, Term
-from igrow.trainer.diagnosis.rules import DecisionRules, came_with_the_trainer
+from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.fit.climate import fit_climate
 from igrow.trainer.fit.evaluation import Model, held_out_errors
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.omission import Omission
 from igrow.trainer.fit.solver import DivergenceError
 
-FILE = "learned/omission.json"
 TERMS = tuple(effect.name for effect in EFFECTS.values() if effect.resembles)
 """Effects that can stand in for a term of the physics."""
 DAY = "24_h"
 """The horizon whose errors decide."""
-USUAL_DEVIATION = 2.0
-"""Of a root gain before any greenhouse."""
 WIDE = 3.0
 """Prior deviation of a term's size, in typical ones."""
-
-
-@dataclass(frozen=True)
-class UsualGains:
-    """What terms gain in calibrations of greenhouses in which nothing was taken out."""
-
-    root_gains: Mapping[str, tuple[float, float]]
-    """Mean and standard deviation, over greenhouses, of the root of twice the gain, by effect."""
-    least_score: float
-    """Standard deviations above its mean that a term must stand."""
-    provenance: Mapping[str, Any] = field(default_factory=dict)
-    """The command that learned it, its date and seeds."""
-
-    def score(self, effect: str, gain: float) -> float:
-        """Return how many standard deviations a gain lies above the usual one."""
-        mean, deviation = self.root_gains.get(effect, (0.0, USUAL_DEVIATION))
-        return (root_gain(gain) - mean) / deviation
-
-    def outstanding(self, gains: Mapping[str, float]) -> str | None:
-        """Return the term that stands out most; None where none stands out."""
-        scores = {effect: self.score(effect, gain) for effect, gain in gains.items()}
-        best = max(scores, key=scores.__getitem__, default=None)
-        return None if best is None or scores[best] < self.least_score else best
-
-
-def root_gain(gain: float) -> float:
-    """Return the root of twice a gain: were the noise as it is modelled, that of a term that is not there is normal."""
-    return float(np.sqrt(2.0 * gain))
-
-
-def read_usual_gains() -> UsualGains:
-    """Return the gains that came with the trainer."""
-    return UsualGains(**came_with_the_trainer(FILE))
 
 
 def gains_of(
@@ -125,51 +88,70 @@ def gains_of(
     return found
 
 
-def examine(
-    record: Record, site: Site, posterior: Gaussian, rules: DecisionRules, usual: UsualGains | None = None
-) -> Omission | None:
-    """Return the terms that a calibrated model lacks; None where none stands out, or none makes unseen weeks better.
+def examine(record: Record, site: Site, posterior: Gaussian, rules: DecisionRules) -> Omission | None:
+    """Return the terms that a calibrated model lacks; None where none makes unseen weeks better.
 
     Args:
         record: of the calibration log.
         site: the greenhouse.
         posterior: of the parameters that the calibration has.
         rules: what a term must show.
-        usual: what terms gain where nothing was taken out (None: what came with the trainer).
 
     Raises:
         DivergenceError: the model runs out of all bounds on the log.
     """
-    usual = usual or read_usual_gains()
     held_out = held_out_weeks(record.time)
-    named = usual.outstanding(gains_of(record, site, posterior, rules))
-    if named is None or not held_out.any():
+    if not held_out.any():
         return None
-    prior, found = history.physical_prior(site, posterior), None
-    terms: tuple[Effect, ...] = ()
-    try:
-        without: Model = (fit_climate([(record, ~held_out)], prior).values, {})
-        last = without
-        while named is not None and len(terms) < rules.most_causes:
-            terms = (*terms, EFFECTS[named])
-            fitted = _fit(record, ~held_out, prior, terms)
-            simulator: Model = (fitted.marginal(prior.names).values, _active(fitted, terms))
-            if not _better(held_out_errors(record, held_out, last, simulator), rules):
+    prior = history.physical_prior(site, posterior)
+    without: Model = (fit_climate([(record, ~held_out)], prior).values, {})
+    found: Omission | None = None
+    terms, last = tuple[Effect, ...](), without
+    known: ActiveEffects = {}
+    while len(terms) < rules.most_causes:
+        try:
+            promising = _promising(gains_of(record, site, posterior, rules, known), rules)
+            trial = _closest(record, ~held_out, prior, last, terms, promising)
+            if trial is None or fall(held_out_errors(record, held_out, last, trial[1])) < rules.least_omission_fall:
                 break
-            last, fitted = simulator, _fit(record, None, prior, terms)
-            parameters = fitted.marginal(prior.names)
-            errors = held_out_errors(record, held_out, without, simulator)
-            found = Omission(tuple(_estimated(fitted, effect, rules) for effect in terms), parameters, errors)
-            named = usual.outstanding(gains_of(record, site, parameters, rules, _active(fitted, terms)))
-    except DivergenceError:
-        pass  # What was found before stands without the term that the model cannot run with.
+            terms, last = trial
+            fitted = _fit(record, None, prior, terms, last)
+        except DivergenceError:
+            break  # What was found before stands without the term that the model cannot run with.
+        posterior, known = fitted.marginal(prior.names), _active(fitted, terms)
+        errors = held_out_errors(record, held_out, without, last)
+        found = Omission(tuple(_estimated(fitted, effect, rules) for effect in terms), posterior, errors)
     return found
 
 
-def _better(errors: Sequence[HeldOutError], rules: DecisionRules) -> bool:
-    """Tell whether a term takes its share off the error of unseen weeks."""
+def fall(errors: Sequence[HeldOutError]) -> float:
+    """Return by which share the error of a day ahead falls, the mean of all quantities."""
     day = [one.after / one.before for one in errors if one.horizon == DAY]
-    return bool(day) and float(np.mean(day)) <= 1.0 - rules.least_omission_fall
+    return 1.0 - float(np.mean(day)) if day else 0.0
+
+
+def _promising(gains: Mapping[str, float], rules: DecisionRules) -> list[Effect]:
+    """Return the terms that gain enough in the linear model to be fitted, that which gains most first."""
+    ranked = sorted(gains, key=gains.__getitem__, reverse=True)
+    return [EFFECTS[name] for name in ranked[: rules.most_omission_fits] if gains[name] >= rules.least_omission_gain]
+
+
+def _closest(
+    record: Record, rows: Mask, prior: Gaussian, last: Model, terms: tuple[Effect, ...], promising: Sequence[Effect]
+) -> tuple[tuple[Effect, ...], Model] | None:
+    """Return the terms and that one more which brings the fitted rows closest to what was measured, and their model."""
+    best: tuple[tuple[Effect, ...], Model] | None = None
+    largest = 0.0
+    for effect in promising:
+        together = (*terms, effect)
+        try:
+            fitted = _fit(record, rows, prior, together, last)
+        except DivergenceError:
+            continue
+        model: Model = (fitted.marginal(prior.names).values, _active(fitted, together))
+        if (fallen := fall(held_out_errors(record, rows, last, model))) > largest:
+            best, largest = (together, model), fallen
+    return best
 
 
 def _active(fitted: Gaussian, terms: Sequence[Effect]) -> dict[str, dict[str, float]]:
@@ -206,12 +188,14 @@ def _name(effect: Effect) -> str:
     return f"{effect.name}:{effect.amplitude.name}"
 
 
-def _fit(record: Record, rows: Mask | None, prior: Gaussian, terms: Sequence[Effect]) -> Gaussian:
-    """Return parameters and the sizes of terms, fitted together to free runs."""
+def _fit(record: Record, rows: Mask | None, prior: Gaussian, terms: Sequence[Effect], start: Model) -> Gaussian:
+    """Return parameters and the sizes of terms, fitted together to free runs, from another model's on."""
     typical = np.array([one.amplitude.typical for one in terms])
     joint = Gaussian(
         (*prior.names, *map(_name, terms)),
         np.concatenate([prior.mean, typical]),
         block_diag(prior.covariance, np.diag((WIDE * typical) ** 2)),
     )
-    return fit_climate([(record, rows)], joint, {one.name: _shape(one) for one in terms})
+    parameters, effects = start
+    sizes = {_name(EFFECTS[name]): values[EFFECTS[name].amplitude.name] for name, values in effects.items()}
+    return fit_climate([(record, rows)], joint, {one.name: _shape(one) for one in terms}, start={**parameters, **sizes})

@@ -56,7 +56,11 @@ class DecisionRules:
     least_history_days: float = _chosen(21.0, "days of a calibration log from which on a history is learned")
     omission_effect: float = _tuned(0.3, "prior deviation of an effect in the discrepancy, in typical amplitudes")
     omission_pattern: float = _tuned(0.05, "the same of a pattern, in its units")
-    least_omission_fall: float = _chosen(0.02, "share of the error of unseen weeks that an omitted term must remove")
+    least_omission_gain: float = _chosen(4.0, "gain in the linear model from which on an omitted term is fitted")
+    most_omission_fits: int = _chosen(4, "terms that are fitted beside the parameters, those that gain most")
+    least_omission_fall: float = _fitted(
+        "share of the error of unseen weeks that an omitted term must remove: more than any where none was taken out"
+    )
     wall_drift: float = _tuned(0.015, "relative change of a parameter within some weeks, by physics")
     crop_drift: float = _tuned(0.05, "the same of a parameter of the crop")
     new_crop_drift: float = _chosen(0.5, "the same of a crop that the calibration has not seen, or of so much of it")

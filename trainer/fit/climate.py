@@ -60,7 +60,12 @@ def _of_effect(name: str) -> Parameter:
 
 
 def fit_climate(
-    parts: Sequence[Part], prior: Gaussian, effects: ActiveEffects | None = None, *, progress: Progress = silent
+    parts: Sequence[Part],
+    prior: Gaussian,
+    effects: ActiveEffects | None = None,
+    *,
+    start: Mapping[str, float] | None = None,
+    progress: Progress = silent,
 ) -> Gaussian:
     """Return the posterior of the parameters.
 
@@ -68,6 +73,7 @@ def fit_climate(
         parts: records on the working grid; several compartments of one kind are fitted with one set of parameters.
         prior: of all parameters; one of an effect, to be fitted with them, is called ``effect:parameter``.
         effects: the active effects, held but for such parameters.
+        start: where to begin, by name; what it lacks begins at the prior's mean.
         progress: is told of each step in a line.
 
     Raises:
@@ -98,8 +104,9 @@ def fit_climate(
     residuals, jacobian = by_differences(batch, prior, high)
     counted = np.concatenate([np.isfinite(values).ravel() for values in measured.values()]).astype(np.float64)
     weights = counted * (_SAMPLE / CORRELATION_TIME)
+    begin = np.array([{**prior.values, **(start or {})}[name] for name in prior.names])
     try:
-        found = solve(residuals, jacobian, prior, low, high, weights=weights, robust=ROBUST, progress=tell)
+        found = solve(residuals, jacobian, prior, low, high, weights=weights, robust=ROBUST, start=begin, progress=tell)
     except DivergenceError:
         raise DivergenceError(
             "the simulator runs out of all bounds on this log before anything is fitted: look whether vents, pipes, "

@@ -18,8 +18,8 @@ from igrow.core.telemetry import Telemetry
 _REFERENCE = Site(name="reference", latitude=0.0, longitude=0.0).greenhouse
 """The greenhouse that the values of `PARAMETERS` were written down for."""
 
-_CANOPIES = {"tomato": (3.0, 35.0, 9.0), "cucumber": (3.2, 20.0, 6.0)}
-"""Leaf area of a full canopy (m2 m-2), days from planting to half of it, and the width of the rise in days.
+_CANOPIES = {"tomato": (0.4, 3.0, 35.0, 9.0), "cucumber": (0.3, 3.2, 20.0, 6.0)}
+"""Leaf area of transplants and of a full canopy (m2 m-2), days from planting to half of the rise and its width in days.
 
 Usual figures of Dutch practice; the transpiration and assimilation parameters of a site absorb their error.
 """
@@ -74,13 +74,18 @@ def _within_bounds(values: Mapping[str, float]) -> dict[str, float]:
 def leaf_area_curve(site: Site, time: Times) -> Floats:
     """Return an estimate of the leaf area index over time, (n,), from the species and the planting date.
 
-    A logistic rise. Before the planting an older crop stands, with a full canopy, where the log began long before it.
+    A logistic rise from transplants. Before the planting an older crop stands, with a full canopy, where the log began
+    long before it, and else none.
     """
-    full, half, width = _CANOPIES.get(site.crop.species.lower(), _CANOPIES["tomato"])
+    planted, full, half, width = _canopy(site)
     days = (time - np.datetime64(site.crop.planting_date, "s")).astype(np.float64) / 86_400.0
     older = (days < 0.0) & np.any(days[:1] < -_EMPTY_DAYS)
-    curve: Floats = full / (1.0 + np.exp(-(np.where(older, np.inf, days) - half) / width))
-    return curve
+    rise = 1.0 / (1.0 + np.exp(-(np.where(older, np.inf, days) - half) / width))
+    return np.where((days < 0.0) & ~older, 0.0, planted + (full - planted) * rise)
+
+
+def _canopy(site: Site) -> tuple[float, float, float, float]:
+    return _CANOPIES.get(site.crop.species.lower(), _CANOPIES["tomato"])
 
 
 def measures_leaf_area(telemetry: Telemetry) -> bool:
@@ -106,7 +111,7 @@ def site_record(telemetry: Telemetry, site: Site, step: float) -> Record:
         longitude=site.longitude,
         mean_height=site.greenhouse.mean_height,
         lamp_efficacy=site.greenhouse.lamps.efficacy if site.greenhouse.lamps is not None else 0.0,
-        leaf_area_index=_CANOPIES.get(site.crop.species.lower(), _CANOPIES["tomato"])[0],
+        leaf_area_index=_canopy(site)[1],
     )
     missing = (*record.missing, "leaf_area_index") if estimated else record.missing
     greenhouse = site.greenhouse
