@@ -127,7 +127,7 @@ def _omission(record: Record, model: FittedModel, progress: Progress) -> Omissio
         return None
     progress("asking the log what the model lacks")
     try:
-        return examine(record, model.site, model.posterior, DEFAULT)
+        return examine(record, model.site, model.posterior, DEFAULT, progress=progress)
     except (IgrowError, np.linalg.LinAlgError) as error:
         progress(f"what the model lacks could not be asked of its own log: {error}")
         return None

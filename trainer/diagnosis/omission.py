@@ -34,6 +34,7 @@ from igrow.trainer.fit.evaluation import Model, held_out_errors
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.omission import Omission
 from igrow.trainer.fit.solver import DivergenceError
+from igrow.trainer.progress import Progress, silent
 
 TERMS = tuple(effect.name for effect in EFFECTS.values() if effect.resembles)
 """Effects that can stand in for a term of the physics."""
@@ -88,7 +89,9 @@ def gains_of(
     return found
 
 
-def examine(record: Record, site: Site, posterior: Gaussian, rules: DecisionRules) -> Omission | None:
+def examine(
+    record: Record, site: Site, posterior: Gaussian, rules: DecisionRules, *, progress: Progress = silent
+) -> Omission | None:
     """Return the terms that a calibrated model lacks; None where none makes unseen weeks better.
 
     Args:
@@ -96,6 +99,7 @@ def examine(record: Record, site: Site, posterior: Gaussian, rules: DecisionRule
         site: the greenhouse.
         posterior: of the parameters that the calibration has.
         rules: what a term must show.
+        progress: is told of each fit in a line.
 
     Raises:
         DivergenceError: the model runs out of all bounds on the log.
@@ -111,7 +115,7 @@ def examine(record: Record, site: Site, posterior: Gaussian, rules: DecisionRule
     while len(terms) < rules.most_causes:
         try:
             promising = _promising(gains_of(record, site, posterior, rules, known), rules)
-            trial = _closest(record, ~held_out, prior, last, terms, promising)
+            trial = _closest(record, ~held_out, prior, last, terms, promising, progress)
             if trial is None or fall(held_out_errors(record, held_out, last, trial[1])) < rules.least_omission_fall:
                 break
             terms, last = trial
@@ -137,12 +141,19 @@ def _promising(gains: Mapping[str, float], rules: DecisionRules) -> list[Effect]
 
 
 def _closest(
-    record: Record, rows: Mask, prior: Gaussian, last: Model, terms: tuple[Effect, ...], promising: Sequence[Effect]
+    record: Record,
+    rows: Mask,
+    prior: Gaussian,
+    last: Model,
+    terms: tuple[Effect, ...],
+    promising: Sequence[Effect],
+    progress: Progress,
 ) -> tuple[tuple[Effect, ...], Model] | None:
     """Return the terms and that one more which brings the fitted rows closest to what was measured, and their model."""
     best: tuple[tuple[Effect, ...], Model] | None = None
     largest = 0.0
     for effect in promising:
+        progress(f"fitting what may be missing: {effect.title}")
         together = (*terms, effect)
         try:
             fitted = _fit(record, rows, prior, together, last)
