@@ -21,7 +21,7 @@ from igrow.core.gaps import held
 from igrow.core.greenhouse import tomato
 from igrow.core.planner.evolution import Genes
 from igrow.core.planner.season.search import GENERATIONS, rule_and_strategy
-from igrow.core.quantities import SETPOINTS
+from igrow.core.quantities import SETPOINTS, USUAL_SETPOINTS
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Site
 from igrow.core.telemetry import to_grid
@@ -41,7 +41,7 @@ class Published(Recipe):
     """Setpoints that somebody had, day by day."""
 
     setpoints: Floats
-    """(DAYS, 24, 4); NaN where the recipe's count."""
+    """(DAYS, 24, S); NaN where the recipe's count."""
 
     def ask(self, morning: Morning) -> Floats:
         """Return the day's for each house."""
@@ -63,19 +63,21 @@ class Policed(Recipe):
 
 
 def growers(folder: Path) -> Floats:
-    """Return the realised setpoints of the Reference, (DAYS, 24, 4); irrigation is NaN."""
+    """Return the realised setpoints of the Reference, (DAYS, 24, S); NaN are irrigation and what it had none of."""
     log = agc2019.read(folder, "Reference").telemetry
     hourly = to_grid(log.select(START, START + DAYS * DAY), 3600)
     if len(hourly) != 24 * DAYS:
         raise SystemExit(f"{folder}: {len(hourly)} hours of the growers' setpoints, not {24 * DAYS}")
-    setpoints = np.stack([held(hourly[name]) for name in SETPOINTS], axis=-1).reshape(DAYS, 24, len(SETPOINTS))
+    setpoints = np.full((DAYS, 24, len(SETPOINTS)), np.nan)
+    for name in USUAL_SETPOINTS:
+        setpoints[:, :, SETPOINTS.index(name)] = held(hourly[name]).reshape(DAYS, 24)
     setpoints[:, :, LAMPS] = np.round(setpoints[:, :, LAMPS])
     setpoints[:, :, IRRIGATION] = np.nan
     return setpoints
 
 
 def champion(folder: Path) -> Floats:
-    """Return the growers' setpoints with the heating shifted by the difference of the slabs, (DAYS, 24, 4)."""
+    """Return the growers' setpoints with the heating shifted by the difference of the slabs, (DAYS, 24, S)."""
     crops = {one.name: one for one in read_2019(folder)}
     warmer = crops["Automatoes"].drivers["temperature"] - crops["Reference"].drivers["temperature"]
     # The season's first local day begins within an hour of its UTC day's end.

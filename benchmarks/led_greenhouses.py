@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +19,7 @@ from igrow.core.greenhouse.sensors import EXACT
 from igrow.core.greenhouse.weather_table import WeatherTable
 from igrow.core.planner.optimise import RADIATION
 from igrow.core.planner.template import Setpoints, for_site
-from igrow.core.quantities import SETPOINTS
+from igrow.core.quantities import SETPOINTS, USUAL_SETPOINTS
 from igrow.core.simulator.outcome import Outcome
 from igrow.core.site import Site
 from igrow.core.sun import unix_seconds
@@ -71,7 +72,7 @@ class Greenhouses:
             disturbances=QUIET,
             sensors=EXACT,
         )
-        self._applied = np.full((self.count, 4), np.nan)
+        self._applied = np.full((self.count, len(SETPOINTS)), np.nan)
         self._memory: Memory | None = None
 
     def measurements(self) -> dict[str, Floats]:
@@ -85,30 +86,33 @@ class Greenhouses:
         return self._hourly[:, first : first + hours]
 
     def applied(self) -> Floats:
-        """Return the setpoints of the last hour, (N, 4), NaN before the first."""
+        """Return the setpoints of the last hour, (N, S), NaN before the first."""
         return self._applied
 
     def advance(self, setpoints: Setpoints) -> Outcome:
-        """Live through hours under setpoints (N, H, 4) within all limits; returns what happened, (1, N, H)."""
+        """Live through hours under setpoints (N, H, S) within all limits; returns what happened, (1, N, H)."""
         hours = setpoints.shape[1]
         radiation = self.coming_weather(hours)[:, :, RADIATION].mean(axis=0)
         template = for_site(self.site, self.time, hours, radiation=radiation)
         course = template.follow(setpoints, self._applied, self._memory)
         self._applied, self._memory = course.setpoints[:, -1], course.memory
         self.time = self.time + hours * np.timedelta64(3600, "s")
-        return run(self._plant, course.setpoints)
+        return run(self._plant, course.setpoints, self.site.setpoints)
 
     def memory(self, greenhouse: int) -> Memory | None:
         """Return what one crop has had, as its limits count it."""
         return None if self._memory is None else one_of(self._memory, greenhouse)
 
 
-def run(plant: Plant, setpoints: Floats) -> Outcome:
-    """Carry a batch of B plants along setpoints (B, H, 4); arrays (1, B, H), climate as of each hour's end."""
+def run(plant: Plant, setpoints: Floats, taken: Sequence[str] = USUAL_SETPOINTS) -> Outcome:
+    """Carry a batch of B plants along setpoints (B, H, S); arrays (1, B, H), climate as of each hour's end.
+
+    `taken` are the setpoints that the plants' computers take; the others they have of their own.
+    """
     columns: dict[str, list[Any]] = {name: [] for name in (*_STATES, *_TOTALS, *_CUMULATIVE)}
     before = _books(plant)
     for hour in range(setpoints.shape[1]):
-        command = {name: setpoints[:, hour, column] for column, name in enumerate(SETPOINTS)}
+        command = {name: setpoints[:, hour, SETPOINTS.index(name)] for name in taken}
         # Actuators are read as means: those of the last hour, when the hours are over.
         plant.reset_means()
         plant.advance(3600.0, command)

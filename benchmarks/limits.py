@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 from igrow.core.agronomy import Place
 from igrow.core.agronomy.inspection import violations
 from igrow.core.bundle import default_bundle_folder, read_bundle
+from igrow.core.greenhouse.recipe import HUMIDITY
 from igrow.core.planner import Budget, PlanningState, optimise
 from igrow.core.planner.optimise import RADIATION
-from igrow.core.quantities import SETPOINTS
+from igrow.core.quantities import SETPOINTS, USUAL_SETPOINTS
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Agronomy, Band, Greenhouse, Rest, Site
 
@@ -73,7 +74,9 @@ def main() -> int:
         rng = np.random.default_rng(case)
         site, weather = random_site(rng), random_weather(rng)
         start = np.datetime64("2020-01-01T00:00:00") + np.timedelta64(int(rng.integers(366 * 24)), "h")
-        recipe = rng.random((HOURS, 4)) * [20.0, 1000.0, 1.0, 1.0] + [10.0, 300.0, 0.0, 0.0]
+        usual = rng.random((HOURS, len(USUAL_SETPOINTS))) * [20.0, 1000.0, 1.0, 1.0] + [10.0, 300.0, 0.0, 0.0]
+        recipe = np.full((HOURS, len(SETPOINTS)), HUMIDITY)
+        recipe[:, [SETPOINTS.index(name) for name in USUAL_SETPOINTS]] = usual
         initial = {"air_temperature": float(rng.uniform(10, 30)), "air_humidity": float(rng.uniform(40, 98))}
         result = optimise(simulator, site, PlanningState(start, initial), weather, recipe, rng, QUICK)
         place = Place.of(site)

@@ -32,7 +32,7 @@ class OnnxPolicy:
         return np.asarray(actions, dtype=np.float32)
 
     def plan(self, site: Site, present: Mapping[str, float], forecast: Floats, start: np.datetime64) -> Setpoints:
-        """Return setpoints (H, 4) for a forecast (H, 6): day by day, the state as it is now."""
+        """Return `PAPER_SETPOINTS` (H, 4) for a forecast (H, 6): day by day, the state as it is now."""
         days = -(-len(forecast) // HOURS)
         padded = np.concatenate([forecast, forecast[-1:].repeat(days * HOURS - len(forecast), axis=0)])
         state = {name: np.array([value]) for name, value in present.items()}

@@ -51,7 +51,7 @@ class Greenhouse:
     def __init__(self, log: Log) -> None:
         self.log, self.site = log, log.known_site
         self.record: Record = site_record(log.telemetry, log.known_site, STEP)
-        self.setpoints, self.inferred = setpoint_columns(log.telemetry, self.record)
+        self.setpoints, self.inferred = setpoint_columns(log.telemetry, self.record, self.site)
         self.week = weeks(self.record.time)
 
     def fit(self, fit: Mask, selection: Mask, **options: object) -> Forecaster:

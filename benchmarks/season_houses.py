@@ -31,6 +31,7 @@ from igrow.core.planner.recent_use import SCALED, factors
 from igrow.core.planner.season import Strategy
 from igrow.core.planner.season.course import RADIATION, asked
 from igrow.core.planner.template import Template, for_site
+from igrow.core.quantities import SETPOINTS
 from igrow.core.simulator.outcome import Outcome, Simulator
 from igrow.core.site import Site
 from igrow.core.sun import unix_seconds
@@ -61,12 +62,12 @@ class Morning:
     weather: Floats
     """That is expected: the mean of the last three days, (N, 24, 6)."""
     recipe: Floats
-    """(24, 4)."""
+    """(24, S)."""
     template: Template
     present: Mapping[str, Floats]
     """As measured, by quantity, (N,)."""
     applied: Floats
-    """(N, 4)."""
+    """(N, S)."""
     memory: Memory
     """Of all rows; `rows` are the way's."""
     rows: slice
@@ -78,7 +79,7 @@ class Way(Protocol):
     """Leads houses."""
 
     def ask(self, morning: Morning) -> Floats:
-        """Return the setpoints of a day, (N, 24, 4)."""
+        """Return the setpoints of a day, (N, 24, S)."""
 
     def learn(self, morning: Morning, outcome: Outcome, weather: Floats) -> None:
         """Take notice of what the day did, arrays (1, N, 24), under which weather, (N, 24, 6)."""
@@ -136,7 +137,7 @@ class Houses:
         )
 
     def advance(self, setpoints: Floats, begin: np.datetime64) -> Outcome:
-        """Live from local midnight on under setpoints (rows, 24, 4); returns what happened, (1, rows, 24)."""
+        """Live from local midnight on under setpoints (rows, 24, S); returns what happened, (1, rows, 24)."""
         return run(self.plant, setpoints)
 
     def weather(self, day: int) -> Floats:
@@ -182,7 +183,7 @@ class Past:
     weather: Floats
     """(rows, H, 6)."""
     setpoints: Floats
-    """(rows, H, 4)."""
+    """(rows, H, S)."""
     used: Mapping[str, Floats]
     """Heat, electricity and CO2 by day, (rows, days)."""
 
@@ -252,7 +253,7 @@ def lead(
 
 def settle(site: Site, led: Houses) -> tuple[Past, Floats, Memory]:
     """Lead all houses by the recipe until the season; return the past, the last setpoints and what crops have had."""
-    applied, memory = np.full((len(led.hourly), 4), np.nan), None
+    applied, memory = np.full((len(led.hourly), len(SETPOINTS)), np.nan), None
     initial: dict[str, Floats] = {}
     setpoints, used = [], []
     for day in range(-BEFORE, 0):

@@ -50,7 +50,7 @@ class Lived:
     weather: Floats
     """(24, 6)."""
     setpoints: Floats
-    """(24, 4)."""
+    """(24, S)."""
     had: dict[str, Floats]
     """What it used and grew, (1,) each."""
     warmth: float

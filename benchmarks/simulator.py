@@ -33,7 +33,7 @@ def weather() -> Floats:
 def candidates(seed: int) -> Floats:
     """Random strategies, (candidates, hours, setpoints)."""
     random = np.random.default_rng(seed)
-    low, high = np.array([14.0, 400.0, 0.0, 0.0]), np.array([24.0, 1000.0, 1.0, 1.0])
+    low, high = np.array([14.0, 400.0, 0.0, 0.0, 70.0]), np.array([24.0, 1000.0, 1.0, 1.0, 90.0])
     return np.asarray(low + (high - low) * random.random((CANDIDATES, HOURS, len(SETPOINTS))))
 
 

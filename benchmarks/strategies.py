@@ -51,6 +51,7 @@ from igrow.core.telemetry import Telemetry
 from igrow.edge.planning.forecast import persistence
 from igrow.edge.planning.make_plan import RECENT_DAYS
 from igrow.trainer.research.policies.policy import HOURS as POLICY_HOURS
+from igrow.trainer.research.policies.policy import PAPER_COLUMNS
 
 STARTS = ("2020-01-19T23:00:00", "2020-03-09T23:00:00", "2020-04-19T22:00:00")
 """Local midnights at which the weeks begin: winter, early spring, spring."""
@@ -73,7 +74,7 @@ class Situation:
     forecast: Floats
     """(HORIZON, 6)."""
     recipe: Floats
-    """(HORIZON, 4)."""
+    """(HORIZON, S)."""
     co2_before: float
     """kg m-2 since the beginning."""
     simulator: Simulator
@@ -87,7 +88,7 @@ Day = tuple[dict[str, Floats], dict[str, Floats], tuple[float, float], tuple[flo
 """What the simulator says of a day that has passed, what it used and grew, what drove its growth, and how warm the air
 was expected to be and was, degC."""
 Strategy = Callable[[Situation], Floats]
-"""Returns setpoints (HORIZON, 4)."""
+"""Returns setpoints (HORIZON, S)."""
 
 
 @dataclass
@@ -226,8 +227,9 @@ def policy_strategy(site: Site, policy: OnnxPolicy) -> Strategy:
     day = slice(0, POLICY_HOURS)
 
     def choose(now: Situation) -> Floats:
-        chosen = policy.plan(site, now.present, now.forecast[day], now.time)
-        return np.concatenate([chosen, now.recipe[POLICY_HOURS:]])
+        asked = now.recipe.copy()
+        asked[day, PAPER_COLUMNS] = policy.plan(site, now.present, now.forecast[day], now.time)
+        return asked
 
     return choose
 
@@ -246,12 +248,14 @@ def best_template(site: Site, simulator: Simulator, count: int = 500) -> Strateg
             template = for_site(site, at, HORIZON)
             if not genes.size:
                 genes = template.draw(rng, count)
-            candidates = template.decode(genes, recipe_by_hour(at, HORIZON, site.longitude), np.full(4, np.nan))
+            candidates = template.decode(
+                genes, recipe_by_hour(at, HORIZON, site.longitude), np.full(len(SETPOINTS), np.nan)
+            )
             outcome = simulator.simulate({}, hourly_weather(weather, at, HORIZON), candidates, at)
             hours = at + np.arange(HORIZON) * np.timedelta64(3600, "s")
             score += Objective(site, hours).value(outcome).score.mean(axis=0)
     best = genes[[int(score.argmax())]]
-    return lambda now: for_site(site, now.time, HORIZON).decode(best, now.recipe, np.full(4, np.nan))[0]
+    return lambda now: for_site(site, now.time, HORIZON).decode(best, now.recipe, np.full(len(SETPOINTS), np.nan))[0]
 
 
 def table(title: str, books: Mapping[str, Sequence[Book]], days: int) -> dict[str, dict[str, float]]:

@@ -95,6 +95,11 @@ def _quantity_table() -> Mapping[str, Quantity]:
             ("irrigation_on", "1", 0.0, 1.0, "fraction of the time irrigation is asked to run"),
         ),
         *rows(
+            Kind.SETPOINT,
+            ("humidity_setpoint", "%", 50.0, 100.0, "relative humidity above which the PLC opens its vents"),
+            optional=True,
+        ),
+        *rows(
             Kind.ACTUATOR,
             ("rail_pipe_temperature", "degC", 0.0, 110.0, "temperature of the pipe rail"),
             ("grow_pipe_temperature", "degC", 0.0, 110.0, "temperature of the grow pipe"),
@@ -156,4 +161,6 @@ CLIMATE = names(Kind.CLIMATE)
 GROWTH = names(Kind.GROWTH)
 YIELD = names(Kind.YIELD)
 SETPOINTS = names(Kind.SETPOINT)
+USUAL_SETPOINTS = tuple(name for name in SETPOINTS if not QUANTITIES[name].optional)
+"""Those of every site that does not say otherwise; a site names the others itself."""
 ACTUATORS = names(Kind.ACTUATOR)

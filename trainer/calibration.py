@@ -22,7 +22,7 @@ from igrow.trainer.data import Log
 from igrow.trainer.data.splits import held_out_weeks
 from igrow.trainer.diagnosis import DEFAULT, discrepancy_of, examine, history_of
 from igrow.trainer.diagnosis.wording import thin_air
-from igrow.trainer.fit.actuation import by_its_own_rules, fit_actuation, setpoint_columns
+from igrow.trainer.fit.actuation import by_its_own_rules, fit_actuation, setpoint_columns, unanswered
 from igrow.trainer.fit.climate import fit_climate
 from igrow.trainer.fit.evaluation import held_out_errors
 from igrow.trainer.fit.gaussian import Gaussian
@@ -67,7 +67,7 @@ def calibrate(
     alignment = log.best_shift(before.posterior.values)
     record = log.record(alignment)
     posterior = fit_climate([(record, None)], before.posterior, progress=progress)
-    setpoints, inferred = setpoint_columns(log.telemetry, record)
+    setpoints, inferred = setpoint_columns(log.telemetry, record, site)
     rules = fit_actuation([(record, setpoints, by_its_own_rules(log.telemetry, record))], posterior.values)
     progress("rules of the climate computer fitted")
     stages = before.crop or built_in_crop()
@@ -98,7 +98,7 @@ def calibrate(
             read_bundle(default_bundle_folder()).manifest.training_range,
         ),
         errors=_held_out_errors(record, before.posterior, progress),
-        notes=(*_notes(record, inferred), *counted, *thin_air(site)),
+        notes=(*_notes(record, inferred), *unanswered(site, rules), *counted, *thin_air(site)),
     )
     model = replace(model, omission=_omission(record, model, progress))
     return _with_discrepancy(model.completed() if complete else model, record, log.days, population, progress)

@@ -16,7 +16,7 @@ import numpy as np
 from igrow.core.bundle import BUILT_IN
 from igrow.core.greenhouse import Season, generate_weather, recipe_by_hour, simulate_many
 from igrow.core.greenhouse.described import parameters_of
-from igrow.core.quantities import SETPOINTS
+from igrow.core.quantities import USUAL_SETPOINTS
 from igrow.core.simulator.crop import CropStages
 from igrow.core.simulator.hybrid.nominal import site_record
 from igrow.core.site import Site
@@ -66,13 +66,13 @@ def plain_recipe(start: np.datetime64, end: np.datetime64) -> Telemetry:
     """Return the recipe hour by hour."""
     hours = np.arange(start, end + np.timedelta64(1, "h"), np.timedelta64(1, "h"))
     rows = recipe_by_hour(start, len(hours))
-    return Telemetry(hours, {name: rows[:, column] for column, name in enumerate(SETPOINTS)})
+    return Telemetry(hours, {name: rows[:, column] for column, name in enumerate(USUAL_SETPOINTS)})
 
 
 def varied_recipe(start: np.datetime64, end: np.datetime64, random: np.random.Generator) -> Telemetry:
     """Return the recipe hour by hour with each day's levels shifted, so that the data hold what planning may try."""
     plain = plain_recipe(start, end)
-    hours, rows = plain.time, np.stack([plain[name] for name in SETPOINTS], axis=1)
+    hours, rows = plain.time, np.stack([plain[name] for name in USUAL_SETPOINTS], axis=1)
     day = ((hours - start) // np.timedelta64(1, "D")).astype(int)
     shift = random.normal(0.0, 1.5, day.max() + 1)[day]
     carbon = random.uniform(0.6, 1.25, day.max() + 1)[day]
@@ -80,7 +80,7 @@ def varied_recipe(start: np.datetime64, end: np.datetime64, random: np.random.Ge
     rows[:, 0] = np.clip(rows[:, 0] + shift, 12.0, 26.0)
     rows[:, 1] = np.clip(rows[:, 1] * carbon, 400.0, 1000.0)
     rows[:, 2] *= lamps
-    return Telemetry(hours, {name: rows[:, column] for column, name in enumerate(SETPOINTS)})
+    return Telemetry(hours, {name: rows[:, column] for column, name in enumerate(USUAL_SETPOINTS)})
 
 
 def default_model(site: Site, *, seed: int = 0, progress: Progress = silent) -> FittedModel:
@@ -96,14 +96,14 @@ def default_model(site: Site, *, seed: int = 0, progress: Progress = silent) -> 
     logs = [prepare_log(season.measured, site) for season in seasons]
     model = calibrate(logs[0], progress=progress)
     physical, alignment = model.posterior.values, model.alignment or 0.0
-    parts = [(record := log.record(alignment), setpoint_columns(log.telemetry, record)[0], None) for log in logs]
+    parts = [(record := log.record(alignment), setpoint_columns(log.telemetry, record, site)[0], None) for log in logs]
     growth, harvest = train_networks([season.true for season in seasons], seed=seed, progress=progress)
     records = [site_record(season.true, site, 300.0) for season in seasons]
     conversion, maintenance = fit_net_growth(records, physical, [season.true for season in seasons])
     progress(
         f"growth: {conversion:.3f} kg of dry matter per kg of CO2, {24e3 * maintenance:.2f} g m-2 a day for maintenance"
     )
-    columns = {name: np.concatenate([log.telemetry[name] for log in logs]) for name in (*RANGED, *SETPOINTS)}
+    columns = {name: np.concatenate([log.telemetry[name] for log in logs]) for name in (*RANGED, *USUAL_SETPOINTS)}
     return replace(
         model,
         # A virtual greenhouse, however well it was described: the real one is another, and so are its log and errors.

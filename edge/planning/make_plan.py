@@ -32,7 +32,7 @@ from igrow.core.planner.season.course import RADIATION
 from igrow.core.planner.season.strategy import UNITS
 from igrow.core.planner.template import for_site
 from igrow.core.planner.weather_ensemble import WeatherEnsemble
-from igrow.core.quantities import SETPOINTS
+from igrow.core.quantities import QUANTITIES, SETPOINTS
 from igrow.core.simulator.growth import GrowthBalance
 from igrow.core.simulator.outcome import Simulator
 from igrow.core.simulator.plan import BundleSimulator
@@ -81,7 +81,7 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
     expected = corrected if len(courses) == 1 else WeatherEnsemble(corrected, courses)
     worth = None if season is None else season.worth(site, state.time, state.initial, warmth(request.telemetry, start))
     recipe = hourly_recipe(site, request, hours)
-    template = for_site(site, state.time, hours, radiation=forecast[:, RADIATION])
+    template = for_site(site, state.time, hours, radiation=forecast[:, RADIATION], known=simulator.setpoints)
     # What the season asks of these days is the first candidate.
     seeds = [] if season is None or worth is None else [season.setpoints(template, forecast, recipe, state.time)]
     result = optimise(
@@ -208,8 +208,11 @@ def present(log: Telemetry, start: int) -> dict[str, float]:
 def recently(simulator: Simulator, balance: GrowthBalance | None, site: Site, log: Telemetry, start: int) -> Corrected:
     """Return the simulator corrected by how the last whole days of the log departed from what it says of them."""
     begin = np.datetime64(start, "s")
-    lacking = [name for name in SETPOINTS if name not in log]
-    log = log.with_columns({name: np.full(len(log), site.limits[name].safe) for name in lacking})
+    safe = {name: np.full(len(log), site.limits[name].safe) for name in SETPOINTS}
+    log = log.with_columns({name: held for name, held in safe.items() if name not in log})
+    # What a site took up lately its log of before does not hold.
+    lately = [name for name in SETPOINTS if QUANTITIES[name].optional]
+    log = log.with_columns({name: np.where(np.isfinite(log[name]), log[name], safe[name]) for name in lately})
     expected: dict[str, list[float]] = {name: [] for name in SCALED}
     used: dict[str, list[float]] = {name: [] for name in SCALED}
     warmth: list[tuple[float, float]] = []
@@ -244,7 +247,7 @@ def recently(simulator: Simulator, balance: GrowthBalance | None, site: Site, lo
 
 
 def hourly_recipe(site: Site, request: PlanRequest, hours: int) -> NDArray[np.float64]:
-    """Return the recipe (hours, 4) in the order of `SETPOINTS`; a setpoint that the site lacks stands at safe."""
+    """Return the recipe (hours, S) in the order of `SETPOINTS`; a setpoint that the site lacks stands at safe."""
     table = np.empty((hours, len(SETPOINTS)))
     for column, name in enumerate(SETPOINTS):
         course = request.recipe.get(name)

@@ -1,4 +1,4 @@
-"""The control that a greenhouse PLC does by itself, from four setpoints to actuators.
+"""The control that a greenhouse PLC does by itself, from setpoints to actuators.
 
 Heating: a pipe temperature from the difference to the setpoint (proportional and integral) and from the outdoor
 temperature, reached by a mixing valve. Ventilation: lee vents before wind vents, by a proportional band above
@@ -56,7 +56,7 @@ class ClimateComputer:
     ventilation_minimum: float = 0.0
     """Opening that the lee vents never go below, 0 to 1."""
     humidity_start: float = 86.0
-    """Relative humidity at which vents open for moisture, %."""
+    """Relative humidity at which vents open for moisture where no setpoint says it, %."""
     humidity_band: float = 12.0
     """Band over which they open to `humidity_opening`, %."""
     humidity_opening: float = 0.25
@@ -167,9 +167,9 @@ def control(
         settings: of the PLC.
         p: parameters of the greenhouse (capacities of its equipment).
         before: the PLC's memory.
-        setpoints: the four setpoints in the registry's units; a missing one is `SAFE_SETPOINTS`' value. An opening in
-            % under `vent_lee` or `vent_wind` takes the place of the PLC's own demand, within its limits of frost and
-            storm; NaN leaves it to the PLC.
+        setpoints: in the registry's units; a missing one is `SAFE_SETPOINTS`' value, of humidity `humidity_start`. An
+            opening in % under `vent_lee` or `vent_wind` takes the place of the PLC's own demand, within its limits of
+            frost and storm; NaN leaves it to the PLC.
         seen: the readings.
         seconds: until the next call.
     """
@@ -206,7 +206,8 @@ def control(
     # Ventilation
     band = s.ventilation_band + 0.25 * xp.maximum(15.0 - outdoor, 0.0)
     by_temperature = clip(xp, (air - setpoint - s.ventilation_offset) / band, 0.0, 2.0)
-    by_humidity = s.humidity_opening * clip(xp, (humidity - s.humidity_start) / s.humidity_band, 0.0, 1.0)
+    damp = humidity - setpoints.get("humidity_setpoint", s.humidity_start)
+    by_humidity = s.humidity_opening * clip(xp, damp / s.humidity_band, 0.0, 1.0)
     demand = xp.maximum(xp.maximum(by_temperature, by_humidity), s.ventilation_minimum)
     frost = ramp(xp, outdoor, s.frost_limit - 2.0, s.frost_limit)
     storm = ramp(xp, seen.wind_speed, s.wind_limit + 5.0, s.wind_limit)

@@ -5,8 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from igrow.core.arrays import Floats
+from igrow.core.greenhouse.climate_computer import ClimateComputer
 from igrow.core.quantities import SETPOINTS
 from igrow.core.sun import solar_hour
+
+HUMIDITY = ClimateComputer().humidity_start
+"""Humidity setpoint, %, where a table needs one: what these greenhouses do without."""
 
 
 def recipe(time: np.datetime64, longitude: float = 4.53) -> dict[str, float]:
@@ -33,6 +37,7 @@ def recipe(time: np.datetime64, longitude: float = 4.53) -> dict[str, float]:
 
 
 def recipe_by_hour(start: np.datetime64, hours: int, longitude: float = 4.53) -> Floats:
-    """Return the recipe at each hour from `start` (UTC) on, in the order of `SETPOINTS`, (hours, 4)."""
+    """Return the recipe at each hour from `start` (UTC) on, in the order of `SETPOINTS`, (hours, S)."""
     times = start + np.arange(hours) * np.timedelta64(3600, "s")
-    return np.array([[recipe(time, longitude)[name] for name in SETPOINTS] for time in times])
+    rows = [{"humidity_setpoint": HUMIDITY, **recipe(time, longitude)} for time in times]
+    return np.array([[row[name] for name in SETPOINTS] for row in rows])

@@ -19,7 +19,13 @@ from igrow.core.simulator.outcome import Simulator
 
 PARTS = ("income", "heat", "electricity", "co2")
 WORDS = {"income": "growth", "heat": "heat", "electricity": "electricity", "co2": "CO2"}
-SAME = {"heating_setpoint": 0.25, "co2_setpoint": 20.0, "lamp_on": 0.05, "irrigation_on": 0.05}
+SAME = {
+    "heating_setpoint": 0.25,
+    "co2_setpoint": 20.0,
+    "lamp_on": 0.05,
+    "irrigation_on": 0.05,
+    "humidity_setpoint": 0.75,
+}
 """A smaller difference from the recipe is none."""
 MOST = 8
 """Changes that are told of, those that matter most."""

@@ -57,7 +57,7 @@ class PlanResult:
     """The plan, and what is expected of it."""
 
     setpoints: Setpoints
-    """(H, 4), one row an hour, in the order of `quantities.SETPOINTS`."""
+    """(H, S), one row an hour, in the order of `quantities.SETPOINTS`."""
     time: Times
     """UTC starts of the hours, (H,)."""
     expected_profit: float
@@ -89,7 +89,7 @@ class PlanResult:
     objective: Objective
     """By which both were valued."""
     recipe: Setpoints
-    """The recipe within all limits, (H, 4)."""
+    """The recipe within all limits, (H, S)."""
     template: Template
     """By which candidates were decoded."""
     binding: tuple[Mapping[str, tuple[str, ...]], ...]
@@ -124,12 +124,12 @@ def optimise(
         site: limits, prices, planning.
         state: where the greenhouse stands.
         forecast: weather of the horizon, (H, 6), the hours' means in the registry's order.
-        recipe: the grower's setpoints over the horizon, (H, 4).
+        recipe: the grower's setpoints over the horizon, (H, S).
         rng: random numbers; the same generator state gives the same plan unless `budget.seconds` ends the search.
         budget: when to end.
         generation: the genetic algorithm, in numpy or from optimizer.onnx.
         template: genes to setpoints; that of `for_site` by default.
-        seeds: what is known to be good beside the recipe, (H, 4) each, such as what the season asks for. The search
+        seeds: what is known to be good beside the recipe, (H, S) each, such as what the season asks for. The search
             starts from what of them its genes can say, and each competes as it is.
         worth: what growth is worth to the crop; by default the average price of the days on which it ripens.
         monotonic: clock in seconds.
@@ -144,7 +144,9 @@ def optimise(
     budget = budget or Budget()
     run = generation or NumpyGeneration()
     time = state.time.astype("datetime64[s]") + np.arange(hours) * np.timedelta64(3600, "s")
-    template = template or for_site(site, state.time, hours, radiation=forecast[:, RADIATION])
+    template = template or for_site(
+        site, state.time, hours, radiation=forecast[:, RADIATION], known=simulator.setpoints
+    )
     objective = Objective(site, time, state.co2_before, worth)
     applied = np.array([state.applied.get(name, np.nan) for name in SETPOINTS])
     known = [template.follow(one[None], applied, state.memory) for one in (recipe, *seeds)]
@@ -219,7 +221,7 @@ def optimise(
 
 
 def _led_before(template: Template, site: Site, time: np.datetime64, forecast: Floats, recipe: Setpoints) -> Setpoints:
-    """Return the recipe (H, 4) from a time on within all limits, as if it had led the day before under the same sun."""
+    """Return the recipe (H, S) from a time on within all limits, as if it had led the day before under the same sun."""
     before = for_site(site, time - np.timedelta64(24, "h"), 24, radiation=forecast[:24, RADIATION])
     led = before.follow(recipe[None, :24], np.full(len(SETPOINTS), np.nan))
     setpoints: Setpoints = template.follow(recipe[None], led.setpoints[:, -1], led.memory).setpoints[0]

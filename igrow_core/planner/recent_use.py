@@ -137,6 +137,11 @@ class Corrected:
     warmer: float = 0.0
     """K by which the air is warmer; growth was counted at the simulator's own temperatures, and stays there."""
 
+    @property
+    def setpoints(self) -> tuple[str, ...]:
+        """Those of the simulator."""
+        return self.simulator.setpoints
+
     def simulate(self, initial: dict[str, float], weather: Floats, setpoints: Floats, start: np.datetime64) -> Outcome:
         """Return what candidates do; see `igrow.core.simulator.outcome.Simulator`."""
         outcome = self.simulator.simulate(initial, weather, setpoints, start)

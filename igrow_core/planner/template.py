@@ -11,7 +11,7 @@ candidate leaves them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,18 +20,18 @@ from numpy.typing import NDArray
 from igrow.core import agronomy
 from igrow.core.agronomy import Held, Memory, Moment, Place, SunToCome
 from igrow.core.local_time import to_local
-from igrow.core.quantities import SETPOINTS
+from igrow.core.quantities import SETPOINTS, USUAL_SETPOINTS
 from igrow.core.site import Site
 from igrow.core.sun import unix_seconds
 
 Setpoints = NDArray[np.float64]
-"""(..., H, 4) in the units of the registry, in its order."""
+"""(..., H, S) in the units of the registry, in its order."""
 
 BLOCK_STARTS = (0, 4, 7, 10, 13, 16, 19, 23)
 """Local hours at which a block begins."""
 BY_HOUR = ("lamp_on",)
 """Setpoints of which each hour is a block."""
-STEPS = {"heating_setpoint": 0.5, "co2_setpoint": 25.0, "lamp_on": 1.0, "irrigation_on": 0.05}
+STEPS = {"heating_setpoint": 0.5, "co2_setpoint": 25.0, "lamp_on": 1.0, "irrigation_on": 0.05, "humidity_setpoint": 1.0}
 """Setpoints are whole multiples of these: finer ones would not show in the greenhouse."""
 
 
@@ -40,7 +40,7 @@ class Course:
     """Setpoints that leave no limit, and what they leave to be counted."""
 
     setpoints: Setpoints
-    """(B, H, 4)."""
+    """(B, H, S)."""
     memory: Memory
     """At the end of the horizon."""
     held: tuple[Held, ...]
@@ -60,11 +60,11 @@ class Template:
     block: Mapping[str, NDArray[np.int64]]
     """By free setpoint: the block of each hour of the horizon, 0 and up, shape (H,)."""
     low: NDArray[np.float64]
-    """Smallest allowed value of each setpoint, shape (4,)."""
+    """Smallest allowed value of each setpoint, shape (S,)."""
     high: NDArray[np.float64]
-    """Largest allowed value of each setpoint, shape (4,)."""
+    """Largest allowed value of each setpoint, shape (S,)."""
     slew: NDArray[np.float64]
-    """Most change per hour of each setpoint, infinite without a limit, shape (4,)."""
+    """Most change per hour of each setpoint, infinite without a limit, shape (S,)."""
     place: Place
     """With the crop's limits."""
     moments: tuple[Moment, ...]
@@ -92,9 +92,9 @@ class Template:
         applied: NDArray[np.float64],
         memory: Memory | None = None,
     ) -> Setpoints:
-        """Return the setpoints (B, H, 4) of candidates (B, G).
+        """Return the setpoints (B, H, S) of candidates (B, G).
 
-        `recipe` (H, 4) gives the setpoints that are not free; `applied` and `memory` as in `follow`.
+        `recipe` (H, S) gives the setpoints that are not free; `applied` and `memory` as in `follow`.
         """
         return self.limit(self.wanted(genes, recipe), applied, memory)
 
@@ -112,7 +112,7 @@ class Template:
         return genes
 
     def wanted(self, genes: NDArray[np.float32], recipe: Setpoints) -> Setpoints:
-        """Return what candidates (B, G) ask for, (B, H, 4), before any limit."""
+        """Return what candidates (B, G) ask for, (B, H, S), before any limit."""
         setpoints = np.repeat(recipe[None], len(genes), axis=0)
         for name in self.free:
             column = SETPOINTS.index(name)
@@ -122,7 +122,7 @@ class Template:
         return setpoints
 
     def encode(self, setpoints: Setpoints) -> NDArray[np.float32]:
-        """Return the genes (G,) nearest to setpoints (H, 4): the mean over each block."""
+        """Return the genes (G,) nearest to setpoints (H, S): the mean over each block."""
         parts = []
         for name in self.free:
             column = SETPOINTS.index(name)
@@ -133,14 +133,14 @@ class Template:
         return np.concatenate(parts).astype(np.float32)
 
     def limit(self, setpoints: Setpoints, applied: NDArray[np.float64], memory: Memory | None = None) -> Setpoints:
-        """Return setpoints (..., H, 4) within all limits; see `follow`."""
+        """Return setpoints (..., H, S) within all limits; see `follow`."""
         batch = setpoints.reshape(-1, *setpoints.shape[-2:])
         return self.follow(batch, applied, memory).setpoints.reshape(setpoints.shape)
 
     def follow(self, setpoints: Setpoints, applied: NDArray[np.float64], memory: Memory | None = None) -> Course:
-        """Return setpoints (B, H, 4) within limits, slew and the crop's limits, as the guard would let them pass.
+        """Return setpoints (B, H, S) within limits, slew and the crop's limits, as the guard would let them pass.
 
-        `applied` (4,) or (B, 4) is what holds before the first hour (NaN where unknown), from which the slew limit
+        `applied` (S,) or (B, S) is what holds before the first hour (NaN where unknown), from which the slew limit
         counts; `memory` is what the crop has had until then. Without one the crop's past is not known.
         """
         limited = np.clip(setpoints, self.low, self.high)
@@ -164,19 +164,27 @@ class Template:
         return agronomy.sun_to_come(self.moments[hour], times, self.sunlight[ahead])
 
 
+def chosen_setpoints(site: Site, known: Collection[str]) -> tuple[str, ...]:
+    """Return the setpoints that plans of a site choose, of those that a simulator answers to (`known`)."""
+    named = (name for name in SETPOINTS if name in site.setpoints and name in site.planning.optimise)
+    return tuple(name for name in named if name in known)
+
+
 def for_site(
     site: Site,
     start: np.datetime64,
     hours: int,
     *,
     radiation: NDArray[np.float64] | None = None,
+    known: Collection[str] = USUAL_SETPOINTS,
 ) -> Template:
     """Return the template of a horizon of `hours` from `start` (UTC), in blocks or hours of the site's local day.
 
     Each local day has genes of its own but the last, which is like the one before it. A last day of its own, whose
     night is never seen to end, burns its lamps until the horizon does and lets the greenhouse cool down towards it:
     a gain that is not there, for which the days before are spoiled. `radiation` (H,) is the global radiation to be
-    expected, W m-2; without it the sun counts nothing in the crop's light.
+    expected, W m-2; without it the sun counts nothing in the crop's light. `known` are the setpoints that the simulator
+    answers to: genes of another one would move the plant for nothing.
     """
     time = start.astype("datetime64[s]") + np.arange(hours) * np.timedelta64(3600, "s")
     local = to_local(time, site.time_zone)
@@ -185,7 +193,7 @@ def for_site(
     hour = local.astype("datetime64[h]").astype(np.int64) % 24
     # Hours before the first block's start belong to the last block, which then runs over midnight.
     period = (np.searchsorted(np.array(BLOCK_STARTS), hour, side="right") - 1) % len(BLOCK_STARTS)
-    free = tuple(name for name in SETPOINTS if name in site.setpoints and name in site.planning.optimise)
+    free = chosen_setpoints(site, known)
     _, by_period = np.unique(pattern * len(BLOCK_STARTS) + period, return_inverse=True)
     _, by_hour = np.unique(pattern * 24 + hour, return_inverse=True)
     limits = [site.limits[name] for name in SETPOINTS]

@@ -19,6 +19,11 @@ class WeatherEnsemble:
     courses: Sequence[Floats]
     """Each (H, 6), hourly means."""
 
+    @property
+    def setpoints(self) -> tuple[str, ...]:
+        """Those of the simulator."""
+        return self.simulator.setpoints
+
     def simulate(self, initial: dict[str, float], weather: Floats, setpoints: Floats, start: np.datetime64) -> Outcome:
         """Return what candidates do; see `igrow.core.simulator.outcome.Simulator`.
 

@@ -3,9 +3,11 @@
 Parametric rules of Dutch climate computers (Bakker, Bot, Challa and van de Braak (1995), Greenhouse Climate
 Control, ch. 4): a pipe temperature from the shortage of heat and the weather, vents on a proportional band above
 the heating setpoint with an influence of humidity and a limit by wind, screens by radiation and outdoor
-temperature, lamps on request below a radiation limit, CO2 on a proportional band in the light. The rules are
-fitted to the log of the very greenhouse (`igrow.trainer.fit.actuation`), so they also stand for settings that
-no log holds. Pure, elementwise, traceable: numpy, torch and ONNX graphs run the same code.
+temperature, lamps on request below a radiation limit, CO2 on a proportional band in the light. A computer that
+takes a humidity setpoint opens the vents by the larger of what temperature and humidity ask; where that setpoint
+is not known, damp air starts the vents earlier instead. The rules are fitted to the log of the very greenhouse
+(`igrow.trainer.fit.actuation`), so they also stand for settings that no log holds. Pure, elementwise,
+traceable: numpy, torch and ONNX graphs run the same code.
 
 Positions follow their targets with a lag, so the stage has a memory: the positions themselves.
 """
@@ -19,6 +21,7 @@ from typing import Any
 
 from igrow.core.arrays import Array
 from igrow.core.effects.definition import Values
+from igrow.core.quantities import SETPOINTS, USUAL_SETPOINTS
 
 POSITIONS = (
     "rail_pipe_temperature",
@@ -67,6 +70,8 @@ def _vent(name: str, offset: float, band: float) -> tuple[Rule, ...]:
         Rule(f"{name}_band", "K", band, 0.3, 40.0, "from start to wide open in mild weather"),
         Rule(f"{name}_band_cold", "1", 0.2, 0.0, 3.0, "widening of the band for each kelvin below 20 degC outside"),
         Rule(f"{name}_humidity", "K per %", 0.1, 0.0, 2.0, "earlier start for each % of humidity above 80"),
+        Rule(f"{name}_humidity_opening", "1", 0.0, 0.0, 1.0, "largest opening for humidity above its setpoint"),
+        Rule(f"{name}_humidity_band", "%", 10.0, 1.0, 40.0, "from the humidity setpoint to that opening"),
         Rule(f"{name}_screened", "1", 0.3, 0.0, 1.5, "opening under a closed screen over that without"),
         Rule(f"{name}_wind_limit", "1", 0.0, 0.0, 0.2, "share of the opening lost for each m/s of wind above 6"),
         Rule(f"{name}_least", "%", 0.0, 0.0, 20.0, "opening that is never left"),
@@ -108,6 +113,21 @@ RULES: Mapping[str, Rule] = MappingProxyType({rule.name: rule for rule in _RULES
 """Every number of the actuation stage by its name."""
 
 
+VENTS: Mapping[str, str] = MappingProxyType({"vent_lee": "lee", "vent_wind": "windward"})
+"""Vents, and what the names of their rules begin with."""
+FOR_HUMIDITY = frozenset(f"{vent}_humidity_{part}" for vent in VENTS.values() for part in ("opening", "band"))
+"""Rules of computers that take a humidity setpoint."""
+
+
+def setpoints_of(rules: Mapping[str, float]) -> tuple[str, ...]:
+    """Return the setpoints that rules answer to, in the registry's order.
+
+    That of the humidity is one of them where a vent opens for it: the others are every computer's.
+    """
+    opens = any(rules.get(f"{vent}_humidity_opening", 0.0) > 0.0 for vent in VENTS.values())
+    return tuple(name for name in SETPOINTS if name in USUAL_SETPOINTS or opens)
+
+
 def default_rules() -> dict[str, float]:
     """Return the values of `RULES` by name."""
     return {name: rule.value for name, rule in RULES.items()}
@@ -127,7 +147,8 @@ def act(
 
     Args:
         xp: the array namespace.
-        setpoints: heating_setpoint (degC), co2_setpoint (ppm), lamp_on and irrigation_on (0 to 1).
+        setpoints: heating_setpoint (degC), co2_setpoint (ppm), lamp_on and irrigation_on (0 to 1), and, where it is
+            known, humidity_setpoint (%).
         weather: outdoor_temperature (degC), global_radiation (W m-2), wind_speed (m s-1).
         climate: air_temperature (degC), air_humidity (%), air_co2 (ppm), par (umol m-2 s-1) as measured now.
         memory: `POSITIONS` now.
@@ -145,7 +166,7 @@ def act(
         off = xp.where(aims[name] > temperature + 1.0, 0.0 * temperature, 1.0 + 0.0 * temperature)
         minutes = parameters["pipe_lag"] + off * (parameters["pipe_cooling"] - parameters["pipe_lag"])
         result[name] = _follow(xp, memory[name], aims[name], minutes, seconds)
-    for name in ("vent_lee", "vent_wind"):
+    for name in VENTS:
         result[name] = _follow(xp, memory[name], aims[name], parameters["vent_lag"], seconds)
     for name in ("energy_screen", "blackout_screen"):
         result[name] = _follow(xp, memory[name], aims[name], parameters["screen_lag"], seconds)
@@ -188,6 +209,9 @@ def targets(
         )
         above = -short - start + p[f"{name}_humidity"] * moist
         share = xp.minimum(xp.maximum(above / band, zero), one)
+        if "humidity_setpoint" in setpoints:
+            damp = (climate["air_humidity"] - setpoints["humidity_setpoint"]) / p[f"{name}_humidity_band"]
+            share = xp.maximum(share, p[f"{name}_humidity_opening"] * xp.minimum(xp.maximum(damp, zero), one))
         share = share * (1.0 + (p[f"{name}_screened"] - 1.0) * screened)
         windy = xp.maximum(1.0 - p[f"{name}_wind_limit"] * xp.maximum(weather["wind_speed"] - 6.0, zero), zero)
         return xp.minimum(xp.maximum(100.0 * share * windy, p[f"{name}_least"] + zero), 100.0 + zero)
@@ -208,8 +232,7 @@ def targets(
     return {
         "rail_pipe_temperature": pipe("rail"),
         "grow_pipe_temperature": pipe("grow"),
-        "vent_lee": vent("lee"),
-        "vent_wind": vent("windward"),
+        **{name: vent(prefix) for name, prefix in VENTS.items()},
         "energy_screen": screen("energy_screen"),
         "blackout_screen": screen("blackout_screen"),
         "lamp_power": p["lamp_capacity"] * lamp,

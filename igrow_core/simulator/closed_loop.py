@@ -8,7 +8,6 @@ import numpy as np
 
 from igrow.core.arrays import Array, Floats, Integers
 from igrow.core.effects.definition import Values
-from igrow.core.quantities import SETPOINTS
 from igrow.core.simulator import actuation
 from igrow.core.simulator.hybrid import climate, measurement
 from igrow.core.simulator.hybrid.climate import ActiveEffects
@@ -54,7 +53,7 @@ def closed_run(
     for k in range(steps):
         row = begin + k
         inputs: dict[str, Array] = {name: values[row] for name, values in record.inputs.items()}
-        asked = {name: setpoints[name][row] for name in SETPOINTS}
+        asked = {name: values[row] for name, values in setpoints.items()}
         fluxes = {channel: flux[row] if flux.ndim == 1 else flux[k] for channel, flux in (added or {}).items()}
         drivers: Mapping[str, Array] = {}
         for _ in range(substeps):

@@ -50,12 +50,16 @@ class Outcome:
 class Simulator(Protocol):
     """Anything that says what setpoints do: a bundle's graph, a model in numpy, the mechanistic greenhouse."""
 
+    @property
+    def setpoints(self) -> tuple[str, ...]:
+        """Setpoints that do anything in it, in the registry's order; plans choose no other."""
+
     def simulate(self, initial: dict[str, float], weather: Floats, setpoints: Floats, start: np.datetime64) -> Outcome:
         """Return what candidates do.
 
         Args:
             initial: present value of quantities (climate, growth, yield, actuators), in the registry's units.
             weather: (H, 6), the hours' means of `quantities.WEATHER`'s first six, in its order.
-            setpoints: (B, H, 4), in the order of `quantities.SETPOINTS`.
+            setpoints: (B, H, S), in the order of `quantities.SETPOINTS`.
             start: UTC time at which the first hour begins.
         """

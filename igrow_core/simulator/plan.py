@@ -10,7 +10,7 @@ from igrow.core import sun
 from igrow.core.arrays import Floats, Times
 from igrow.core.bundle import Bundle, BundleError, open_session
 from igrow.core.errors import IgrowError
-from igrow.core.quantities import GROWTH, WEATHER
+from igrow.core.quantities import GROWTH, SETPOINTS, WEATHER
 from igrow.core.simulator.growth import GrowthBalance
 from igrow.core.simulator.hindcast import SimulatorSettings
 from igrow.core.simulator.hybrid.measurement import PREDICTED
@@ -63,11 +63,14 @@ class BundleSimulator:
         try:
             tensors = {one.name: one.quantities for one in bundle.manifest.graphs["simulator"].inputs}
             self._weather = tensors["weather"]
+            self.setpoints = tensors["setpoints"]
+            """That the graph takes; a bundle of before one was known goes on without it."""
+            self._asked = [SETPOINTS.index(name) for name in self.setpoints]
             names = tensors["parameters"]
             mean = np.array([self.settings.parameters[name] for name in names])
             draws = [[draw[name] for name in names if name in draw] for draw in bundle.manifest.simulator["members"]]
             varied = [name for name in names if draws and name in bundle.manifest.simulator["members"][0]]
-        except (KeyError, TypeError) as error:
+        except (KeyError, TypeError, ValueError) as error:
             raise BundleError(f"{bundle.folder}: manifest.json: {error} is missing or not usable") from None
         self._parameters = np.tile(mean, (1 + len(draws), 1))
         columns = [names.index(name) for name in varied]
@@ -103,7 +106,7 @@ class BundleSimulator:
             "weather": self._columns(weather)[:, :, None],
             "clock": self._clock(time)[:, :, None],
             "day": self.settings.day(time)[:, None],
-            "setpoints": np.tile(np.moveaxis(setpoints, 0, -1), (1, 1, members)),
+            "setpoints": np.tile(np.moveaxis(setpoints[..., self._asked], 0, -1), (1, 1, members)),
             "parameters": np.repeat(self._parameters.T, candidates, axis=1),
         }
         names = ["climate_out", "resources", "growth_out", "harvest_out", "outside"]

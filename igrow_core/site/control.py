@@ -42,7 +42,7 @@ def _limits(low: float, high: float, safe: float, slew: float | None, dead_band:
 
 @dataclass(frozen=True)
 class Limits:
-    """The limits of the four setpoints."""
+    """The limits of the setpoints."""
 
     heating_setpoint: SetpointLimits = setting(
         help="degC", default_factory=lambda: _limits(12.0, 28.0, 18.0, 4.0, 0.1, 5)
@@ -53,6 +53,11 @@ class Limits:
     lamp_on: SetpointLimits = setting(help="fraction", default_factory=lambda: _limits(0.0, 1.0, 0.0, None, 0.05, 30))
     irrigation_on: SetpointLimits = setting(
         help="fraction", default_factory=lambda: _limits(0.0, 1.0, 0.1, None, 0.02, 5)
+    )
+    # Grey mould (Botrytis) needs leaves that stay wet, or air above some 93 %: from 90 % the vents have to work. Below
+    # 70 % they would blow out most of what a crop transpires, and the heat with it.
+    humidity_setpoint: SetpointLimits = setting(
+        help="%, of a PLC that takes one", default_factory=lambda: _limits(70.0, 90.0, 85.0, 10.0, 0.5, 5)
     )
 
     def __post_init__(self) -> None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from igrow.core.errors import IgrowError
 from igrow.core.language.units import Units
 from igrow.core.local_time import zone
-from igrow.core.quantities import ACTUATORS, CLIMATE, SETPOINTS, WEATHER
+from igrow.core.quantities import ACTUATORS, CLIMATE, SETPOINTS, USUAL_SETPOINTS, WEATHER
 from igrow.core.site.control import Limits, Planning
 from igrow.core.site.crop import Crop
 from igrow.core.site.equipment import Greenhouse, Sensor, default_sensors
@@ -37,7 +37,7 @@ class Site:
         default_factory=default_sensors,
     )
     actuators: tuple[str, ...] = setting(help="actuators whose state the PLC reports", default=ACTUATORS)
-    setpoints: tuple[str, ...] = setting(help="setpoints that the PLC takes", default=SETPOINTS)
+    setpoints: tuple[str, ...] = setting(help="setpoints that the PLC takes", default=USUAL_SETPOINTS)
     crop: Crop = setting(help="crop", default_factory=Crop)
     prices: Prices = setting(help="prices", default_factory=Prices)
     limits: Limits = setting(help="limits of the setpoints", default_factory=Limits)

@@ -15,7 +15,7 @@ from igrow.core.quantities import SETPOINTS
 from igrow.core.site import Agronomy, Band, Rest, Site
 from igrow.core.telemetry import Telemetry
 
-UNKNOWN = np.full(4, np.nan)
+UNKNOWN = np.full(len(SETPOINTS), np.nan)
 ZONES = ("Europe/Amsterdam", "UTC", "Asia/Kolkata", "America/New_York", "Australia/Adelaide", "Asia/Kathmandu")
 
 
@@ -47,9 +47,9 @@ def some_site(rng: np.random.Generator) -> Site:
 
 
 def some_wish(rng: np.random.Generator, hours: int, count: int = 4) -> np.ndarray:
-    """Return wild setpoints (count, hours, 4)."""
+    """Return wild setpoints (count, hours, S)."""
     block = int(rng.integers(1, 7))
-    coarse = rng.random((count, -(-hours // block), 4))
+    coarse = rng.random((count, -(-hours // block), len(SETPOINTS)))
     wish = np.repeat(coarse, block, axis=1)[:, :hours]
     wish[..., 0] = 10 + 20 * wish[..., 0]
     wish[..., 1] = 300 + 1200 * wish[..., 1]
@@ -83,7 +83,9 @@ def test_what_leaves_no_limit_passes_unchanged() -> None:
     start, hours = np.datetime64("2020-01-31T23:00:00"), 48
     hour = np.arange(hours) % 24
     day = (hour >= 9) & (hour < 16)
-    wish = np.column_stack([np.where(day, 19.5, 18.0), np.full(hours, 800.0), 1.0 * (hour < 16), 0.5 + 0.0 * hour])
+    wish = np.column_stack(
+        [np.where(day, 19.5, 18.0), np.full(hours, 800.0), 1.0 * (hour < 16), 0.5 + 0.0 * hour, 80.0 + 0.0 * hour]
+    )
     template = for_site(site, start, hours)
     assert left(site, start, wish, np.zeros(hours)) == []
     evening = Memory(night=template.moments[0].night, dark=6.0, darkest=6.0)
@@ -103,7 +105,7 @@ def test_the_limit_that_binds_is_named(column: int, value: float, limit: str) ->
     site = Site("named", 52.0, 4.5, "Europe/Amsterdam")
     site = replace(site, crop=replace(site.crop, agronomy=replace(site.crop.agronomy, co2_with_people=700.0)))
     start, hours = np.datetime64("2020-01-31T23:00:00"), 48
-    wish = np.tile([18.5, 600.0, 0.0, 0.5], (1, hours, 1))
+    wish = np.tile([18.5, 600.0, 0.0, 0.5, 80.0], (1, hours, 1))
     wish[..., column] = value
     course = for_site(site, start, hours).follow(wish, UNKNOWN)
     named = {name for one in course.binding() for name in one.get(SETPOINTS[column], ())}
@@ -139,7 +141,7 @@ def test_history_counts_dark_hours_that_were_given() -> None:
     site = Site("past", 52.0, 4.5, "Europe/Amsterdam")
     start = np.datetime64("2020-02-01T00:00:00")
     times = start - np.arange(12, 0, -1) * np.timedelta64(1, "h")
-    wish = np.tile([18.5, 600.0, 1.0, 0.5], (1, 24, 1))
+    wish = np.tile([18.5, 600.0, 1.0, 0.5, 80.0], (1, 24, 1))
     lamps = {}
     for name, lit in (("dark", 0.0), ("lit", 1.0)):
         columns = {"lamp_on": np.full(12, lit), "heating_setpoint": np.full(12, 18.5)}

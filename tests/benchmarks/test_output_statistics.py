@@ -21,7 +21,7 @@ DAY = 288
 def house() -> tuple[Record, dict[str, np.ndarray]]:
     log = virtual_log(16, seed=11)
     record = site_record(log, SITE, 300.0)
-    return record, setpoint_columns(log, record)[0]
+    return record, setpoint_columns(log, record, SITE)[0]
 
 
 def too_cold_in_the_sun(record: Record):

@@ -11,6 +11,7 @@ from benchmarks.season_houses import BEFORE, DAY, START
 from benchmarks.seasons import described
 from benchmarks.simulated_houses import SimulatedHouses
 from igrow.core.greenhouse import recipe_by_hour
+from igrow.core.quantities import SETPOINTS
 from igrow.core.sun import unix_seconds
 from tests import needs
 
@@ -63,7 +64,7 @@ def test_a_simulated_house_goes_on_where_it_ended_and_its_crop_is_picked() -> No
 def test_what_growers_had_covers_the_season_and_the_champion_heats_less() -> None:
     folder = needs.data_sets() / "agc2019"
     theirs, his = growers(folder), champion(folder)
-    assert theirs.shape == his.shape == (DAYS, 24, 4)
+    assert theirs.shape == his.shape == (DAYS, 24, len(SETPOINTS))
     assert set(np.unique(theirs[:, :, LAMPS])) == {0.0, 1.0}
     shift = (his - theirs)[:, :, HEATING]
     assert (shift == shift[:, :1]).all()

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from igrow.core.errors import IgrowError
-from igrow.core.quantities import QUANTITIES, SETPOINTS
+from igrow.core.quantities import QUANTITIES, SETPOINTS, USUAL_SETPOINTS
 from igrow.core.site import Screen, Site, load_site
 from igrow.core.yaml_schema import SchemaError, parse
 from tests.core.yaml_template import dump
@@ -89,3 +89,12 @@ def test_a_site_that_is_written_is_read_back(
 def test_a_site_can_be_sent_to_another_process() -> None:
     site = load_site(CONFIG)
     assert pickle.loads(pickle.dumps(site)) == site
+
+
+def test_a_humidity_setpoint_is_there_for_sites_that_name_it_alone() -> None:
+    four = ("heating_setpoint", "co2_setpoint", "lamp_on", "irrigation_on")
+    assert parse(SHORT, Site).setpoints == USUAL_SETPOINTS == four
+    site = parse(f"{SHORT}setpoints: [heating_setpoint, humidity_setpoint]", Site)
+    assert site.setpoints == ("heating_setpoint", "humidity_setpoint")
+    with pytest.raises(IgrowError, match=r"humidity_setpoint\.high is 101: 50 to 100 % makes sense"):
+        parse(f"{SHORT}limits: {{humidity_setpoint: {{high: 101}}}}", Site)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,11 +11,14 @@ import pytest
 from benchmarks.forecasts.forecaster import fit_forecaster
 from benchmarks.forecasts.totals import daily_totals
 from igrow.core.arrays import Array
+from igrow.core.greenhouse import GreenhouseParameters, generate_weather, recipe, simulate
+from igrow.core.greenhouse.climate_computer import ClimateComputer
+from igrow.core.quantities import SETPOINTS, USUAL_SETPOINTS
 from igrow.core.simulator import actuation
 from igrow.core.simulator.hybrid.nominal import nominal, site_record
 from igrow.core.telemetry import Telemetry, concatenate
 from igrow.trainer.data import prepare_log
-from igrow.trainer.fit.actuation import by_its_own_rules, fit_actuation, setpoint_columns
+from igrow.trainer.fit.actuation import by_its_own_rules, fit_actuation, setpoint_columns, unanswered
 from igrow.trainer.fit.climate import site_prior
 from tests.virtual_log import SITE, virtual_log
 
@@ -22,7 +26,7 @@ from tests.virtual_log import SITE, virtual_log
 def test_rules_fitted_to_a_log_do_what_its_computer_did() -> None:
     log = virtual_log(10, seed=8)
     record = site_record(log, SITE, 300.0)
-    setpoints, inferred = setpoint_columns(log, record)
+    setpoints, inferred = setpoint_columns(log, record, SITE)
     assert inferred == ()
     rules = fit_actuation([(record, setpoints, None)], nominal(SITE))
     usual = actuation.default_rules()
@@ -37,7 +41,7 @@ def test_rules_fitted_to_a_log_do_what_its_computer_did() -> None:
 def test_what_a_separating_test_asked_of_the_vents_is_no_rule_of_the_plc() -> None:
     log = virtual_log(10, seed=8)
     record = site_record(log, SITE, 300.0)
-    setpoints, _ = setpoint_columns(log, record)
+    setpoints, _ = setpoint_columns(log, record, SITE)
     wanted = fit_actuation([(record, setpoints, None)], nominal(SITE))
     night = log["global_radiation"] <= 0.0
     tested = log.with_columns({"vent_lee": np.where(night, 60.0, log["vent_lee"])})
@@ -65,7 +69,7 @@ def test_the_radiation_above_which_lamps_stay_dark_is_read_off_the_log(
     assert limit > 1000.0 or (power == 0.0).sum() > 50
     lit = log.with_columns({"lamp_on": asked, "lamp_power": power})
     record = site_record(lit, SITE, 300.0)
-    rules = fit_actuation([(record, setpoint_columns(lit, record)[0], None)], nominal(SITE))
+    rules = fit_actuation([(record, setpoint_columns(lit, record, SITE)[0], None)], nominal(SITE))
     assert rules["lamp_capacity"] == 80.0
     assert found[0] <= rules["lamp_radiation"] <= found[1]
 
@@ -74,7 +78,7 @@ def test_a_log_without_setpoints_has_them_inferred_and_says_which() -> None:
     log = virtual_log(4, seed=9)
     bare = log.only([name for name in log.columns if name not in {"heating_setpoint", "co2_setpoint"}])
     record = site_record(bare, SITE, 300.0)
-    setpoints, inferred = setpoint_columns(bare, record)
+    setpoints, inferred = setpoint_columns(bare, record, SITE)
     assert inferred == ("heating_setpoint", "co2_setpoint")
     assert np.isfinite(setpoints["heating_setpoint"]).all()
 
@@ -83,7 +87,7 @@ def test_a_log_without_setpoints_has_them_inferred_and_says_which() -> None:
 def test_daily_totals_of_heat_and_co2_follow_from_setpoints() -> None:
     log = virtual_log(14, seed=10)
     record = site_record(log, SITE, 300.0)
-    setpoints, _ = setpoint_columns(log, record)
+    setpoints, _ = setpoint_columns(log, record, SITE)
     day = np.arange(len(record)) // 288
     model = fit_forecaster([(record, setpoints, day < 8, (day >= 8) & (day < 10))], site_prior(SITE), {})
     totals = daily_totals(record, setpoints, model, day >= 10)
@@ -96,6 +100,58 @@ def test_a_gap_that_is_longer_than_the_log_hides_no_setpoints() -> None:
     table = virtual_log(8, seed=1)
     late = Telemetry(table.time + np.timedelta64(20, "D"), table.columns)
     log = prepare_log(concatenate([table, late]), SITE)
-    setpoints, inferred = setpoint_columns(log.telemetry, log.record())
+    setpoints, inferred = setpoint_columns(log.telemetry, log.record(), SITE)
     assert inferred == ()
     assert np.isin(setpoints["heating_setpoint"][:600], (17.0, 20.0)).mean() > 0.9
+
+
+DAMP_SITE = replace(SITE, setpoints=SETPOINTS)
+
+
+@pytest.fixture(scope="module")
+def moved() -> Telemetry:
+    """The log of a mechanistic greenhouse whose humidity setpoint is moved every six hours."""
+    start, end = np.datetime64("2020-02-20T00:00:00"), np.datetime64("2020-03-01T00:00:00")
+    levels = np.random.default_rng(4).uniform(70.0, 90.0, 41)
+
+    def schedule(time: np.datetime64) -> dict[str, float]:
+        return {**recipe(time), "humidity_setpoint": float(levels[int((time - start) / np.timedelta64(6, "h"))])}
+
+    weather = generate_weather(start, end, seed=3)
+    return simulate(GreenhouseParameters(), weather, schedule, start, end, seed=2).measured
+
+
+def test_how_vents_answer_to_a_humidity_setpoint_is_read_off_the_plants_log(moved: Telemetry) -> None:
+    record = site_record(moved, DAMP_SITE, 300.0)
+    setpoints, inferred = setpoint_columns(moved, record, DAMP_SITE)
+    assert (set(setpoints), inferred) == (set(SETPOINTS), ())
+    rules, computer = fit_actuation([(record, setpoints, None)], nominal(DAMP_SITE)), ClimateComputer()
+    assert rules["lee_humidity"] == 0.0
+    assert rules["lee_humidity_opening"] == pytest.approx(computer.humidity_opening, abs=0.04)
+    assert rules["lee_humidity_band"] == pytest.approx(computer.humidity_band, abs=2.5)
+    assert unanswered(DAMP_SITE, rules) == ()
+    # The windward vents open for heat alone.
+    assert rules["windward_humidity_opening"] == 0.0
+    assert actuation.setpoints_of(rules) == SETPOINTS
+
+
+def test_a_site_that_does_not_name_the_humidity_setpoint_is_fitted_as_if_its_log_had_none(moved: Telemetry) -> None:
+    fitted = []
+    for log in (moved, moved.only(name for name in moved.columns if name != "humidity_setpoint")):
+        record = site_record(log, SITE, 300.0)
+        setpoints, inferred = setpoint_columns(log, record, SITE)
+        assert (set(setpoints), inferred) == (set(USUAL_SETPOINTS), ())
+        fitted.append(fit_actuation([(record, setpoints, None)], nominal(SITE)))
+    assert fitted[0] == fitted[1]
+    assert actuation.setpoints_of(fitted[0]) == USUAL_SETPOINTS
+    assert fitted[0]["lee_humidity"] > 0.0
+
+
+def test_a_log_without_the_humidity_setpoint_that_a_site_names_has_none_inferred() -> None:
+    log = virtual_log(8, seed=1)
+    record = site_record(log, DAMP_SITE, 300.0)
+    setpoints, inferred = setpoint_columns(log, record, DAMP_SITE)
+    assert (set(setpoints), inferred) == (set(USUAL_SETPOINTS), ())
+    (note,) = unanswered(DAMP_SITE, actuation.default_rules())
+    assert note == "in this log nothing answers to humidity_setpoint: plans leave it to the recipe"
+    assert unanswered(SITE, actuation.default_rules()) == ()

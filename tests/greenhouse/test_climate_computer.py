@@ -114,3 +114,11 @@ def test_irrigation_comes_in_pulses_by_radiation_and_only_when_permitted() -> No
 def test_the_realised_heating_setpoint_ramps() -> None:
     state = settle(MILD, minutes=10, heating_setpoint=25.0)
     assert state.heating_setpoint == pytest.approx(17.0 + ClimateComputer().heating_ramp / 6.0)
+
+
+def test_a_humidity_setpoint_takes_the_place_of_the_computers_own() -> None:
+    computer, moist = ClimateComputer(), MILD._replace(air_humidity=92.0)
+    own = settle(moist).vent_lee
+    assert settle(moist, humidity_setpoint=computer.humidity_start).vent_lee == own
+    assert settle(moist, humidity_setpoint=92.0).vent_lee == 0.0
+    assert settle(moist, humidity_setpoint=80.0).vent_lee == pytest.approx(computer.humidity_opening)

@@ -27,10 +27,11 @@ def weather() -> np.ndarray:
 
 @pytest.fixture
 def recipe() -> np.ndarray:
-    """A grower's two days, (48, 4)."""
+    """A grower's two days, (48, S)."""
     hour = np.arange(HOURS) % 24
     day = (hour >= 7) & (hour < 19)
-    return np.column_stack([np.where(day, 20.0, 17.0), np.where(day, 600.0, 400.0), 1.0 * day, 0.5 * day])
+    rows = [np.where(day, 20.0, 17.0), np.where(day, 600.0, 400.0), 1.0 * day, 0.5 * day, np.full(HOURS, 85.0)]
+    return np.column_stack(rows)
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from igrow.core.errors import IgrowError
 from igrow.core.planner import Budget, NumpyGeneration, Objective, PlanningState, PlanResult, optimise
 from igrow.core.planner.onnx_generation import OnnxGeneration
 from igrow.core.planner.template import for_site
-from igrow.core.quantities import SETPOINTS
+from igrow.core.quantities import SETPOINTS, USUAL_SETPOINTS
 from igrow.core.simulator.outcome import Simulator
 from igrow.core.site import Site
 from tests.planner.toy_greenhouse import HOURS, START, ToySimulator, with_planning
@@ -31,7 +31,7 @@ def test_a_plan_earns_more_than_the_recipe(site, state, weather, recipe) -> None
     assert result.expected_profit > result.recipe_profit + 0.005
     assert not result.follows_recipe
     assert (np.diff(result.history) >= 0).all()
-    assert result.setpoints.shape == (HOURS, 4)
+    assert result.setpoints.shape == (HOURS, len(SETPOINTS))
     assert result.expected_profit == pytest.approx(float(result.valuation.profit[0, 0]))
 
 
@@ -47,7 +47,7 @@ def test_the_search_comes_near_the_best_that_a_full_search_of_one_setpoint_finds
     for hour in hours:
         trials = np.repeat(chosen[None], 2, axis=0)
         trials[:, hour, 2] = [0.0, 1.0]
-        trials = template.limit(trials, np.full(4, np.nan))
+        trials = template.limit(trials, np.full(len(SETPOINTS), np.nan))
         score = objective.value(ToySimulator().simulate({}, weather, trials, START)).score[0]
         chosen = trials[int(np.argmax(score))]
         best = score.max()
@@ -90,7 +90,7 @@ def test_a_recipe_is_not_charged_for_the_evening_of_the_plan_before(site, state,
     before = for_site(site, START - np.timedelta64(24, "h"), 24)
 
     def after(led: np.ndarray) -> PlanResult:
-        memory = before.follow(led[None, :24], np.full(4, np.nan)).memory
+        memory = before.follow(led[None, :24], np.full(len(SETPOINTS), np.nan)).memory
         found: PlanResult = plan(ToySimulator(), site, replace(state, memory=memory), weather, morning)
         return found
 
@@ -103,7 +103,7 @@ def test_a_recipe_is_not_charged_for_the_evening_of_the_plan_before(site, state,
 
 
 def test_doubt_about_the_lamps_keeps_a_cautious_planner_from_them(site, state, weather, recipe) -> None:
-    dark = recipe * np.array([1.0, 1.0, 0.0, 1.0])
+    dark = recipe * np.array([1.0, 1.0, 0.0, 1.0, 1.0])
     doubtful = ToySimulator(members=(0.2, 0.6, 1.4, 1.8))
     hours = [
         plan(doubtful, with_planning(site, caution=caution), state, weather, dark).setpoints[:, 2].sum()
@@ -113,7 +113,7 @@ def test_doubt_about_the_lamps_keeps_a_cautious_planner_from_them(site, state, w
 
 
 def test_leaving_the_range_of_the_data_costs_and_is_flagged(site, state, weather, recipe) -> None:
-    dark = recipe * np.array([1.0, 1.0, 0.0, 1.0])
+    dark = recipe * np.array([1.0, 1.0, 0.0, 1.0, 1.0])
     free = plan(ToySimulator(), site, state, weather, dark)
     bound = plan(ToySimulator(known_lamp_hours=6.0), site, state, weather, dark)
     assert not free.leaves_range
@@ -174,3 +174,32 @@ def test_a_forecast_with_a_gap_is_refused(site, state, weather, recipe) -> None:
     weather[3, 0] = np.nan
     with pytest.raises(IgrowError, match="the forecast must have shape"):
         plan(ToySimulator(), site, state, weather, recipe)
+
+
+def damp_site(site: Site) -> Site:
+    """The site with a humidity setpoint that plans may choose; its air may be damp for twelve hours a day."""
+    named = with_planning(site, optimise=(*site.planning.optimise, "humidity_setpoint"))
+    return replace(named, setpoints=SETPOINTS, crop=replace(site.crop, humidity_high=82.0))
+
+
+@pytest.mark.parametrize(("named", "known"), [(False, True), (True, False)])
+def test_a_humidity_setpoint_that_site_or_simulator_lacks_stays_the_recipes(
+    site, state, weather, recipe, named: bool, known: bool
+) -> None:
+    simulator = ToySimulator(setpoints=SETPOINTS if known else USUAL_SETPOINTS)
+    one = damp_site(site) if named else with_planning(site, optimise=(*site.planning.optimise, "humidity_setpoint"))
+    result = plan(simulator, one, state, weather, recipe)
+    assert "humidity_setpoint" not in result.template.free
+    assert (result.setpoints[:, SETPOINTS.index("humidity_setpoint")] == 85.0).all()
+
+
+def test_the_search_lets_the_air_be_as_damp_as_pays_and_not_beyond_the_crops_damp_hours(site, state, weather) -> None:
+    """The toy's air is as damp as its setpoint, and each per cent drier costs heat."""
+    hour = np.arange(HOURS) % 24
+    dry = np.column_stack([np.full(HOURS, one) for one in (19.0, 600.0, 0.0, 0.5, 78.0)])
+    dry[:, SETPOINTS.index("lamp_on")] = (hour >= 7) & (hour < 19)
+    result = plan(ToySimulator(setpoints=SETPOINTS), damp_site(site), state, weather, dry)
+    asked = result.setpoints[:, SETPOINTS.index("humidity_setpoint")]
+    assert asked.mean() > 80.0
+    for day in (asked[:24], asked[24:]):
+        assert 0 < (day > 82.0).sum() <= site.crop.agronomy.damp_hours

@@ -11,7 +11,7 @@ import pytest
 from benchmarks.onnx_policy import OnnxPolicy
 from igrow.core.errors import IgrowError
 from igrow.core.quantities import SETPOINTS
-from igrow.trainer.research.policies.policy import ACTIONS, OBSERVATIONS, chosen, observe, to_setpoints
+from igrow.trainer.research.policies.policy import ACTIONS, OBSERVATIONS, PAPER_SETPOINTS, chosen, observe, to_setpoints
 from tests.planner.toy_greenhouse import START
 
 
@@ -34,7 +34,7 @@ def test_every_action_is_within_the_limits(site) -> None:
     actions = np.random.default_rng(0).uniform(-2, 2, (50, ACTIONS)).astype(np.float32)
     setpoints = to_setpoints(site, actions)
     assert setpoints.shape == (50, 24, 4)
-    for column, name in enumerate(SETPOINTS):
+    for column, name in enumerate(PAPER_SETPOINTS):
         limits = site.limits[name]
         assert setpoints[..., column].min() == pytest.approx(limits.low)
         assert setpoints[..., column].max() == pytest.approx(limits.high)
@@ -42,7 +42,7 @@ def test_every_action_is_within_the_limits(site) -> None:
 
 def test_lamps_are_on_or_off(site) -> None:
     actions = np.random.default_rng(0).uniform(-1, 1, (5, ACTIONS)).astype(np.float32)
-    assert set(np.unique(to_setpoints(site, actions)[..., SETPOINTS.index("lamp_on")])) == {0.0, 1.0}
+    assert set(np.unique(to_setpoints(site, actions)[..., PAPER_SETPOINTS.index("lamp_on")])) == {0.0, 1.0}
 
 
 def test_what_plans_do_not_choose_is_the_recipes(site, recipe) -> None:
@@ -50,7 +50,8 @@ def test_what_plans_do_not_choose_is_the_recipes(site, recipe) -> None:
     setpoints = to_setpoints(site, np.zeros((2, ACTIONS), dtype=np.float32))
     followed = chosen(free, setpoints, recipe[:24])
     for column, name in enumerate(SETPOINTS):
-        expected = setpoints[..., column] if name in free.planning.optimise else recipe[None, :24, column]
+        chosen_here = name in PAPER_SETPOINTS and name in free.planning.optimise
+        expected = setpoints[..., PAPER_SETPOINTS.index(name)] if chosen_here else recipe[None, :24, column]
         np.testing.assert_array_equal(followed[..., column], np.broadcast_to(expected, (2, 24)))
 
 

@@ -13,7 +13,7 @@ from igrow.core.site import Site
 
 SITE = Site("toy", 52.0, 4.5, "Europe/Amsterdam")
 MIDNIGHT = np.datetime64("2020-02-01T23:00:00", "s")
-UNKNOWN = np.full(4, np.nan)
+UNKNOWN = np.full(len(SETPOINTS), np.nan)
 
 
 def test_a_block_holds_from_its_local_hour_to_the_next_and_the_last_day_is_like_the_one_before() -> None:
@@ -46,10 +46,10 @@ def test_every_candidate_stays_within_limits_and_slew(seed: int, hour: int, hour
     rng = np.random.default_rng(seed)
     template = for_site(SITE, MIDNIGHT + np.timedelta64(hour, "h"), hours)
     genes = rng.random((5, template.genes), dtype=np.float32)
-    recipe = rng.uniform(-50, 2000, size=(hours, 4))
-    applied = np.array([19.0, 500.0, 0.0, 0.2])
+    recipe = rng.uniform(-50, 2000, size=(hours, len(SETPOINTS)))
+    applied = np.array([19.0, 500.0, 0.0, 0.2, 85.0])
     setpoints = template.decode(genes, recipe, applied)
-    assert setpoints.shape == (5, hours, 4)
+    assert setpoints.shape == (5, hours, len(SETPOINTS))
     for column, name in enumerate(SETPOINTS):
         limits = SITE.limits[name]
         assert setpoints[..., column].min() >= limits.low
@@ -61,7 +61,8 @@ def test_every_candidate_stays_within_limits_and_slew(seed: int, hour: int, hour
 
 def test_what_is_not_free_follows_the_recipe() -> None:
     template = for_site(SITE, MIDNIGHT, 24)
-    recipe = np.column_stack([np.full(24, 20.0), np.full(24, 500.0), np.zeros(24), np.linspace(0, 0.5, 24)])
+    columns = [np.full(24, 20.0), np.full(24, 500.0), np.zeros(24), np.linspace(0, 0.5, 24), np.full(24, 85.0)]
+    recipe = np.column_stack(columns)
     setpoints = template.decode(np.ones((1, template.genes), dtype=np.float32), recipe, UNKNOWN)
     assert "irrigation_on" not in template.free
     np.testing.assert_array_equal(setpoints[0, :, 3], recipe[:, 3])
@@ -70,7 +71,7 @@ def test_what_is_not_free_follows_the_recipe() -> None:
 def test_a_schedule_in_blocks_survives_encoding() -> None:
     template = for_site(SITE, MIDNIGHT, 48)
     genes = np.random.default_rng(0).random((1, template.genes), dtype=np.float32)
-    recipe = np.tile([18.0, 400.0, 0.0, 0.1], (48, 1))
+    recipe = np.tile([18.0, 400.0, 0.0, 0.1, 85.0], (48, 1))
     first = template.decode(genes, recipe, UNKNOWN)[0]
     unlimited = template.encode(first)
     again = template.decode(unlimited[None], recipe, UNKNOWN)[0]

@@ -13,16 +13,17 @@ from zoneinfo import ZoneInfo
 import numpy as np
 import pytest
 
-from igrow.core.bundle import default_bundle_folder
+from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.co2_count import CO2Count, co2_since_planting
 from igrow.core.planner import Budget, PlanResult, optimise
-from igrow.core.quantities import SETPOINTS
+from igrow.core.quantities import SETPOINTS, USUAL_SETPOINTS
 from igrow.core.simulator.outcome import Outcome
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 from igrow.edge.cli.plan import reasons
 from igrow.edge.planning.make_plan import hourly_recipe, make_plan, present, recently
 from igrow.edge.ports import PlanRequest
+from igrow.trainer.exporting import export, read_model
 
 START = 1_780_012_800
 RECIPE = {"heating_setpoint": 18.0, "co2_setpoint": 600.0, "lamp_on": 0.0, "irrigation_on": 0.2}
@@ -46,7 +47,7 @@ def log() -> Telemetry:
     return Telemetry(seconds.astype("datetime64[s]"), columns)
 
 
-def request(step: float = 3600.0, steps: int = 24, names: tuple[str, ...] = SETPOINTS) -> PlanRequest:
+def request(step: float = 3600.0, steps: int = 24, names: tuple[str, ...] = USUAL_SETPOINTS) -> PlanRequest:
     recipe = {name: (RECIPE[name],) * steps for name in names}
     return PlanRequest(float(START), step, log(), recipe, default_bundle_folder())
 
@@ -59,7 +60,7 @@ def test_a_plan_without_its_forecast_stays_within_the_limits_and_is_worth_no_les
     os.mkfifo(tmp_path / "forecast.csv")
     plan = make_plan(SITE, replace(request(), forecast=tmp_path / "forecast.csv"))
     assert "not read within 0.2 s" in plan.problem
-    assert set(plan.setpoints) == set(SETPOINTS)
+    assert set(plan.setpoints) == set(USUAL_SETPOINTS)
     for name, course in plan.setpoints.items():
         limits = SITE.limits[name]
         assert len(course) == 24
@@ -103,8 +104,8 @@ def test_slow_quantities_count_however_old_and_fast_ones_do_not() -> None:
 def test_a_recipe_of_any_step_becomes_hours(step: float, steps: int) -> None:
     hours = 48
     table = hourly_recipe(SITE, request(step, steps), hours)
-    assert table.shape == (hours, 4)
-    assert (table == [RECIPE[name] for name in SETPOINTS]).all()
+    assert table.shape == (hours, len(SETPOINTS))
+    assert (table == [RECIPE.get(name, SITE.limits[name].safe) for name in SETPOINTS]).all()
 
 
 def test_a_setpoint_that_the_site_lacks_stands_at_its_safe_value() -> None:
@@ -114,6 +115,8 @@ def test_a_setpoint_that_the_site_lacks_stands_at_its_safe_value() -> None:
 
 class OneUnitAnHour:
     """A simulator by which every hour uses and grows one unit."""
+
+    setpoints = USUAL_SETPOINTS
 
     def simulate(
         self, initial: dict[str, float], weather: np.ndarray, setpoints: np.ndarray, start: np.datetime64
@@ -177,3 +180,23 @@ def test_a_plan_is_explained_and_names_the_limits_that_bind() -> None:
     assert "lamp_on by dark_hours" in told
     assert "95 % between" in told
     assert pickle.loads(pickle.dumps(plan)) == plan
+
+
+@pytest.mark.parametrize("taken", [False, True])
+def test_a_plan_holds_a_humidity_setpoint_only_where_the_site_takes_one(tmp_path: Path, taken: bool) -> None:
+    """The bundle knows it in both cases."""
+    damp = replace(
+        SITE, setpoints=SETPOINTS, planning=replace(SITE.planning, optimise=("heating_setpoint", "humidity_setpoint"))
+    )
+    model = read_model(read_bundle(default_bundle_folder()), damp)
+    rules = {"lee_humidity": 0.0, "windward_humidity": 0.0, "lee_humidity_opening": 0.4}
+    bundle = export(replace(model, actuation={**model.actuation, **rules}), tmp_path / "bundle")
+    asked = replace(request(), bundle=bundle.folder)
+    if taken:
+        asked = replace(asked, recipe={**asked.recipe, "humidity_setpoint": (85.0,) * 24})
+    plan = make_plan(damp if taken else SITE, asked)
+    assert set(plan.setpoints) == set(SETPOINTS if taken else USUAL_SETPOINTS)
+    if taken:
+        course, limits = np.array(plan.setpoints["humidity_setpoint"]), damp.limits.humidity_setpoint
+        assert (course >= limits.low).all() and (course <= limits.high).all()
+        assert (course != 85.0).any(), "nothing else has a say in the heat that damp air saves"

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from igrow.core.quantities import QUANTITIES
+from igrow.core.quantities import QUANTITIES, USUAL_SETPOINTS
 from igrow.core.simulator import actuation
 from igrow.core.simulator.actuation import RULES, default_rules
 
@@ -76,7 +77,7 @@ def test_whatever_rules_and_climate_are_the_actuators_stay_in_range(
     }
     out = actuation.act(
         np,
-        SETPOINTS | {"heating_setpoint": setpoint, "lamp_on": lamp},
+        SETPOINTS | {"heating_setpoint": setpoint, "lamp_on": lamp, "humidity_setpoint": 80.0},
         {"outdoor_temperature": outdoor, "global_radiation": radiation, "wind_speed": wind},
         CLIMATE | {"air_temperature": temperature, "air_humidity": humidity},
         REST,
@@ -93,3 +94,47 @@ def test_a_position_moves_towards_its_target_and_not_past_it() -> None:
     out = actuation.act(np, SETPOINTS, WEATHER, hot, REST, default_rules(), seconds=300.0)
     aim = actuation.targets(np, SETPOINTS, WEATHER, hot, REST, default_rules())["vent_lee"]
     assert 0.0 < out["vent_lee"] < aim
+
+
+def vents(humidity: float, temperature: float = 20.0, **more: float) -> tuple[float, float]:
+    """Return where the lee vents go under a humidity setpoint of 85 %, and where the windward ones do."""
+    rules = default_rules() | {"lee_humidity": 0.0, "windward_humidity": 0.0}
+    rules |= {"lee_humidity_opening": 0.4, "lee_humidity_band": 10.0}
+    seen = CLIMATE | {"air_humidity": humidity, "air_temperature": temperature}
+    asked = SETPOINTS | {"humidity_setpoint": 85.0} | more
+    found = actuation.targets(np, asked, WEATHER, seen, REST, rules)
+    return float(found["vent_lee"]), float(found["vent_wind"])
+
+
+@pytest.mark.parametrize(("humidity", "opening"), [(80.0, 0.0), (85.0, 0.0), (90.0, 20.0), (95.0, 40.0), (99.0, 40.0)])
+def test_damp_air_opens_the_vents_in_a_band_above_its_setpoint(humidity: float, opening: float) -> None:
+    lee, windward = vents(humidity)
+    assert lee == pytest.approx(opening)
+    assert windward == 0.0
+
+
+def test_a_vent_opens_by_the_larger_of_what_temperature_and_humidity_ask() -> None:
+    warm = 32.0
+    by_temperature, _ = vents(70.0, warm)
+    assert by_temperature > 40.0
+    assert vents(99.0, warm)[0] == by_temperature, "a sum would be more"
+    slightly = vents(70.0, 22.0)[0]
+    assert 0.0 < slightly < 20.0
+    assert vents(90.0, 22.0)[0] == pytest.approx(20.0)
+
+
+def test_a_humidity_setpoint_that_no_rule_answers_to_changes_nothing() -> None:
+    for humidity in (60.0, 88.0, 97.0):
+        for temperature in (18.0, 22.0, 27.0):
+            seen = CLIMATE | {"air_humidity": humidity, "air_temperature": temperature}
+            plain, told = (
+                actuation.targets(np, SETPOINTS | more, WEATHER, seen, REST, default_rules())
+                for more in ({}, {"humidity_setpoint": 75.0})
+            )
+            assert plain == told
+
+
+def test_which_setpoints_rules_answer_to() -> None:
+    assert actuation.setpoints_of(default_rules()) == USUAL_SETPOINTS
+    assert actuation.setpoints_of({}) == USUAL_SETPOINTS, "rules of before it was known"
+    assert actuation.setpoints_of(default_rules() | {"lee_humidity_opening": 0.3})[-1] == "humidity_setpoint"

@@ -13,7 +13,7 @@ from igrow.core.site import Greenhouse
 
 START = np.datetime64("2020-02-01T00:00:00")
 NIGHT = np.tile([2.0, 85.0, 415.0, 0.0, 3.0, -8.0], (24, 1))
-WARM = np.tile([20.0, 400.0, 0.0, 0.0], (1, 24, 1))
+WARM = np.tile([20.0, 400.0, 0.0, 0.0, 85.0], (1, 24, 1))
 
 
 @pytest.fixture(scope="module")

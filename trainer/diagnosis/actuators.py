@@ -119,7 +119,7 @@ def courses(log: Log, seen: Record, model: FittedModel) -> dict[str, Floats]:
     lacking = [name for name in REPLACEABLE if name in seen.missing]
     if not lacking:
         return {}
-    setpoints, _ = setpoint_columns(log.telemetry, seen)
+    setpoints, _ = setpoint_columns(log.telemetry, seen, model.site)
     states = record.observe(seen, model.posterior.values, {})
     drivers = climate.derive(np, states, seen.inputs, model.posterior.values, seen.lamp_efficacy)
     shown = {name: np.broadcast_to(drivers[name], (len(seen),)) for name in (*measurement.PREDICTED, "par")}

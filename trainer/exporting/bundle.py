@@ -31,7 +31,7 @@ from igrow.trainer.exporting.climate import climate_blocks, effect_parameter
 from igrow.trainer.exporting.golden import golden_inputs
 from igrow.trainer.exporting.hindcast import hindcast_model
 from igrow.trainer.exporting.optimizer import export_optimizer, optimizer_signature
-from igrow.trainer.exporting.plan import plan_blocks, plan_model
+from igrow.trainer.exporting.plan import plan_blocks, plan_model, settings
 from igrow.trainer.exporting.signatures import signatures
 from igrow.trainer.fit.climate import bounds, site_prior
 from igrow.trainer.fit.discrepancy import Discrepancy
@@ -65,7 +65,7 @@ def export(model: FittedModel, folder: Path | str, *, created: datetime | None =
     crop = model.crop or built_in_crop()
     random = np.random.default_rng(seed)
     blocks = climate_blocks([effect.name for effect in model.effects])
-    planning = plan_blocks(blocks, crop, model.training_range)
+    planning = plan_blocks(blocks, crop, model.training_range, actuation.setpoints_of(model.actuation))
     settings = EvolutionSettings()
     graphs = {
         "simulator": plan_model(planning),
@@ -189,7 +189,9 @@ def _parameter_values(model: FittedModel, reference: datetime) -> dict[str, floa
     """Return the value of each row of the graphs' input `parameters`."""
     values = _constants(model.site)
     values |= {f"parameter:{name}": value for name, value in model.posterior.values.items()}
-    values |= {f"actuation:{name}": float(value) for name, value in model.actuation.items()}
+    rules = model.actuation
+    answered = settings(actuation.setpoints_of(rules))
+    values |= {f"actuation:{name}": float(value) for name, value in rules.items() if f"actuation:{name}" in answered}
     values |= {f"holding:{name}": float(value) for name, value in model.holding.items()}
     for effect in model.effects:
         for parameter in EFFECTS[effect.name].parameters:

@@ -53,7 +53,14 @@ def golden_inputs(
         return np.array([[values[name]] for name in names])
 
     climate = np.array([[18.0, 21.0], [75.0, 82.0], [450.0, 800.0]])
-    setpoints = np.stack([18.0 + 3 * sun, 400.0 + 400 * sun, sun > 0, 0.3 * sun], axis=1)[:, :, None]
+    asked = {
+        "heating_setpoint": 18.0 + 3 * sun,
+        "co2_setpoint": 400.0 + 400 * sun,
+        "lamp_on": sun > 0,
+        "irrigation_on": 0.3 * sun,
+        "humidity_setpoint": 85.0 - 5.0 * sun,
+    }
+    setpoints = np.stack([asked[name] for name in blocks.setpoints], axis=1)[:, :, None]
     inputs: dict[str, dict[str, NDArray[Any]]] = {
         "simulator": {
             "climate": climate,

@@ -14,32 +14,38 @@ from scipy.optimize import least_squares
 from igrow.core import gaps
 from igrow.core.arrays import Floats, Mask
 from igrow.core.errors import IgrowError
-from igrow.core.quantities import SETPOINTS
+from igrow.core.quantities import QUANTITIES, SETPOINTS
 from igrow.core.separating_tests.definition import SOURCE
 from igrow.core.simulator import actuation
-from igrow.core.simulator.actuation import RULES
+from igrow.core.simulator.actuation import FOR_HUMIDITY, RULES, VENTS
 from igrow.core.simulator.hybrid import climate
 from igrow.core.simulator.hybrid import record as records
 from igrow.core.simulator.hybrid.record import Record
+from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry, to_grid
 
 _RULES_OF = {
     "rail_pipe_temperature": ("rail", 5.0),
     "grow_pipe_temperature": ("grow", 5.0),
-    "vent_lee": ("lee", 5.0),
-    "vent_wind": ("windward", 5.0),
+    "vent_lee": (VENTS["vent_lee"], 5.0),
+    "vent_wind": (VENTS["vent_wind"], 5.0),
     "energy_screen": ("energy_screen", 20.0),
     "blackout_screen": ("blackout_screen", 20.0),
     "co2_dosing": ("co2", 0.002),
 }
 """Actuator -> prefix of its rules, and the size of an error that counts as one."""
+OPENING = 0.2
+"""Largest opening for humidity from which a fit begins where the log has a humidity setpoint."""
+LEAST_OPENING = 0.01
+"""A smaller one is none: such vents do not answer to that setpoint."""
 
 
-def setpoint_columns(telemetry: Telemetry, record: Record) -> tuple[dict[str, Floats], tuple[str, ...]]:
+def setpoint_columns(telemetry: Telemetry, record: Record, site: Site) -> tuple[dict[str, Floats], tuple[str, ...]]:
     """Return the setpoints on the record's grid, (n,) each, and the names of those that had to be inferred.
 
     A log without setpoints: the heating and CO2 setpoints are taken as the median of what was measured at the same
-    hour over the two weeks around (what the computer held), lamps and irrigation as what they did.
+    hour over the two weeks around (what the computer held), lamps and irrigation as what they did. A setpoint that not
+    every computer takes is among them where the site names it and the log has it.
     """
     grid = to_grid(telemetry, int(record.step))
     inferred = []
@@ -47,9 +53,14 @@ def setpoint_columns(telemetry: Telemetry, record: Record) -> tuple[dict[str, Fl
     # A gap in the log says nothing of what its rows hold.
     logged = np.isfinite(record.measured["air_temperature"])
     for name in SETPOINTS:
+        optional = QUANTITIES[name].optional
+        if optional and name not in site.setpoints:
+            continue
         values = grid.columns.get(name, np.full(len(record), np.nan))
         if np.isfinite(values[logged]).sum() > 0.5 * logged.sum():
             columns[name] = gaps.held(values)
+            continue
+        if optional:
             continue
         inferred.append(name)
         if name == "lamp_on":
@@ -69,6 +80,13 @@ def by_its_own_rules(telemetry: Telemetry, record: Record) -> Mask:
     return np.ones(len(record), dtype=bool) if marked is None else ~(marked > 0.0)
 
 
+def unanswered(site: Site, rules: Mapping[str, float]) -> tuple[str, ...]:
+    """Return a sentence on each setpoint that a site names and that nothing in its log answers to; plans leave it."""
+    answered = actuation.setpoints_of(rules)
+    lost = [name for name in SETPOINTS if QUANTITIES[name].optional and name in site.setpoints and name not in answered]
+    return tuple(f"in this log nothing answers to {name}: plans leave it to the recipe" for name in lost)
+
+
 def fit_actuation(
     parts: Sequence[tuple[Record, Mapping[str, Floats], Mask | None]], parameters: Mapping[str, float]
 ) -> dict[str, float]:
@@ -82,6 +100,9 @@ def fit_actuation(
         IgrowError: no row shows both what the computer saw and what it did.
     """
     samples = [_samples(record, setpoints, rows, parameters) for record, setpoints, rows in parts]
+    # A setpoint that only some of the records have tells nothing of all their rows.
+    common = set.intersection(*(set(sample) for sample in samples))
+    samples = [{name: sample[name] for name in sample if name in common} for sample in samples]
     table = {name: np.concatenate([sample[name] for sample in samples]) for name in samples[0]}
     if len(table["par"]) == 0:
         raise IgrowError("no row of the log has the climate and all actuators at once: nothing tells the PLC's rules")
@@ -142,18 +163,26 @@ def _samples(
 def _fit_rule(
     actuator: str, prefix: str, size: float, table: Mapping[str, Floats], rules: Mapping[str, float]
 ) -> dict[str, float]:
-    names = [
-        name for name in RULES if name.startswith(f"{prefix}_") and name not in {"co2_capacity", "irrigation_rate"}
-    ]
+    setpoints = {name: table[f"setpoint:{name}"] for name in SETPOINTS if f"setpoint:{name}" in table}
+    held: dict[str, float] = {}
+    rules = dict(rules)
+    settled = {"co2_capacity", "irrigation_rate"}
+    if "humidity_setpoint" not in setpoints:
+        settled |= FOR_HUMIDITY
+    elif actuator in VENTS:
+        held[f"{prefix}_humidity"] = 0.0
+        rules[f"{prefix}_humidity_opening"] = OPENING
+        settled |= set(held)
+    rules |= held
+    names = [name for name in RULES if name.startswith(f"{prefix}_") and name not in settled]
     low = np.array([RULES[name].low for name in names])
     high = np.array([RULES[name].high for name in names])
     start = np.clip(np.array([rules[name] for name in names]), low, high)
     width = np.maximum(np.abs(start), 0.05 * (high - low))
-    setpoints = {name: table[f"setpoint:{name}"] for name in SETPOINTS}
     measured = table[actuator]
 
     def predict(point: Floats) -> Floats:
-        trial = dict(rules) | dict(zip(names, point.tolist(), strict=True))
+        trial = rules | dict(zip(names, point.tolist(), strict=True))
         return np.asarray(actuation.targets(np, setpoints, table, table, table, trial)[actuator])
 
     def residual(point: Floats) -> Floats:
@@ -175,7 +204,9 @@ def _fit_rule(
         ),
         key=lambda solution: float(solution.cost),
     )
-    return dict(zip(names, np.clip(best.x, low, high).tolist(), strict=True))
+    found = held | dict(zip(names, np.clip(best.x, low, high).tolist(), strict=True))
+    opening = f"{prefix}_humidity_opening"
+    return found | {opening: 0.0} if 0.0 < found.get(opening, 0.0) < LEAST_OPENING else found
 
 
 def _usual_course(measured: Floats, step: float) -> Floats:

@@ -59,11 +59,11 @@ def score_bundle(
         from igrow.trainer.research.network.log_runs import climate_runs  # noqa: PLC0415  (torch is slow to import)
 
         record = log.record()
-        by_setpoints = climate_runs(bundle.folder, record, setpoint_columns(log.telemetry, record)[0])
+        by_setpoints = climate_runs(bundle.folder, record, setpoint_columns(log.telemetry, record, site)[0])
         return {BY_SETPOINTS: _scores(record, by_setpoints, horizons, BY_SETPOINTS, progress)}
     record, by_actuators = runs_by_actuators(log, read_model(bundle, site))
     found = {ACTUATORS: _scores(record, by_actuators, horizons, ACTUATORS, progress)}
-    setpoints, _ = setpoint_columns(log.telemetry, record)
+    setpoints, _ = setpoint_columns(log.telemetry, record, site)
     planned = planned_runs(bundle, site, record, setpoints)
     return found | {BY_SETPOINTS: _scores(record, planned, horizons, BY_SETPOINTS, progress)}
 
@@ -115,7 +115,8 @@ def planned_runs(bundle: Bundle, site: Site, record: Record, setpoints: Mapping[
     simulator = BundleSimulator(bundle, site.greenhouse, members=1)
     hour = max(1, round(3600.0 / record.step))
     weather = np.stack([record.inputs[name] for name in WEATHER if name in record.inputs], axis=1)
-    asked = np.stack([setpoints[name] for name in SETPOINTS], axis=1)
+    usual = {name: np.full(len(record), site.limits[name].safe) for name in SETPOINTS}
+    asked = np.stack([setpoints.get(name, usual[name]) for name in SETPOINTS], axis=1)
     last = len(record) - 1
     known: dict[tuple[int, int], Outcome] = {}
 

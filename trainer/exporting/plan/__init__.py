@@ -6,7 +6,8 @@ number of candidates. Everything is float32 and the batch comes last; `ports` te
 """
 
 from igrow.trainer.exporting.plan.blocks import PlanBlocks, plan_blocks
+from igrow.trainer.exporting.plan.control import settings
 from igrow.trainer.exporting.plan.graph import plan_model, ports
 from igrow.trainer.exporting.plan.training_range import RANGED
 
-__all__ = ["RANGED", "PlanBlocks", "plan_blocks", "plan_model", "ports"]
+__all__ = ["RANGED", "PlanBlocks", "plan_blocks", "plan_model", "ports", "settings"]

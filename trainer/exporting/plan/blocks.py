@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from igrow.core.quantities import WEATHER
+from igrow.core.quantities import USUAL_SETPOINTS, WEATHER
 from igrow.core.simulator.crop import GROWTH_DRIVERS, HARVEST_DRIVERS, CropStages
 from igrow.trainer.exporting.blocks import Block
 from igrow.trainer.exporting.climate import ClimateBlocks
-from igrow.trainer.exporting.plan.control import SETTINGS, control_block, equipment_block
+from igrow.trainer.exporting.plan.control import control_block, equipment_block, settings
 from igrow.trainer.exporting.plan.crop import crop_block, net_growth_block
 from igrow.trainer.exporting.plan.training_range import range_block
 
@@ -21,6 +21,8 @@ class PlanBlocks:
     climate: ClimateBlocks
     weather: tuple[str, ...]
     """Columns of the graph's input `weather`."""
+    setpoints: tuple[str, ...]
+    """Columns of the graph's input `setpoints`."""
     parameters: tuple[str, ...]
     """Rows of the graph's input `parameters`."""
     equipment: Block
@@ -44,21 +46,28 @@ class PlanBlocks:
         ]
 
 
-def plan_blocks(stage: ClimateBlocks, crop: CropStages, known: Mapping[str, tuple[float, float]]) -> PlanBlocks:
+def plan_blocks(
+    stage: ClimateBlocks,
+    crop: CropStages,
+    known: Mapping[str, tuple[float, float]],
+    setpoints: tuple[str, ...] = USUAL_SETPOINTS,
+) -> PlanBlocks:
     """Trace what planning needs beside the climate stage.
 
     Args:
         stage: the climate stage with its active effects.
         crop: growth and yield.
         known: smallest and largest value of quantities in the training data.
+        setpoints: that the climate computer answers to, in the registry's order.
     """
     weather = tuple(name for name in WEATHER if name in stage.inputs)
     return PlanBlocks(
         climate=stage,
         weather=weather,
-        parameters=(*stage.parameters, *SETTINGS),
-        equipment=equipment_block(weather),
-        control=control_block(stage),
+        setpoints=setpoints,
+        parameters=(*stage.parameters, *settings(setpoints)),
+        equipment=equipment_block(weather, setpoints),
+        control=control_block(stage, setpoints),
         growth=crop_block("growth", crop.growth, GROWTH_DRIVERS),
         net_growth=net_growth_block(crop),
         harvest=crop_block("harvest", crop.harvest, HARVEST_DRIVERS),

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from igrow.core import air
-from igrow.core.quantities import SETPOINTS
 from igrow.core.simulator import actuation, holding
 from igrow.core.simulator.hybrid import climate
 from igrow.core.simulator.hybrid.measurement import PREDICTED
@@ -19,27 +18,31 @@ CARRIED = ("vent_lee", "vent_wind", "energy_screen", "blackout_screen")
 """Positions of the equipment that an hour hands to the next."""
 SECONDS = 3600.0 / STEPS_PER_HOUR
 """Length of a step."""
-SETTINGS = (*tags("actuation", actuation.RULES), *tags("holding", holding.PARAMETERS))
-"""Parameters of the fitted rules."""
 
 
-def equipment_block(weather: Sequence[str]) -> Block:
-    """Trace `_equipment`; `weather` names what is known of it."""
+def settings(setpoints: Sequence[str]) -> tuple[str, ...]:
+    """Return the parameters of the fitted rules of a computer that takes these setpoints."""
+    rules = [name for name in actuation.RULES if "humidity_setpoint" in setpoints or name not in actuation.FOR_HUMIDITY]
+    return (*tags("actuation", rules), *tags("holding", holding.PARAMETERS))
+
+
+def equipment_block(weather: Sequence[str], setpoints: Sequence[str]) -> Block:
+    """Trace `_equipment`; `weather` names what is known of it, `setpoints` what the computer takes."""
     return trace(
         "equipment",
         _equipment,
         [
-            *tags("setpoint", SETPOINTS),
+            *tags("setpoint", setpoints),
             *tags("weather", weather),
             *tags("climate", (*PREDICTED, "par")),
             *tags("memory", CARRIED),
-            *SETTINGS,
+            *settings(setpoints),
         ],
     )
 
 
-def control_block(stage: ClimateBlocks) -> Block:
-    """Trace `_control` for a climate stage with its active effects."""
+def control_block(stage: ClimateBlocks, setpoints: Sequence[str]) -> Block:
+    """Trace `_control` for a climate stage with its active effects; `setpoints` are what the computer takes."""
     return trace(
         "control",
         _control,
@@ -48,8 +51,8 @@ def control_block(stage: ClimateBlocks) -> Block:
             *tags("driver", (*stage.inputs, *stage.derive.outputs, "mean_height")),
             *stage.channels,
             *tags("parameter", PARAMETERS),
-            *tags("setpoint", SETPOINTS),
-            *SETTINGS,
+            *tags("setpoint", setpoints),
+            *settings(setpoints),
             "shown_temperature",
             "shown_co2",
         ],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from onnx import ModelProto
 
-from igrow.core.quantities import GROWTH, SETPOINTS, YIELD
+from igrow.core.quantities import GROWTH, YIELD
 from igrow.core.simulator.hybrid.measurement import PREDICTED
 from igrow.core.simulator.plan import CLIMATE_OUT, CLOCK, EQUIPMENT, RESOURCES
 from igrow.trainer.exporting.blocks import Ports, shapes
@@ -25,7 +25,7 @@ def ports(blocks: PlanBlocks) -> tuple[Ports, Ports]:
         "weather": (blocks.weather, ("hours", len(blocks.weather), "w")),
         "clock": (CLOCK, ("hours", len(CLOCK), 1)),
         "day": (("day",), ("hours", 1)),
-        "setpoints": (SETPOINTS, ("hours", len(SETPOINTS), "batch")),
+        "setpoints": (blocks.setpoints, ("hours", len(blocks.setpoints), "batch")),
         "parameters": (blocks.parameters, (len(blocks.parameters), "members")),
     }
     outputs: Ports = {

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from onnx import GraphProto
 
-from igrow.core.quantities import GROWTH, SETPOINTS
+from igrow.core.quantities import GROWTH
 from igrow.core.simulator.crop import GROWTH_DRIVERS
 from igrow.core.simulator.hybrid import climate
 from igrow.core.simulator.hybrid.measurement import PREDICTED
@@ -42,7 +42,7 @@ def hour_graph(blocks: PlanBlocks, parameters: Mapping[str, str]) -> GraphProto:
     carried = wiring.rows("carried", carried_names(blocks))
     weather = wiring.rows("hour_weather", blocks.weather)
     clock = wiring.rows("hour_clock", CLOCK)
-    setpoints = tagged("setpoint", wiring.rows("hour_setpoints", SETPOINTS))
+    setpoints = tagged("setpoint", wiring.rows("hour_setpoints", blocks.setpoints))
     seconds = wiring.constant("seconds", [SECONDS])
     zero = wiring.constant("zero", [0.0])
     growth = {name: carried[name] for name in GROWTH}
@@ -112,7 +112,7 @@ def hour_graph(blocks: PlanBlocks, parameters: Mapping[str, str]) -> GraphProto:
             "hour_weather": (len(blocks.weather), "w"),
             "hour_clock": (len(CLOCK), 1),
             "hour_day": (1,),
-            "hour_setpoints": (len(SETPOINTS), "batch"),
+            "hour_setpoints": (len(blocks.setpoints), "batch"),
         },
         {"carried_next": width, "hour_out": (len(rows), "batch")},
     )

@@ -21,7 +21,16 @@ from igrow.core.planner.template import BLOCK_STARTS, for_site
 from igrow.core.quantities import SETPOINTS
 from igrow.core.simulator.outcome import Simulator
 from igrow.core.site import Site
-from igrow.trainer.research.policies.policy import ACTIONS, HOURS, OBSERVATIONS, PRESENT, chosen, observe, to_setpoints
+from igrow.trainer.research.policies.policy import (
+    ACTIONS,
+    HOURS,
+    OBSERVATIONS,
+    PAPER_SETPOINTS,
+    PRESENT,
+    chosen,
+    observe,
+    to_setpoints,
+)
 
 DAY = np.timedelta64(86_400, "s")
 FIRST_START = np.datetime64("2020-01-04T23:00:00", "s")
@@ -33,7 +42,7 @@ TRAINING_SEEDS = 1_000_000
 """Seeds of training weather begin here; tests and benchmarks use smaller ones."""
 BLOCKS = np.searchsorted(np.array(BLOCK_STARTS), np.arange(HOURS), side="right") - 1
 """Block of the day of each hour, (24,); hours before the first block's start belong to the last one."""
-LEVELS = len(BLOCK_STARTS) * len(SETPOINTS)
+LEVELS = len(BLOCK_STARTS) * len(PAPER_SETPOINTS)
 """Numbers that are learnt: a level of each setpoint in each block."""
 EUROS = 20.0
 """Reward of a euro: gains of a day are some EUR 0.05 m-2."""
@@ -50,7 +59,7 @@ class Start(NamedTuple):
 
 def by_hour(levels: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return actions (B, 96), hour by hour, of levels (B, 32), block by block."""
-    blocks = levels.reshape(len(levels), len(BLOCK_STARTS), len(SETPOINTS))
+    blocks = levels.reshape(len(levels), len(BLOCK_STARTS), len(PAPER_SETPOINTS))
     return blocks[:, BLOCKS].reshape(len(levels), ACTIONS)
 
 

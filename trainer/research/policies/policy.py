@@ -18,13 +18,17 @@ from igrow.core.quantities import SETPOINTS, WEATHER
 from igrow.core.site import Site
 
 HOURS = 24
+PAPER_SETPOINTS = ("heating_setpoint", "co2_setpoint", "lamp_on", "irrigation_on")
+"""The four that the policies of Cao et al. (2022) choose."""
+PAPER_COLUMNS = [SETPOINTS.index(name) for name in PAPER_SETPOINTS]
+"""Where they stand among all."""
 FORECAST = {"outdoor_temperature": (10.0, 10.0), "outdoor_humidity": (75.0, 20.0), "global_radiation": (150.0, 250.0)}
 """Weather that the policy sees for each hour, with the offset and scale that bring it near to -1 to 1."""
 PRESENT = {"air_temperature": (20.0, 5.0), "leaf_area_index": (3.0, 1.0), "plant_load": (300.0, 200.0)}
 """State that it sees, with offset and scale."""
 OBSERVATIONS = HOURS * len(FORECAST) + len(PRESENT) + 1
 """76: the last one is the price of growth."""
-ACTIONS = HOURS * len(SETPOINTS)
+ACTIONS = HOURS * len(PAPER_SETPOINTS)
 """96: hour by hour, -1 for the lower limit of a setpoint and 1 for the upper one."""
 
 
@@ -49,21 +53,25 @@ def observe(site: Site, present: Mapping[str, Floats], forecast: Floats, start: 
 
 
 def to_setpoints(site: Site, actions: NDArray[np.float32]) -> Setpoints:
-    """Return the setpoints (B, 24, 4) of actions (B, 96), -1 to 1, within the site's limits; lamps are on or off."""
-    low = np.array([site.limits[name].low for name in SETPOINTS])
-    high = np.array([site.limits[name].high for name in SETPOINTS])
-    share = (np.clip(actions.astype(np.float64), -1.0, 1.0).reshape(len(actions), HOURS, len(SETPOINTS)) + 1.0) / 2.0
+    """Return `PAPER_SETPOINTS` (B, 24, 4) of actions (B, 96), -1 to 1, within the limits; lamps are on or off."""
+    low = np.array([site.limits[name].low for name in PAPER_SETPOINTS])
+    high = np.array([site.limits[name].high for name in PAPER_SETPOINTS])
+    shape = (len(actions), HOURS, len(PAPER_SETPOINTS))
+    share = (np.clip(actions.astype(np.float64), -1.0, 1.0).reshape(shape) + 1.0) / 2.0
     setpoints = low + share * (high - low)
     for name in BY_HOUR:
-        column = SETPOINTS.index(name)
+        column = PAPER_SETPOINTS.index(name)
         setpoints[..., column] = np.round(setpoints[..., column] / STEPS[name]) * STEPS[name]
     return np.asarray(setpoints)
 
 
 def chosen(site: Site, setpoints: Setpoints, recipe: Setpoints) -> Setpoints:
-    """Return setpoints (..., H, 4) in which those that the site's plans do not choose are the recipe's, (H, 4).
+    """Return all setpoints (..., H, S): of `PAPER_SETPOINTS` (..., H, 4) those that the site's plans choose, else the
+    recipe's, (H, S).
 
     A policy sees no slab, and its simulator none either: it would water at random.
     """
-    free = [name in site.setpoints and name in site.planning.optimise for name in SETPOINTS]
-    return np.where(free, setpoints, recipe)
+    asked = np.broadcast_to(recipe, (*setpoints.shape[:-1], len(SETPOINTS))).copy()
+    free = [name in site.setpoints and name in site.planning.optimise for name in PAPER_SETPOINTS]
+    asked[..., PAPER_COLUMNS] = np.where(free, setpoints, asked[..., PAPER_COLUMNS])
+    return asked
