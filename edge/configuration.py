@@ -6,6 +6,7 @@ reloads) with them finds nothing wrong later. Paths are relative to the file tha
 
 from __future__ import annotations
 
+import datetime
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -30,6 +31,7 @@ from igrow.edge.registers.bus_load import estimate
 from igrow.edge.registers.loading import load_register_map
 from igrow.edge.registers.model import RegisterMap
 from igrow.edge.sensors.rules import SensorRule, default_rule
+from igrow.edge.sources.recipe import Period
 
 WRITABLE_BAD_SAMPLES = 2
 """Readings in a row until a register that we write is believed to show what it cannot mean."""
@@ -151,6 +153,10 @@ def put_together(path: Path, file: DaemonFile, site: Site, register_map: Registe
     _check_exchange(path, file)
     _check_heartbeat(path, register_map)
     setpoints = tuple(name for name in setpoints if name in site.setpoints)
+    if "humidity_setpoint" in setpoints and not file.recipe.humidity_setpoint:
+        # A recipe of before the PLC took it says nothing of it; plans and page compare with what it says.
+        always = Period(datetime.time(), site.limits.humidity_setpoint.safe)
+        file = replace(file, recipe=replace(file.recipe, humidity_setpoint=(always,)))
     for name in file.guard.points:
         if name not in points or not points[name].writable:
             raise ConfigurationError(

@@ -195,7 +195,11 @@ DEFAULT_INTERLOCKS: tuple[Interlock, ...] = (
     Interlock(
         "humidity",
         "air_humidity",
-        {"irrigation_on": Bound(high=0.0), "heating_setpoint": Bound(low=SAFE)},
+        {
+            "irrigation_on": Bound(high=0.0),
+            "heating_setpoint": Bound(low=SAFE),
+            "humidity_setpoint": Bound(high=SAFE),
+        },
         above=97.0,
         release=93.0,
         why="a wet crop gets fungi: no more water, and not less heat than the safe setpoint",

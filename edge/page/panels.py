@@ -52,7 +52,7 @@ class Sketch:
 
 SKETCHES = (
     Sketch(N_("Temperature"), (("air_temperature", "measured"),), "heating_setpoint", 4.0, height=240),
-    Sketch(N_("Humidity"), (("air_humidity", "measured"),), "", 20.0),
+    Sketch(N_("Humidity"), (("air_humidity", "measured"),), "humidity_setpoint", 20.0),
     Sketch(N_("CO2"), (("air_co2", "measured"),), "co2_setpoint", 200.0),
     Sketch(N_("Light at the crop"), (("par", "measured"),), "", 200.0),
     Sketch(N_("Lamps"), (), "lamp_on", 100.0, height=100),

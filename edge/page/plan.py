@@ -20,6 +20,10 @@ MORE = {
     "co2_setpoint": (N_("More CO2 than your recipe ({usual})"), N_("Less CO2 than your recipe ({usual})")),
     "lamp_on": (N_("More lamp light than your recipe ({usual})"), N_("Less lamp light than your recipe ({usual})")),
     "irrigation_on": (N_("More water than your recipe ({usual})"), N_("Less water than your recipe ({usual})")),
+    "humidity_setpoint": (
+        N_("Damper before vents open than by your recipe ({usual})"),
+        N_("Drier before vents open than by your recipe ({usual})"),
+    ),
 }
 PART_TEXTS = {
     "income": (N_("growth worth {amount} more"), N_("growth worth {amount} less")),

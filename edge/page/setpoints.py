@@ -71,7 +71,7 @@ def setpoints(
                 lease_words(leases.get(name), now, say),
                 say.text("{low} to {high}", low=say.number(name, limits.low), high=say.shown(name, limits.high)),
                 f"{low:.6g}", f"{high:.6g}",
-                "5" if how.unit == "%" else "10" if QUANTITIES[name].unit == "ppm" else "0.1",
+                {"1": "5", "%": "1", "ppm": "10"}.get(QUANTITIES[name].unit, "0.1"),
                 "" if shown is None else f"{how.of(shown):.{DIGITS.get(QUANTITIES[name].unit, 1)}f}",
             )
         )  # fmt: skip

@@ -10,7 +10,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from igrow.core.quantities import ACTUATORS, QUANTITIES, SETPOINTS
+from igrow.core.greenhouse.climate_computer import ClimateComputer
+from igrow.core.quantities import ACTUATORS, QUANTITIES, SETPOINTS, USUAL_SETPOINTS
 from igrow.edge.registers.model import Function, Parity, RegisterMap
 from igrow.edge.virtual_plc.memory import DeviceMemory
 from igrow.edge.virtual_plc.modbus_server import ModbusServer
@@ -20,9 +21,16 @@ from igrow.edge.virtual_plc.plant import Plant
 _log = logging.getLogger(__name__)
 
 SAFE_SETPOINTS: Mapping[str, float] = MappingProxyType(
-    {"heating_setpoint": 17.0, "co2_setpoint": 400.0, "lamp_on": 0.0, "irrigation_on": 0.1}
+    {
+        "heating_setpoint": 17.0,
+        "co2_setpoint": 400.0,
+        "lamp_on": 0.0,
+        "irrigation_on": 0.1,
+        "humidity_setpoint": ClimateComputer().humidity_start,
+    }
 )
-"""What keeps a tomato crop alive without anybody's care: frost far away, no dosing, no lamps, some water."""
+"""What keeps a tomato crop alive without anybody's care: frost far away, no dosing, no lamps, some water, vents that
+open before leaves get wet."""
 
 PLANT_STEP = 5.0
 """Plant seconds between two programs runs in real time."""
@@ -57,11 +65,13 @@ class VirtualPlc:
         self.plant = plant
         self.memory = DeviceMemory(register_map, name)
         self.pace = pace
-        self._safe = dict(safe_setpoints)
         self._fallback_after = fallback_after
         self._sleep = sleep
         self._server = ModbusServer({register_map.devices[name].device_id: self})
         self._setpoints = tuple(name for name in SETPOINTS if name in self.memory.points)
+        # Without a register for it the computer goes by its own settings.
+        taken = {*USUAL_SETPOINTS, *self._setpoints}
+        self._safe = {name: value for name, value in safe_setpoints.items() if name in taken}
         self._lent = {name: point for name, point in self.memory.points.items() if point.writable and name in ACTUATORS}
         self._commanded: dict[str, tuple[float, np.datetime64]] = {}
         """What was written to each of them, and when."""

@@ -34,6 +34,7 @@ NAMES: Mapping[str, str] = {
     "co2_setpoint": N_("CO2 setpoint"),
     "lamp_on": N_("lamp switch"),
     "irrigation_on": N_("irrigation switch"),
+    "humidity_setpoint": N_("humidity setpoint"),
     # actuators
     "rail_pipe_temperature": N_("pipe rail temperature"),
     "grow_pipe_temperature": N_("grow pipe temperature"),

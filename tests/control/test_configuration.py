@@ -241,3 +241,39 @@ def test_a_file_that_the_daemons_file_names_is_told_from_it(tmp_path: Path, name
     write_files(tmp_path, 5020)
     with pytest.raises(ConfigurationError, match=f"{name}: {said}: give the daemon's file"):
         load_configuration(tmp_path / name)
+
+
+DAMP = '  humidity_setpoint: {{device: plc, function: holding, address: 4, type: float32, unit: "%", writable: true}}\n'
+
+
+def with_humidity(tmp_path: Path, recipe: str = "") -> Path:
+    path = write_files(tmp_path, 5020, map_text=MAP + DAMP)
+    path.write_text(path.read_text() + recipe)
+    site = tmp_path / "site.yaml"
+    site.write_text(site.read_text().replace("co2_setpoint]", "co2_setpoint, humidity_setpoint]"))
+    return path
+
+
+def test_a_humidity_setpoint_is_the_plcs_own_until_the_site_names_it(tmp_path):
+    configuration = load_configuration(write_files(tmp_path, 5020, map_text=MAP + DAMP))
+    assert configuration.setpoints == ("heating_setpoint", "co2_setpoint")
+    assert "humidity_setpoint" not in configuration.guard_rules.points
+    assert configuration.file.recipe.humidity_setpoint == ()
+
+
+def test_a_site_that_names_a_humidity_setpoint_has_it_guarded_and_in_its_recipe(tmp_path):
+    configuration = load_configuration(with_humidity(tmp_path))
+    assert configuration.setpoints[-1] == "humidity_setpoint"
+    rule = configuration.guard_rules.points["humidity_setpoint"]
+    assert (rule.low, rule.high, rule.safe, rule.decided) == (70.0, 90.0, 85.0, True)
+    assert rule.slew == pytest.approx(10.0 / 3600.0)
+    (always,) = configuration.file.recipe.humidity_setpoint
+    assert always.value == 85.0
+
+
+def test_a_recipes_own_humidity_setpoint_is_kept_and_checked(tmp_path):
+    own = "  humidity_setpoint: [{at: 00:00, value: %s}]\n"
+    (said,) = load_configuration(with_humidity(tmp_path, own % "80")).file.recipe.humidity_setpoint
+    assert said.value == 80.0
+    with pytest.raises(IgrowError, match="humidity_setpoint is 20: 50 to 100 % makes sense"):
+        load_configuration(with_humidity(tmp_path, own % "20"))

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from igrow.core.site.control import Limits
 from igrow.edge.guard import Bound, GuardRules, GuardState, Interlock, PointRule, PointState, Request, guard
 from igrow.edge.guard.core import with_earlier_writes
 from igrow.edge.guard.interlocks import DEFAULT_INTERLOCKS, SAFE, InterlockError
@@ -251,3 +252,15 @@ def test_rules_that_no_value_can_satisfy_are_refused():
         PointRule(low=10.0, high=30.0, safe=20.0, refresh=600.0, daily_budget=48)
     with pytest.raises(InterlockError, match="release"):
         Interlock("x", "wind_speed", {"vent_lee": Bound(high=SAFE)}, above=10.0, release=12.0)
+
+
+@pytest.mark.parametrize(
+    ("asked", "humidity", "written"),
+    [(88.0, 80.0, 88.0), (99.0, 80.0, 90.0), (40.0, 80.0, 70.0), (88.0, 98.0, 85.0), (78.0, 98.0, 78.0)],
+)
+def test_a_humidity_setpoint_keeps_its_limits_and_is_no_damper_than_safe_over_a_wet_crop(asked, humidity, written):
+    limits = Limits().humidity_setpoint
+    rule = PointRule(low=limits.low, high=limits.high, safe=limits.safe)
+    image = image_of(0.0, air_humidity=humidity)
+    verdict = ask(asked, rule, shown=86.0, name="humidity_setpoint", image=image, interlocks=DEFAULT_INTERLOCKS)
+    assert values(verdict) == [written]

@@ -451,3 +451,18 @@ def test_what_is_set_aside_is_said_at_once(tmp_path: Path, log: Telemetry, capsy
     told = capsys.readouterr().out
     assert "note: air_co2: 20 readings" in told
     assert "note: no readings of outdoor_humidity, wind_speed: nothing is said of what needs them" in told
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["RV setpoint", "Humidity setpoint (%)", "RH setpoint %", "vochtsetpoint", "Sollwert Luftfeuchte [%]"],
+)
+def test_a_setpoint_of_the_humidity_is_no_reading_of_it(tmp_path: Path, log: Telemetry, name: str, capsys) -> None:
+    names = ("time", "air temperature (C)", "RH (%)", "CO2 (ppm)", "outside temperature (C)", "radiation (W/m2)")
+    table = written(log, (*names, "wind speed (m/s)"))
+    table.insert(1, name, 83.0)
+    table.to_csv(tmp_path / "export.csv", index=False)
+    imported(tmp_path)
+    assert_reads_as(tmp_path, log)
+    read = read_log(tmp_path / "export.csv", tmp_path / "site.yaml").telemetry
+    np.testing.assert_array_equal(np.unique(read["humidity_setpoint"][np.isfinite(read["humidity_setpoint"])]), [83.0])

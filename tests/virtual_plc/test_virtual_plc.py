@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 from igrow.core.errors import IgrowError
-from igrow.core.quantities import SETPOINTS
+from igrow.core.quantities import USUAL_SETPOINTS
 from igrow.edge.bus.errors import AddressRefusedError, BusError, NoValueError
 from igrow.edge.bus.plc import RegisterPlc
 from igrow.edge.bus.protocol import Priority, ReadRequest, WriteRequest
 from igrow.edge.registers.loading import load_register_map, parse_register_map
-from igrow.edge.registers.model import Function
+from igrow.edge.registers.model import Function, RegisterMap
 from igrow.edge.virtual_plc.pace import Lockstep, Pace, Realtime, parse_pace
 from igrow.edge.virtual_plc.virtual_plc import SAFE_SETPOINTS, VirtualPlc
 from tests.bus.simulated_loop import run
@@ -27,15 +27,17 @@ MAP = load_register_map(Path(__file__).parents[2] / "config" / "register-maps" /
 START = 1577836800.0  # 2020-01-01T00:00:00Z
 
 
-def against(pace: Pace, story: Callable[[VirtualPlc, RegisterPlc], Awaitable[None]], **more: Any) -> ToyPlant:
+def against(
+    pace: Pace, story: Callable[[VirtualPlc, RegisterPlc], Awaitable[None]], registers: RegisterMap = MAP, **more: Any
+) -> ToyPlant:
     """Play a story between a virtual PLC and its client, in simulated time."""
     plant = ToyPlant()
 
     async def main() -> None:
-        virtual = VirtualPlc(plant, MAP, pace, **more)
+        virtual = VirtualPlc(plant, registers, pace, **more)
         port = await virtual.start("127.0.0.1")
-        buses = {name: replace(bus, port=port) for name, bus in MAP.buses.items()}
-        client = RegisterPlc(replace(MAP, buses=buses), monotonic=asyncio.get_running_loop().time)
+        buses = {name: replace(bus, port=port) for name, bus in registers.buses.items()}
+        client = RegisterPlc(replace(registers, buses=buses), monotonic=asyncio.get_running_loop().time)
         client.start()
         try:
             await story(virtual, client)
@@ -102,7 +104,7 @@ def test_measurements_come_in_their_units_and_missing_ones_as_no_value() -> None
 
 def test_the_plant_obeys_the_setpoints_that_were_written() -> None:
     async def story(virtual: VirtualPlc, client: RegisterPlc) -> None:
-        for name, setpoint in zip(SETPOINTS, (21.5, 800.0, 1.0, 0.5), strict=True):
+        for name, setpoint in zip(USUAL_SETPOINTS, (21.5, 800.0, 1.0, 0.5), strict=True):
             await client.write(name, setpoint)
         await client.write("heartbeat", 1)
 
@@ -119,7 +121,8 @@ def test_before_the_first_heartbeat_the_plant_runs_on_safe_setpoints_whatever_wa
 
     plant = against(Realtime(), story)
     assert len(plant.history) > 10
-    assert all(setpoints == pytest.approx(SAFE_SETPOINTS) for setpoints in plant.history)
+    safe = {name: SAFE_SETPOINTS[name] for name in USUAL_SETPOINTS}
+    assert all(setpoints == pytest.approx(safe) for setpoints in plant.history)
 
 
 def test_a_heartbeat_that_stops_makes_the_plc_fall_back_and_a_new_one_ends_it() -> None:
@@ -224,3 +227,15 @@ def test_a_plc_of_one_coil_is_served_like_any_other() -> None:
     )
     virtual = VirtualPlc(ToyPlant(), coil, Realtime(1.0))
     assert virtual.memory.value("lamp_on") == 0.0
+
+
+def test_a_register_of_the_humidity_setpoint_is_obeyed_and_falls_back_to_the_computers_own() -> None:
+    path = Path(__file__).parents[2] / "config" / "register-maps" / "virtual-plc.yaml"
+    damp = parse_register_map(path.read_text().replace("  # humidity_setpoint:   {", "  humidity_setpoint: {"))
+
+    async def story(virtual: VirtualPlc, client: RegisterPlc) -> None:
+        assert await value(client, "humidity_setpoint") == SAFE_SETPOINTS["humidity_setpoint"] == 86.0
+        await client.write("humidity_setpoint", 78.0)
+        await client.write("heartbeat", 1)
+
+    assert against(Lockstep(), story, damp).history[-1]["humidity_setpoint"] == 78.0
