@@ -29,6 +29,7 @@ from igrow.core.planner.season import Season, SeasonPlan, Strategy, valued
 from igrow.core.planner.season.course import DAY, STRETCH, typical_days
 from igrow.core.planner.season.plan import first_crop
 from igrow.core.planner.season.search import GENERATIONS, genetic, worth_of
+from igrow.core.planner.template import chosen_setpoints
 from igrow.core.quantities import WEATHER
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Site
@@ -75,10 +76,14 @@ def plan_season(
     season = season_of(site, bundle, begins or site.crop.planting_date, weather, progress)
     age = (begins or site.crop.planting_date) - site.crop.planting_date
     crop = first_crop(season.plant, age.days >= BEARING)
-    rule, strategy = Strategy(season.days, 1, ends=True), Strategy(season.days, KNOTS)
+    humidity = "humidity_setpoint" in chosen_setpoints(site, season.simulator.setpoints)
+    rule, strategy = (
+        Strategy(season.days, 1, ends=True, humidity=humidity),
+        Strategy(season.days, KNOTS, humidity=humidity),
+    )
     # The strategy grows out of a rule, which takes a third of the search.
     third = generations // 3
-    found = _Partial(partial, f"{season.start} {season.days} {generations}")
+    found = _Partial(partial, f"{season.start} {season.days} {generations}" + " with humidity" * humidity)
     short = found.get("rule", lambda: genetic(worth_of(season, rule, crop), rule.genes, third, 1)[0])
     progress(f"the best rule for the {season.days} days is found")
     first = strategy.of_rule(rule, short)

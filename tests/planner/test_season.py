@@ -16,6 +16,7 @@ from igrow.core.planner.season.course import asked
 from igrow.core.planner.season.crop import fresh, like, live, supplied
 from igrow.core.planner.season.strategy import RANGES
 from igrow.core.planner.template import for_site
+from igrow.core.quantities import SETPOINTS
 from igrow.core.site import Site
 from tests.planner.toy_greenhouse import ToySimulator
 
@@ -73,7 +74,7 @@ def test_a_strategy_says_what_a_grower_would(season: Season, weather: np.ndarray
 def test_every_day_of_any_strategy_keeps_the_crops_limits(season: Season, weather: np.ndarray) -> None:
     strategy = Strategy(DAYS, 3)
     genes = np.random.default_rng(0).random((8, strategy.genes), dtype=np.float32)
-    place, applied, memory, courses = Place.of(season.site), np.full((8, 4), np.nan), None, []
+    place, applied, memory, courses = Place.of(season.site), np.full((8, len(SETPOINTS)), np.nan), None, []
     for day in range(4):
         template = for_site(season.site, START + day * np.timedelta64(1, "D"), 24, radiation=weather[:24, 3])
         course = template.follow(asked(strategy, genes, day, template, weather[:24], season.recipe), applied, memory)

@@ -10,9 +10,11 @@ import pytest
 from igrow.core.bundle import BundleError
 from igrow.core.greenhouse import GreenhouseParameters, tomato
 from igrow.core.planner import Budget, PlanningState, optimise
-from igrow.core.planner.season import Season, SeasonPlan, Strategy, valued
+from igrow.core.planner.season import Season, SeasonPlan, Strategy, run_season, valued
+from igrow.core.planner.season.course import DAMP_PENALTY
 from igrow.core.planner.season.search import SETTINGS, genetic, worth_of
 from igrow.core.planner.template import for_site
+from igrow.core.quantities import SETPOINTS
 from igrow.core.site import Site
 from tests.planner.toy_greenhouse import ToySimulator
 
@@ -112,7 +114,7 @@ def test_the_first_candidate_of_a_day_is_what_the_season_asks_of_it(
     time = START + 5 * DAY
     template = for_site(site, time, 48, radiation=weather[:48, 3])
     asked = plan.setpoints(template, weather[:48], recipe[:48], time)
-    assert asked.shape == (48, 4)
+    assert asked.shape == (48, len(SETPOINTS))
     numbers = plan.numbers(time)
     warm = numbers["day_temperature"] + numbers["warmer_by_sun"] * weather[:24, 3].mean() / 100.0
     assert asked[:24, 0].max() == pytest.approx(warm)
@@ -135,3 +137,41 @@ def test_usual_weather_is_between_the_cold_and_the_mild_day_of_a_date(plan: Seas
     usual = replace(plan, weather=warmth).typical_weather(START + 9 * DAY, 48)
     np.testing.assert_allclose(usual[[0, 47], 0], 0.5)
     np.testing.assert_allclose(replace(plan, weather=warmth).typical_weather(START + 39 * DAY, 24)[:, 0], 2.5)
+
+
+def damp(season: Season) -> Season:
+    """The season of a site whose plans choose a humidity setpoint."""
+    site = season.site
+    chosen = replace(site.planning, optimise=(*site.planning.optimise, "humidity_setpoint"))
+    named = replace(site, setpoints=SETPOINTS, planning=chosen)
+    return replace(season, site=named, simulator=ToySimulator(setpoints=SETPOINTS))
+
+
+def test_a_strategy_says_a_humidity_where_the_computer_takes_one(season: Season, recipe: np.ndarray) -> None:
+    strategy, column = Strategy(DAYS, 2, humidity=True), SETPOINTS.index("humidity_setpoint")
+    assert strategy.genes == Strategy(DAYS, 2).genes + 2
+    genes = np.full(strategy.genes, 0.5, dtype=np.float32)
+    plan = valued(damp(season), strategy, genes, tomato.mature_crop(PLANT, 1.0))
+    again = SeasonPlan.from_json(plan.to_json(), "season.json")
+    assert again.numbers(START)["humidity"] == pytest.approx(82.5)
+    takes, lacks = (for_site(one.site, START, 48, known=one.simulator.setpoints) for one in (damp(season), season))
+    weather = np.tile(season.weather[0], (2, 1))
+    assert again.setpoints(takes, weather, recipe, START)[:, column] == pytest.approx(82.5)
+    # A site that has given it up since keeps its recipe.
+    assert (again.setpoints(lacks, weather, recipe, START)[:, column] == recipe[:, column]).all()
+
+
+def test_a_season_without_a_humidity_is_written_as_before_it_was_known(plan: SeasonPlan) -> None:
+    assert "humidity" not in plan.to_json()
+
+
+def test_a_strategy_pays_for_days_that_it_leaves_damper_than_the_crop_bears(season: Season) -> None:
+    one = damp(season)
+    site = replace(one.site, crop=replace(one.site.crop, humidity_high=82.0))
+    strategy = Strategy(DAYS, 1, humidity=True)
+    genes = np.full((2, strategy.genes), 0.5, dtype=np.float32)
+    genes[:, -1] = (0.2, 0.9)
+    outcome = run_season(replace(one, site=site), strategy, genes, tomato.mature_crop(PLANT, 1.0))
+    assert outcome.penalty[0] == 0.0
+    # All hours of all days are damp, twelve of them beyond what it bears.
+    assert outcome.penalty[1] == pytest.approx(DAYS * 12.0 * DAMP_PENALTY)

@@ -12,17 +12,20 @@ from igrow.core.economics import Balance, harvest_income, local_days, running_co
 from igrow.core.greenhouse import tomato
 from igrow.core.greenhouse.parameters import GreenhouseParameters
 from igrow.core.greenhouse.tomato import Crop
-from igrow.core.planner.objective import DISBELIEF, OUTSIDE_PENALTY
+from igrow.core.planner.objective import DISBELIEF, OUTSIDE_PENALTY, damp_hours
 from igrow.core.planner.season.crop import fresh, like, live, supplied
 from igrow.core.planner.season.strategy import Strategy
 from igrow.core.planner.template import Setpoints, Template, for_site
-from igrow.core.quantities import WEATHER
+from igrow.core.quantities import SETPOINTS, WEATHER
 from igrow.core.simulator.outcome import Outcome, Simulator
 from igrow.core.site import Site
 
 DAY = np.timedelta64(86_400, "s")
 STRETCH = 10
 """Days whose weather is lived as two typical days, each for half of them."""
+DAMP_PENALTY = 0.05
+"""EUR m-2 for each hour of a day that is damp beyond what the crop bears, of strategies that choose the humidity: four
+are worth a day."""
 SUN_WARMS = 0.1
 """Sol-air temperature above that of the air for each W m-2 of global radiation, K."""
 OUTDOOR, RADIATION, WIND = (WEATHER.index(name) for name in ("outdoor_temperature", "global_radiation", "wind_speed"))
@@ -46,7 +49,7 @@ class Season:
     every: int
     """Days for which a typical one stands; the last for those that are left."""
     recipe: Setpoints
-    """The grower's day, (24, 4), for what strategies say nothing of."""
+    """The grower's day, (24, S), for what strategies say nothing of."""
     first_day: int = 0
     """Day of the season on which the start lies; the strategies' days are counted from the season's beginning."""
 
@@ -64,7 +67,7 @@ class SeasonOutcome:
     harvest: Floats
     """kg m-2, (B,)."""
     penalty: Floats
-    """For leaving the range of the training data, EUR m-2, (B,)."""
+    """For leaving the range of the training data, and for air that strategies leave damp, EUR m-2, (B,)."""
     crop: Crop
     """At the end."""
     used: dict[str, Floats]
@@ -108,6 +111,9 @@ def run_season(season: Season, strategy: Strategy, genes: NDArray[np.float32], c
         )
         used = {name: before + repeats * getattr(outcome, name)[0].sum(axis=-1) for name, before in used.items()}
         penalty = penalty + repeats * OUTSIDE_PENALTY * outcome.outside[0].sum(axis=-1) / 24.0
+        if strategy.humidity:
+            too_damp = np.maximum(damp_hours(outcome, site) - site.crop.agronomy.damp_hours, 0.0)
+            penalty = penalty + repeats * DAMP_PENALTY * too_damp
         for day in range(first, first + repeats):
             before = fresh(p, plants)
             plants = live(p, plants, supply, warm, leaves)
@@ -158,14 +164,14 @@ def _typical_day(
     twice = np.tile(weather, (2, 1))
     template = for_site(season.site, start, 48, radiation=twice[:, RADIATION])
     wanted = asked(strategy, genes, season.first_day + day, template, weather, season.recipe)
-    course = template.follow(np.tile(wanted, (1, 2, 1)), np.full(4, np.nan)).setpoints
+    course = template.follow(np.tile(wanted, (1, 2, 1)), np.full(len(SETPOINTS), np.nan)).setpoints
     return season.simulator.simulate(dict(MORNING), twice, course, start - DAY).last(24)
 
 
 def asked(
     strategy: Strategy, genes: NDArray[np.float32], day: float, template: Template, weather: Floats, recipe: Setpoints
 ) -> Setpoints:
-    """Return what strategies ask of a day, (B, 24, 4), whose hours are the first 24 of a template."""
+    """Return what strategies ask of a day, (B, 24, S), whose hours are the first 24 of a template."""
     moments = template.moments[:24]
     local_hour = np.array([one.clock for one in moments])
     sun_up = np.array([one.sun_up for one in moments])

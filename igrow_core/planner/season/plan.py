@@ -23,6 +23,7 @@ from igrow.core.planner.season.course import DAY, Season, run_season
 from igrow.core.planner.season.strategy import Strategy
 from igrow.core.planner.season.worth import CropWorth, MarginalValues, marginal_values
 from igrow.core.planner.template import Setpoints, Template
+from igrow.core.quantities import SETPOINTS
 from igrow.core.site import Site
 
 SEASON_FILE = "season.json"
@@ -49,11 +50,13 @@ class SeasonPlan:
     """As they are expected, one crop each: floats, and (STAGES,) for fruit."""
     weather: Floats
     """Of each date's typical day, a cold and a mild one in turn, hourly means in the registry's order, (D, 24, 6)."""
+    humidity: bool = False
+    """Whether the strategy says a setpoint of the humidity."""
 
     @property
     def strategy(self) -> Strategy:
         """How the genes become a day's numbers."""
-        return Strategy(self.days, self.knots)
+        return Strategy(self.days, self.knots, humidity=self.humidity)
 
     def day_of(self, time: np.datetime64) -> float:
         """Return the day of the season at a UTC time, counted from its first."""
@@ -69,12 +72,12 @@ class SeasonPlan:
         return {name: float(value[0]) for name, value in said.items()}
 
     def setpoints(self, template: Template, weather: Floats, recipe: Setpoints, time: np.datetime64) -> Setpoints:
-        """Return what the strategy asks of a horizon of whole days from a UTC time on, (H, 4), before any limit.
+        """Return what the strategy asks of a horizon of whole days from a UTC time on, (H, S), before any limit.
 
         Args:
             template: of the horizon.
             weather: that is expected, (H, 6).
-            recipe: (H, 4), for what a strategy says nothing of.
+            recipe: (H, S), for what a strategy says nothing of.
             time: at which the horizon begins.
         """
         days = []
@@ -84,7 +87,12 @@ class SeasonPlan:
             sun_up = np.array([one.sun_up for one in template.moments[hours]])
             day = self.day_of(time) + first / 24.0
             days.append(self.strategy.setpoints(self.genes[None], day, clock, sun_up, weather[hours], recipe[hours])[0])
-        return np.concatenate(days)
+        asked = np.concatenate(days)
+        # A site may have given up a setpoint since.
+        column = SETPOINTS.index("humidity_setpoint")
+        if "humidity_setpoint" not in template.free:
+            asked[:, column] = recipe[:, column]
+        return asked
 
     def typical_weather(self, time: np.datetime64, hours: int) -> Floats:
         """Return the weather that is usual from a UTC time on, (hours, 6): the mean of the stretch's two days."""
@@ -137,7 +145,7 @@ class SeasonPlan:
             "weather": np.round(self.weather, 2).tolist(),
             "crops": [{name: np.asarray(part).tolist() for name, part in one._asdict().items()} for one in self.crops],
         }  # fmt: skip
-        return json.dumps(content)
+        return json.dumps(content | ({"humidity": True} if self.humidity else {}))
 
     @classmethod
     def from_json(cls, text: str, where: str) -> SeasonPlan:
@@ -162,6 +170,7 @@ class SeasonPlan:
                     for one in given["crops"]
                 ),
                 np.array(given["weather"], dtype=np.float64),
+                bool(given.get("humidity", False)),
             )
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise BundleError(f"{where}: is no season: {error}") from None
@@ -200,8 +209,9 @@ def valued(season: Season, strategy: Strategy, genes: Genes, crop: Crop) -> Seas
     net_profit = float(outcome.balance.net_profit[0])
     weather = season.weather[: len(crops)]
     return SeasonPlan(
-        season.start, season.days, season.every, strategy.knots, genes, net_profit, values, crops, weather
-    )
+        season.start, season.days, season.every, strategy.knots, genes, net_profit, values, crops, weather,
+        strategy.humidity,
+    )  # fmt: skip
 
 
 def _one(crop: Crop) -> Crop:

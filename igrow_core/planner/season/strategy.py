@@ -27,6 +27,8 @@ RANGES = {
 }
 """What a strategy says, and between what: degC, degC, K for each 100 W m-2 of the day's mean radiation, ppm while there
 is light, h a day, local hour (before midnight negative), W m-2 of sun above which lamps rest."""
+HUMIDITY = {"humidity": (75.0, 90.0)}
+"""What it says beside where the climate computer takes a humidity setpoint: % above which vents open."""
 UNITS = {
     "day_temperature": "degC",
     "night_temperature": "degC",
@@ -35,6 +37,7 @@ UNITS = {
     "lamp_hours": "h",
     "lamps_from": "h",
     "lamps_below": "W m-2",
+    "humidity": "%",
 }
 """Units of what a strategy says, as its sentences name them."""
 NO_CO2 = 400.0
@@ -51,21 +54,30 @@ class Strategy:
     """Dates, evenly over the season."""
     ends: bool = False
     """Whether one more gene tells the day from which on the lamps stay off."""
+    humidity: bool = False
+    """Whether the climate computer takes a setpoint of the humidity."""
+
+    @property
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """What it says, and between what."""
+        return RANGES | HUMIDITY if self.humidity else RANGES
 
     @property
     def genes(self) -> int:
         """Number of genes."""
-        return len(RANGES) * self.knots + self.ends
+        return len(self.ranges) * self.knots + self.ends
 
     def numbers(self, genes: NDArray[np.float32], day: float) -> dict[str, Floats]:
         """Return the numbers of `RANGES` by name on a day counted from the season's first, (B,) each."""
-        knots = genes[:, : len(RANGES) * self.knots].astype(np.float64).reshape(len(genes), len(RANGES), self.knots)
+        count = len(self.ranges)
+        knots = genes[:, : count * self.knots].astype(np.float64).reshape(len(genes), count, self.knots)
         place = min(max(day / max(self.days - 1, 1), 0.0), 1.0) * (self.knots - 1)
         left = min(int(place), max(self.knots - 2, 0))
         share = place - left
         between = knots[:, :, left] * (1.0 - share) + knots[:, :, min(left + 1, self.knots - 1)] * share
         numbers = {
-            name: low + between[:, column] * (high - low) for column, (name, (low, high)) in enumerate(RANGES.items())
+            name: low + between[:, column] * (high - low)
+            for column, (name, (low, high)) in enumerate(self.ranges.items())
         }
         if self.ends:
             numbers["lamp_hours"] = numbers["lamp_hours"] * (day < genes[:, -1] * self.days)
@@ -76,7 +88,7 @@ class Strategy:
         days = np.linspace(0.0, self.days - 1.0, self.knots)
         numbers = [rule.numbers(genes[None], day) for day in days]
         columns = [
-            [(float(one[name][0]) - low) / (high - low) for one in numbers] for name, (low, high) in RANGES.items()
+            [(float(one[name][0]) - low) / (high - low) for one in numbers] for name, (low, high) in self.ranges.items()
         ]
         return np.array([share for column in columns for share in column] + [1.0] * self.ends, dtype=np.float32)
 
@@ -89,7 +101,7 @@ class Strategy:
         weather: Floats,
         recipe: Setpoints,
     ) -> Setpoints:
-        """Return a day's setpoints (B, H, 4), before any limit.
+        """Return a day's setpoints (B, H, S), before any limit.
 
         Args:
             genes: (B, G).
@@ -97,7 +109,7 @@ class Strategy:
             local_hour: at which each hour begins, (H,).
             sun_up: (H,).
             weather: that is expected, (H, 6).
-            recipe: the grower's setpoints, (H, 4), for what a strategy says nothing of.
+            recipe: the grower's setpoints, (H, S), for what a strategy says nothing of.
         """
         said = {name: value[:, None] for name, value in self.numbers(genes, day).items()}
         radiation = weather[:, WEATHER.index("global_radiation")]
@@ -112,11 +124,13 @@ class Strategy:
             ("co2_setpoint", np.where(light, said["co2"], NO_CO2)),
         ):
             setpoints[:, :, SETPOINTS.index(name)] = values
+        if self.humidity:
+            setpoints[:, :, SETPOINTS.index("humidity_setpoint")] = said["humidity"]
         return setpoints
 
     def table(self, genes: NDArray[np.float32], every: int = 14) -> list[str]:
         """Return the strategy (G,) as lines for people, a row for every `every` days."""
-        lines = ["  day" + "".join(f"{name:>19s}" for name in RANGES)]
+        lines = ["  day" + "".join(f"{name:>19s}" for name in self.ranges)]
         for day in range(0, self.days, every):
             numbers = self.numbers(genes[None], day)
             lines.append(f"{day:5d}" + "".join(f"{float(value[0]):19.1f}" for value in numbers.values()))
