@@ -27,7 +27,8 @@ def test_the_sensors_show_every_quantity_within_its_range(winter: Telemetry) -> 
     for _ in range(24):
         plant.step(300, recipe(plant.time))
     measured = plant.measurements()
-    assert set(measured) == {name for name, quantity in QUANTITIES.items() if quantity.kind is not Kind.MARK}
+    known = {name for name, quantity in QUANTITIES.items() if quantity.kind is not Kind.MARK}
+    assert set(measured) == known - {"humidity_setpoint"}  # which the recipe does not give
     for name, value in measured.items():
         assert QUANTITIES[name].holds(value), name
 
