@@ -117,6 +117,14 @@ RESULTS = {
         "greenhouse and weather 700; strategies 5",
         long=True,
     ),
+    "season-humidity": Result(
+        "A season with a humidity setpoint and without",
+        ("benchmarks.season_humidity",),
+        "150 days, at today's prices; tuned in a simulator whose vents answer to the setpoint, and led through greenhouses "
+        "whose climate computer takes one.",
+        "greenhouses and weather 700; the seasons that teach the vents' rule 31",
+        long=True,
+    ),
     "season-plans": Result(
         "A plan a day through a short season",
         ("benchmarks.season_plans", "--days", "40", "--houses", "3", "--generations", "24"),
