@@ -120,8 +120,8 @@ RESULTS = {
     "season-humidity": Result(
         "A season with a humidity setpoint and without",
         ("benchmarks.season_humidity",),
-        "150 days, at today's prices; tuned in a simulator whose vents answer to the setpoint, and led through greenhouses "
-        "whose climate computer takes one.",
+        "150 days, at today's prices; tuned in a simulator whose vents answer to the setpoint, and led through "
+        "greenhouses whose climate computer takes one.",
         "greenhouses and weather 700; the seasons that teach the vents' rule 31",
         long=True,
     ),

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from igrow.core import sun
-from igrow.core.arrays import Floats
+from igrow.core.arrays import Floats, Times
 from igrow.core.simulator import actuation
 from igrow.core.simulator.closed_loop import closed_run
 from igrow.core.simulator.hybrid import record as records
@@ -40,6 +40,12 @@ def weather(days: int, step: float, seed: int) -> dict[str, Floats]:
         "sky_temperature": temperature - 4.0 - 14.0 * clear,
         "outdoor_co2": np.full(count, 415.0),
     }
+
+
+def leaf_area(time: Times) -> Floats:
+    """Return a leaf area index that is measured, (n,): 2.4 when the logs begin."""
+    planted = (time - np.datetime64("2019-12-16", "s")).astype(np.float64) / 86_400.0
+    return np.asarray(3.0 / (1.0 + np.exp(-(planted - 35.0) / 9.0)))
 
 
 def setpoints(days: int, step: float) -> dict[str, Floats]:
@@ -76,11 +82,12 @@ def virtual_log(
     added: Mapping[str, Floats] | None = None,
     noise: bool = True,
     followed: Mapping[str, Floats] | None = None,
+    measures_leaves: bool = False,
 ) -> Telemetry:
     """Return the log of a virtual greenhouse.
 
     `added` are fluxes that the simulator does not know, (n,); `followed` setpoints that the plant follows in place of
-    those that the log has, (n,).
+    those that the log has, (n,). Where nobody measures its leaves the crop has the usual course.
     """
     generator = np.random.default_rng(seed + 1)
     outside, asked = weather(days, step, seed), setpoints(days, step)
@@ -92,14 +99,15 @@ def virtual_log(
         "air_humidity": np.full(count, 75.0),
         "air_co2": np.full(count, 450.0),
     }
-    blank = Telemetry(time, outside | empty | begin)
+    leaves = {"leaf_area_index": leaf_area(time)} if measures_leaves else {}
+    blank = Telemetry(time, outside | empty | begin | leaves)
     record = site_record(blank, SITE, step)
     values = dict(parameters or nominal(SITE))
     states = records.observe(record, values, {})
     out = closed_run(
         record, states, {**asked, **(followed or {})}, [0], count - 1, values, {}, actuation.default_rules(), added
     )
-    columns = dict(outside) | asked
+    columns = dict(outside) | asked | leaves
     for name in ("air_temperature", "air_humidity", "air_co2"):
         columns[name] = np.concatenate([begin[name][:1], out[name][:, 0]])
     for name in actuation.OUTPUTS:

@@ -44,7 +44,8 @@ def greenhouse_log(
     fluxes = disturbances(days, STEP, seed)
     for channel, flux in (added or {}).items():
         fluxes[channel] = fluxes.get(channel, 0.0) + flux
-    return prepare_log(virtual_log(days, seed=seed, step=STEP, added=fluxes, followed=followed), SITE)
+    measured = virtual_log(days, seed=seed, step=STEP, added=fluxes, followed=followed, measures_leaves=True)
+    return prepare_log(measured, SITE)
 
 
 def model_in_force() -> FittedModel:

@@ -80,6 +80,7 @@ def test_what_is_not_asked_of_a_crop_that_grew_is_said(quiet_log: Log) -> None:
     site = quiet_log.known_site
     planted = quiet_log.telemetry.time[0].astype("datetime64[D]").item() - datetime.timedelta(days=60)
     log = replace(quiet_log, site=replace(site, crop=replace(site.crop, planting_date=planted)))
+    log = log.without("leaf_area_index")
     result = diagnose(log, calibrated(np.datetime64(f"{planted}T00:00:00") + np.timedelta64(20, "D")))
     assert wording.GROWN_CROP in result.notes
     assert wording.NEW_CROP not in result.notes
