@@ -134,6 +134,20 @@ def test_a_model_without_a_finite_error_at_the_start_is_refused(broken) -> None:
         solve(broken, lambda _: np.eye(1), prior, -FAR[:1], FAR[:1])
 
 
+def test_a_parameter_whose_difference_diverges_stays_and_the_others_are_fitted() -> None:
+    prior = Gaussian.independent({"a": 0.0, "b": 0.0}, {"a": 1.0, "b": 1.0})
+    measured = np.linspace(0.0, 3.0, 20)
+
+    def batch(points: np.ndarray) -> np.ndarray:
+        a, b = points[:, :1], points[:, 1:]
+        return np.where(b > 0.0, np.nan, 10.0 * (a * measured - 2.0 * measured))
+
+    residuals, jacobian = by_differences(batch, prior, FAR[:2])
+    found = solve(residuals, jacobian, prior, -FAR[:2], FAR[:2])
+    assert found.posterior.values["a"] == pytest.approx(2.0, rel=1e-3)
+    assert found.posterior.values["b"] == 0.0
+
+
 def test_the_covariance_by_other_weights_is_that_of_a_fit_with_these() -> None:
     prior, (design, measured) = known(), linear()
     found = solve(lambda x: design @ x - measured, lambda _: design, prior, -FAR, FAR)

@@ -107,7 +107,10 @@ def solve(
     def slopes(moved: Floats) -> Floats:
         nonlocal latest, steps
         point = begin + scale * moved
-        latest = point, residuals(point), jacobian(point)
+        slope = jacobian(point)
+        # What runs out of all bounds a little further on stays where it is in this step.
+        runs = np.isfinite(slope[weight > 0.0]).all(axis=0)
+        latest = point, residuals(point), np.where(runs, slope, 0.0)
         if progress is not None:
             progress(steps, latest[1])
         steps += 1
