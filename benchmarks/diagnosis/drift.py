@@ -143,21 +143,32 @@ def false_parameters(logs: Sequence[NullLog], gains: Sequence[dict[str, float]])
     return claims
 
 
-def season_logs(job: tuple[str, int]) -> list[NullLog]:
-    """Simulate the nursery of a season, calibrate, and lay out its later logs."""
-    season, first = job
-    known = nursery(season, GREENHOUSES, first)
-    references = []
-    for own_log in zip(known.greenhouses, calibration_logs(known), strict=True):
-        references.append(calibrated(own_log))
-        print(f"{season}: {len(references)} of {GREENHOUSES} calibrated", file=sys.stderr, flush=True)
-    cases = null_cases(season, references)
-    logs = later_logs(references, cases, DAYS)
-    found = []
-    for one, own, seen in zip(references, cases, logs, strict=True):
-        found += [null_log((one, case, log)) for case, log in zip(own, seen, strict=True)]
-        print(f"{season}: {len(found)} logs", file=sys.stderr, flush=True)
-    return found
+def unchanged(jobs: Jobs) -> list[tuple[Reference, Case, Telemetry]]:
+    """Simulate the nurseries and calibrate their greenhouses; return the later logs in which nothing is missing."""
+    known = {season: nursery(season, GREENHOUSES, first) for season, first in SEEDS.items()}
+    weeks = jobs.each(calibration_logs, known.values())
+    own = [
+        pair
+        for one, logs in zip(known.values(), weeks, strict=True)
+        for pair in zip(one.greenhouses, logs, strict=True)
+    ]
+    references: list[Reference] = []
+    for one in jobs.each(calibrated, own):
+        references.append(one)
+        print(f"{len(references)} of {len(own)} calibrated", file=sys.stderr, flush=True)
+    by_season = [references[place : place + GREENHOUSES] for place in range(0, len(references), GREENHOUSES)]
+    cases = [null_cases(season, houses) for season, houses in zip(SEEDS, by_season, strict=True)]
+    later = jobs.each(_later, list(zip(by_season, cases, strict=True)))
+    return [
+        (one, case, log)
+        for houses, asked, logs in zip(by_season, cases, later, strict=True)
+        for one, mine, seen in zip(houses, asked, logs, strict=True)
+        for case, log in zip(mine, seen, strict=True)
+    ]
+
+
+def _later(job: tuple[Sequence[Reference], Sequence[Sequence[Case]]]) -> list[list[Telemetry]]:
+    return later_logs(*job, DAYS)
 
 
 def learn(logs: Sequence[NullLog]) -> Drift:
@@ -169,8 +180,9 @@ def main(processes: int) -> int:
     """Write the drift into the package."""
     logs: list[NullLog] = []
     with Jobs("diagnosis drift", processes) as jobs:
-        for found_logs in jobs.each(season_logs, SEEDS.items()):
-            logs += found_logs
+        for one in jobs.each(null_log, unchanged(jobs)):
+            logs.append(one)
+            print(f"{len(logs)} logs", file=sys.stderr, flush=True)
     gains: list[dict[str, float]] = []
     for season in SEEDS:
         learned = learn([one for one in logs if one.season != season])

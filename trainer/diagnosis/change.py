@@ -44,7 +44,7 @@ def changed(design: Design, explained: float, rng: np.random.Generator, *, cause
         return nothing
     if pattern is not None and left_by_hour(design, null, cause, rng) >= rules.least_left_by_hour:
         return replace(nothing, patterns=(pattern,))
-    return _round(design, null, cause, rng)
+    return round_of(design, null, cause, rng)
 
 
 def left_by_hour(design: Design, null: Fit, cause: Hypothesis, rng: np.random.Generator) -> float:
@@ -90,7 +90,7 @@ def proven_gain(design: Design, one: Hypothesis) -> float:
     return math.sqrt(by_noise * by_days)
 
 
-def _round(design: Design, null: Fit, cause: Hypothesis, rng: np.random.Generator) -> Round:
+def round_of(design: Design, null: Fit, cause: Hypothesis, rng: np.random.Generator) -> Round:
     """Return both models under the noise that is left beside the cause: its scale and weights, not its colour."""
     model = null.model.with_term(cause.term)
     named = linear.fit(design.grams, model)

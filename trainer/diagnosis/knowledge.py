@@ -117,10 +117,11 @@ def activate(record: Record, terms: Sequence[ActiveTerm]) -> dict[str, dict[str,
     for term in terms:
         definition = EFFECTS[term.effect]
         amplitude: Array = term.amplitude
-        if term.onset is not None:
+        ages = "elapsed_days" in definition.drivers
+        if term.onset is not None and (ages or term.onset > record.time[0]):
             age = (record.time - term.onset).astype("timedelta64[s]").astype(np.float64) / 86_400.0
             share = (age >= 0.0).astype(np.float64)
-            if "elapsed_days" in definition.drivers:
+            if ages:
                 # The record counts from its first instant; the effect counts from its own beginning.
                 share = np.maximum(age, 0.0) / np.maximum(np.asarray(record.inputs["elapsed_days"]), 1e-9)
             amplitude = term.amplitude * share

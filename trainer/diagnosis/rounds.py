@@ -9,7 +9,7 @@ import numpy as np
 
 from igrow.core.arrays import Floats
 from igrow.core.site import Site
-from igrow.trainer.diagnosis import history, parameter_change
+from igrow.trainer.diagnosis import fitted_change, history, parameter_change
 from igrow.trainer.diagnosis.change import changed
 from igrow.trainer.diagnosis.compare import Round, compare
 from igrow.trainer.diagnosis.design import Design, prepare
@@ -122,8 +122,11 @@ class Change(Search):
     """How greenhouses like it change with time; None: what came with the trainer."""
 
     def judge(self, design: Design, explained: float, rng: np.random.Generator, *, causes: bool) -> Round:
-        """Return what one round finds."""
-        return changed(design, explained, rng, causes=causes)
+        """Return what one round finds; where time steps tell nothing, fits to free runs are asked."""
+        judged = changed(design, explained, rng, causes=causes)
+        if judged.cause is not None or judged.patterns or explained > 0.0:
+            return judged
+        return fitted_change.find(self.days, self.knowledge, self.by_physics(), rng) or judged
 
     def design(self, terms: Sequence[ActiveTerm], interval: float) -> Design:
         """Return the design of a model with terms, about the calibrated parameters."""
@@ -131,8 +134,11 @@ class Change(Search):
 
     def changed_parameter(self, rng: np.random.Generator) -> ParameterChange | None:
         """Return the parameter that has changed where no effect is missing."""
-        by_physics = (self.drift or read_drift()).by_physics()
-        return parameter_change.find(self._expected(self.knowledge.terms, by_physics), rng)
+        return parameter_change.find(self.by_physics(), rng)
+
+    def by_physics(self) -> Design:
+        """Return the design in which all changes by physics alone."""
+        return self._expected(self.knowledge.terms, (self.drift or read_drift()).by_physics())
 
     def _expected(self, terms: Sequence[ActiveTerm], drift: Drift) -> Design:
         plain = history.laid_out(self.days, self.site, self.history, terms, self.rules) if terms else self.plain

@@ -68,8 +68,15 @@ class DecisionRules:
     pattern_drift: float = _tuned(0.005, "the same of a pattern, in its units")
     change_onset_price: float = _tuned(12.0, "gain that a beginning of a change must add")
     change_last_days: int = _tuned(5, "days at the end of a log in which no beginning of a change is looked for")
-    change_over_null: float = _tuned(1.3, "times its largest gain where nothing had changed that a change must bring")
+    change_over_null: float = _tuned(
+        1.3, "times the most that it brought where nothing had changed that a change must bring"
+    )
     least_change_skill: float = _tuned(-0.01, "share that a first change removes: chance makes as much of four days")
+    least_fitted_change: float = _chosen(10.0, "gain by physics alone from which on a change is fitted to free runs")
+    most_change_fits: int = _chosen(3, "changes that are fitted beside the parameters, those that gain most")
+    least_change_fall: float = _fitted(
+        "share of the error of unseen days that such a change must remove: more than any where nothing had changed"
+    )
     least_pattern_change: float = _tuned(60.0, "the same of a pattern: greenhouses drift with the weather")
     least_proven_pattern: float = _tuned(20.0, "of it, what the scatter of day scores must bear out")
     pattern_over_change: float = _tuned(1.5, "times a change's gain at which a pattern replaces it")

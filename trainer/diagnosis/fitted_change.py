@@ -1,0 +1,103 @@
+"""A change that time steps alone do not prove: told by fits to free runs of a day, beside all parameters.
+
+What greenhouses show by themselves when nothing has changed lets much pass for drift: a sensor that is off, what a crop
+transpires at night. By physics alone such a change stands out, and so does, in some greenhouses, one that is not
+there. A free run of a day tells these apart: the effects that gain most by physics are fitted beside parameters that
+change by physics, and that which brings the fitted days closest to what was measured must make days better that no
+fit saw, by more than any does where nothing has changed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from igrow.core.arrays import Mask
+from igrow.core.effects import EFFECTS
+from igrow.core.simulator.hybrid.climate import ActiveEffects
+from igrow.core.simulator.hybrid.record import Record
+from igrow.trainer.diagnosis import change, linear, search
+from igrow.trainer.diagnosis.candidates import Candidate
+from igrow.trainer.diagnosis.compare import Round
+from igrow.trainer.diagnosis.design import Design
+from igrow.trainer.diagnosis.freerun import LogDays
+from igrow.trainer.diagnosis.knowledge import Knowledge, activate, home_drift
+from igrow.trainer.diagnosis.omission import WIDE, fall
+from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.fit.climate import fit_climate
+from igrow.trainer.fit.evaluation import Model, held_out_errors
+from igrow.trainer.fit.gaussian import Gaussian
+from igrow.trainer.fit.solver import DivergenceError
+
+
+def find(days: LogDays, knowledge: Knowledge, design: Design, rng: np.random.Generator) -> Round | None:
+    """Return the round in which a fit names a change; None where none makes unseen days better.
+
+    Args:
+        days: of the log.
+        knowledge: of the greenhouse before it.
+        design: of the log, in a greenhouse that changes by physics alone.
+        rng: for flips and bootstraps.
+    """
+    null = linear.fit(design.grams, design.null_model())
+    found = closest(days, knowledge, design, promising(design, rng))
+    if found is None or found[1] < design.rules.least_change_fall:
+        return None
+    return change.round_of(design, null, found[0], rng)
+
+
+def promising(design: Design, rng: np.random.Generator) -> list[Hypothesis]:
+    """Return the effects that gain enough by physics to be fitted, that which gains most first."""
+    assert design.history is not None
+    null, rules = linear.fit(design.grams, design.null_model()), design.rules
+    scored = search.score_candidates(design, null, [None], rng)
+    asked = (one for one in scored if one.effect not in design.history.without)
+    ranked = sorted(asked, key=lambda one: change.net_gain(design, one), reverse=True)
+    return [
+        one for one in ranked[: rules.most_change_fits] if change.net_gain(design, one) >= rules.least_fitted_change
+    ]
+
+
+def closest(
+    days: LogDays, knowledge: Knowledge, design: Design, hypotheses: list[Hypothesis]
+) -> tuple[Hypothesis, float] | None:
+    """Return the hypothesis that brings the fitted days closest to what was measured, and its fall on unseen days.
+
+    The fall is the share of the error a day ahead that goes, the mean of all quantities.
+    """
+    record, fitted = days.record, days.split.fit_rows
+    known = activate(record, knowledge.terms)
+    # Of what began within the log there is no one size beside which another could be fitted.
+    if not hypotheses or any(np.ndim(value) for effect in known.values() for value in effect.values()):
+        return None
+    prior = knowledge.posterior.widened(home_drift(knowledge.posterior.values, design.rules))
+    try:
+        without: Model = (fit_climate([(record, fitted)], prior, known).values, known)
+    except DivergenceError:
+        return None
+    best: tuple[Hypothesis, float] | None = None
+    largest = 0.0
+    for one in hypotheses:
+        try:
+            model = _fit(record, fitted, prior, known, one)
+        except DivergenceError:
+            continue
+        if (closer := fall(held_out_errors(record, fitted, without, model))) > largest:
+            largest = closer
+            best = (one, fall(held_out_errors(record, ~fitted, without, model)))
+    return best
+
+
+def _fit(record: Record, rows: Mask, prior: Gaussian, known: ActiveEffects, one: Hypothesis) -> Model:
+    """Return parameters and the size of an effect, fitted together to free runs."""
+    assert isinstance(one.cause, Candidate)
+    size, shape = EFFECTS[one.effect].amplitude, one.cause.values
+    name = f"{one.effect}:{size.name}"
+    joint = Gaussian(
+        (*prior.names, name),
+        np.append(prior.mean, np.clip(one.amplitude, size.low, size.high)),
+        block_diag(prior.covariance, (WIDE * size.typical) ** 2),
+    )
+    fitted = fit_climate([(record, rows)], joint, {**known, one.effect: dict(shape)})
+    sizes = {size.name: fitted.values[name], **shape}
+    return fitted.marginal(prior.names).values, {**known, one.effect: sizes}
