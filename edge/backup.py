@@ -76,7 +76,7 @@ def put_back(archive: Path, configuration: Path) -> Configuration:
         scratch = Path(name)
         try:
             with tarfile.open(archive, "r:gz") as source:
-                source.extractall(scratch, filter="data")
+                _unpack(source, scratch)
         except (OSError, EOFError, tarfile.TarError) as error:
             raise BackupError(f"{archive}: the backup cannot be restored: {error}") from None
         if not (scratch / STORE).is_file() or not (scratch / CONFIGURATION / DAEMON_FILE).is_file():
@@ -89,6 +89,27 @@ def put_back(archive: Path, configuration: Path) -> Configuration:
             store.restore(scratch / STORE, found.store_folder)
             _place(scratch / STATE, found.state_folder, {})
     return found
+
+
+def _unpack(source: tarfile.TarFile, folder: Path) -> None:
+    """Unpack plain files into a folder; Debian 12's Python has no filter for that yet.
+
+    Raises:
+        TarError: a member is none, or lies outside the folder.
+    """
+    home = folder.resolve()
+    for member in source:
+        goal = (home / member.name).resolve()
+        if not (member.isfile() or member.isdir()) or not goal.is_relative_to(home):
+            raise tarfile.TarError(f"{member.name} is no file of a backup")
+        content = source.extractfile(member)
+        if content is None:
+            continue
+        goal.parent.mkdir(parents=True, exist_ok=True)
+        with content, goal.open("wb") as file:
+            shutil.copyfileobj(content, file)
+        # Whoever else may read a file, nobody else may write to it.
+        goal.chmod(member.mode & 0o755 | 0o600)
 
 
 def _configuration_files(configuration: Configuration) -> tuple[dict[str, Path], list[Path]]:

@@ -87,10 +87,13 @@ def test_a_file_of_the_configuration_that_lies_elsewhere_is_named(tmp_path, gate
     assert back_up(load_configuration(gateway.path), tmp_path / "backup.tar.gz") == [elsewhere]
 
 
-def test_an_archive_that_would_write_outside_its_folder_is_refused(tmp_path):
+@pytest.mark.parametrize(("name", "kind"), [("../../evil", tarfile.REGTYPE), ("state/link", tarfile.SYMTYPE)])
+def test_an_archive_that_would_write_outside_its_folder_is_refused(tmp_path, name, kind):
     archive = tmp_path / "evil.tar.gz"
     with tarfile.open(archive, "w:gz") as made:
-        made.addfile(tarfile.TarInfo("../../evil"))
+        member = tarfile.TarInfo(name)
+        member.type, member.linkname = kind, "/etc" if kind == tarfile.SYMTYPE else ""
+        made.addfile(member)
     with pytest.raises(BackupError, match="cannot be restored"):
         put_back(archive, tmp_path / "new" / "daemon.yaml")
     assert not (tmp_path / "new").exists()
