@@ -3,11 +3,12 @@
     python -m benchmarks.season_humidity [--houses 8] [--generations 36] [--led 150]
 
 The built-in bundle's simulator is given vents that open by the larger of what temperature and humidity ask, fitted to
-virtual seasons in which the humidity setpoint was moved each day. On it a strategy of six dates is tuned, without the
-setpoint and with it. Both, the second at the computers' own humidity too, and the strategy that was tuned on the
-built-in bundle as it is, lead the greenhouses of `benchmarks.seasons judge` (8 % off, own weather, two undeclared
-effects) at today's prices, for the first `--led` days. Less than the whole season says little of fruit that was picked,
-so growth is told too, at the price that fruit now growing earns on average. Damp hours are those of the greenhouses.
+virtual seasons in which the humidity setpoint was moved each day. On it a rule and a strategy of six dates are tuned,
+without the setpoint and with it. Both strategies, the second at the computers' own humidity too, the rule with it, and
+rule and strategy that were tuned on the built-in bundle as it is, lead the greenhouses of `benchmarks.seasons judge`
+(8 % off, own weather, two undeclared effects) at today's prices beside the recipe, for the first `--led` days. Less
+than the whole season says little of fruit that was picked, so growth is told too, at the price that fruit now growing
+earns on average. Damp hours are those of the greenhouses.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.led_greenhouses import run
-from benchmarks.season_houses import DAY, PARTS, START, Houses, Led, lead, money
+from benchmarks.season_houses import DAY, PARTS, START, Houses, Led, Recipe, Way, lead, money
 from benchmarks.seasons import GROWN_AND_USED, STRATEGIES, brought, described, season_of, ways_of
 from igrow.core.arrays import Floats
 from igrow.core.bundle import default_bundle_folder, read_bundle
@@ -117,13 +118,17 @@ def main() -> int:
         simulator = BundleSimulator(export(model, Path(folder) / "bundle"), site.greenhouse, members=1)
         season = replace(season_of(site, days), simulator=simulator)
         crop = tomato.mature_crop(season.plant, 1.0)
-        genes = np.array([given["strategies"]["today"]["season"]["genes"]], dtype=np.float32)
-        ways: dict[str, Led] = {"built-in": Led(ways_of(days)["season"], genes)}
+        ways: dict[str, Way] = {"recipe": Recipe()}
+        for name, kind in (("rule", "rule"), ("built-in", "season")):
+            genes = np.array([given["strategies"]["today"][kind]["genes"]], dtype=np.float32)
+            ways[name] = Led(ways_of(days)[kind], genes)
         for name, humidity in (("without", False), ("with", True)):
             rule, strategy = Strategy(days, 1, ends=True, humidity=humidity), Strategy(days, 6, humidity=humidity)
-            best, _ = rule_and_strategy(season, rule, strategy, crop, arguments.generations)["season"]
+            found = rule_and_strategy(season, rule, strategy, crop, arguments.generations)
+            best, _ = found["season"]
             ways[name] = Led(strategy, best[None])
             if humidity:
+                ways["rule with"] = Led(rule, found["rule"][0][None])
                 low, high = strategy.ranges["humidity"]
                 held = best.copy()
                 held[-strategy.knots :] = (HUMIDITY - low) / (high - low)
@@ -131,13 +136,15 @@ def main() -> int:
             print(f"{name}:")
             print("\n".join(strategy.table(best, 30)), flush=True)
         for name, way in ways.items():
+            if not isinstance(way, Led):
+                continue
             net = float(run_season(season, way.strategy, way.genes, crop).balance.net_profit[0])
             print(f"{name:10s}expected net {net:.2f} EUR m-2", flush=True)
     led_through(site, ways, arguments.led, arguments.houses)
     return 0
 
 
-def led_through(site: Site, ways: Mapping[str, Led], days: int, houses: int) -> None:
+def led_through(site: Site, ways: Mapping[str, Way], days: int, houses: int) -> None:
     """Lead greenhouses through the first days of a season, and print what came of it."""
     stood: list[TakingHouses] = []
 

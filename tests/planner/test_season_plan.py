@@ -10,8 +10,9 @@ import pytest
 from igrow.core.bundle import BundleError
 from igrow.core.greenhouse import GreenhouseParameters, tomato
 from igrow.core.planner import Budget, PlanningState, optimise
+from igrow.core.planner.optimise import NOT_ADMITTED
 from igrow.core.planner.season import Season, SeasonPlan, Strategy, run_season, valued
-from igrow.core.planner.season.course import DAMP_PENALTY
+from igrow.core.planner.season.course import bearable_damp
 from igrow.core.planner.season.search import SETTINGS, genetic, worth_of
 from igrow.core.planner.template import for_site
 from igrow.core.quantities import SETPOINTS
@@ -165,13 +166,23 @@ def test_a_season_without_a_humidity_is_written_as_before_it_was_known(plan: Sea
     assert "humidity" not in plan.to_json()
 
 
-def test_a_strategy_pays_for_days_that_it_leaves_damper_than_the_crop_bears(season: Season) -> None:
+def test_a_strategy_that_leaves_days_damper_than_the_crop_bears_is_not_admitted(season: Season) -> None:
     one = damp(season)
-    site = replace(one.site, crop=replace(one.site.crop, humidity_high=82.0))
-    strategy = Strategy(DAYS, 1, humidity=True)
+    # Where the toy's recipe holds 85 %, a crop that bears 86 is never damp under it.
+    site = replace(one.site, crop=replace(one.site.crop, humidity_high=86.0))
+    strategy, crop = Strategy(DAYS, 1, humidity=True), tomato.mature_crop(PLANT, 1.0)
     genes = np.full((2, strategy.genes), 0.5, dtype=np.float32)
     genes[:, -1] = (0.2, 0.9)
-    outcome = run_season(replace(one, site=site), strategy, genes, tomato.mature_crop(PLANT, 1.0))
-    assert outcome.penalty[0] == 0.0
-    # All hours of all days are damp, twelve of them beyond what it bears.
-    assert outcome.penalty[1] == pytest.approx(DAYS * 12.0 * DAMP_PENALTY)
+    season = replace(one, site=site)
+    drier, damper = worth_of(season, strategy, crop)(genes)
+    outcome = run_season(season, strategy, genes[:1], crop)
+    assert drier == pytest.approx(outcome.balance.net_profit[0] - outcome.penalty[0])
+    # All hours of its four typical days are damp, twelve of each beyond what the crop bears.
+    assert damper == pytest.approx(NOT_ADMITTED * (1.0 + 4 * 12.0))
+
+
+def test_a_strategy_may_leave_days_as_damp_as_the_recipe_does(season: Season) -> None:
+    one = damp(season)
+    assert bearable_damp(one) == pytest.approx(np.full(4, one.site.crop.agronomy.damp_hours))
+    site = replace(one.site, crop=replace(one.site.crop, humidity_high=60.0))
+    assert bearable_damp(replace(one, site=site)) == pytest.approx(np.full(4, 24.0))

@@ -23,9 +23,6 @@ from igrow.core.site import Site
 DAY = np.timedelta64(86_400, "s")
 STRETCH = 10
 """Days whose weather is lived as two typical days, each for half of them."""
-DAMP_PENALTY = 0.05
-"""EUR m-2 for each hour of a day that is damp beyond what the crop bears, of strategies that choose the humidity: four
-are worth a day."""
 SUN_WARMS = 0.1
 """Sol-air temperature above that of the air for each W m-2 of global radiation, K."""
 OUTDOOR, RADIATION, WIND = (WEATHER.index(name) for name in ("outdoor_temperature", "global_radiation", "wind_speed"))
@@ -67,7 +64,9 @@ class SeasonOutcome:
     harvest: Floats
     """kg m-2, (B,)."""
     penalty: Floats
-    """For leaving the range of the training data, and for air that strategies leave damp, EUR m-2, (B,)."""
+    """For leaving the range of the training data, EUR m-2, (B,)."""
+    damp: Floats
+    """Hours of each typical day that are expected to be damp, (T, B)."""
     crop: Crop
     """At the end."""
     used: dict[str, Floats]
@@ -85,7 +84,7 @@ def run_season(season: Season, strategy: Strategy, genes: NDArray[np.float32], c
     parts: list[Balance] = []
     used = {name: np.zeros(count) for name in ("heat", "electricity", "co2", "net_growth")}
     penalty = np.zeros(count)
-    crops = []
+    damp, crops = [], []
     for typical, weather in enumerate(season.weather):
         first = typical * season.every
         repeats = min(season.every, season.days - first)
@@ -111,9 +110,7 @@ def run_season(season: Season, strategy: Strategy, genes: NDArray[np.float32], c
         )
         used = {name: before + repeats * getattr(outcome, name)[0].sum(axis=-1) for name, before in used.items()}
         penalty = penalty + repeats * OUTSIDE_PENALTY * outcome.outside[0].sum(axis=-1) / 24.0
-        if strategy.humidity:
-            too_damp = np.maximum(damp_hours(outcome, site) - site.crop.agronomy.damp_hours, 0.0)
-            penalty = penalty + repeats * DAMP_PENALTY * too_damp
+        damp.append(np.broadcast_to(damp_hours(outcome, site), count))
         for day in range(first, first + repeats):
             before = fresh(p, plants)
             plants = live(p, plants, supply, warm, leaves)
@@ -127,7 +124,17 @@ def run_season(season: Season, strategy: Strategy, genes: NDArray[np.float32], c
     total = parts[0]
     for part in parts[1:]:
         total = total + part
-    return SeasonOutcome(total, fresh(p, plants) - planted, penalty, plants, used, tuple(crops))
+    return SeasonOutcome(total, fresh(p, plants) - planted, penalty, np.stack(damp), plants, used, tuple(crops))
+
+
+def bearable_damp(season: Season) -> Floats:
+    """Return how many hours of each typical day may be damp, (T,): as many as the crop bears, or the recipe has."""
+    damp = []
+    for first in range(0, season.days, season.every):
+        start, weather = season.start + first * DAY, season.weather[first // season.every]
+        template = _two_days(season, start, weather)
+        damp.append(float(damp_hours(_lived(season, season.recipe[None], template, start, weather), season.site)[0]))
+    return np.maximum(damp, season.site.crop.agronomy.damp_hours)
 
 
 def typical_days(days: Floats) -> Floats:
@@ -158,14 +165,24 @@ def believed(outcome: Outcome) -> Floats:
 def _typical_day(
     season: Season, strategy: Strategy, genes: NDArray[np.float32], day: int, start: np.datetime64, weather: Floats
 ) -> Outcome:
-    # The day before is like it: the night that ends in the morning has had its dark hours, or has not, and air and
-    # floor begin as warm as the strategy leaves them. A morning that is the same for all gives to a cool strategy, for
-    # nothing, a tenth of the heat that it needs.
-    twice = np.tile(weather, (2, 1))
-    template = for_site(season.site, start, 48, radiation=twice[:, RADIATION])
+    template = _two_days(season, start, weather)
     wanted = asked(strategy, genes, season.first_day + day, template, weather, season.recipe)
+    return _lived(season, wanted, template, start, weather)
+
+
+def _two_days(season: Season, start: np.datetime64, weather: Floats) -> Template:
+    return for_site(season.site, start, 48, radiation=np.tile(weather[:, RADIATION], 2))
+
+
+def _lived(season: Season, wanted: Setpoints, template: Template, start: np.datetime64, weather: Floats) -> Outcome:
+    """Return a day under setpoints (B, 24, S), lived once before.
+
+    The day before is like it: the night that ends in the morning has had its dark hours, or has not, and air and floor
+    begin as warm as the setpoints leave them. A morning that is the same for all gives to a cool strategy, for nothing,
+    a tenth of the heat that it needs.
+    """
     course = template.follow(np.tile(wanted, (1, 2, 1)), np.full(len(SETPOINTS), np.nan)).setpoints
-    return season.simulator.simulate(dict(MORNING), twice, course, start - DAY).last(24)
+    return season.simulator.simulate(dict(MORNING), np.tile(weather, (2, 1)), course, start - DAY).last(24)
 
 
 def asked(

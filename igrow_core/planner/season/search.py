@@ -9,7 +9,8 @@ import numpy as np
 from igrow.core.arrays import Floats
 from igrow.core.greenhouse.tomato import Crop
 from igrow.core.planner.evolution import WORST, EvolutionSettings, Genes, NumpyGeneration, draw
-from igrow.core.planner.season.course import Season, run_season
+from igrow.core.planner.optimise import NOT_ADMITTED
+from igrow.core.planner.season.course import Season, bearable_damp, run_season
 from igrow.core.planner.season.strategy import Strategy
 
 SETTINGS = EvolutionSettings(parents=24, offspring=48)
@@ -21,11 +22,18 @@ Search = Callable[[Callable[[Genes], Floats], int, int, int, Genes | None], tupl
 
 
 def worth_of(season: Season, strategy: Strategy, crop: Crop) -> Callable[[Genes], Floats]:
-    """Return what candidates (B, G) of a strategy are worth in a season from a crop on, EUR m-2, (B,)."""
+    """Return what candidates (B, G) of a strategy are worth in a season from a crop on, EUR m-2, (B,).
+
+    One that chooses the humidity and expects damper days than the crop bears is not admitted (Deb's rule, as in the
+    search of a plan).
+    """
+    most = bearable_damp(season) if strategy.humidity else np.inf
 
     def value(genes: Genes) -> Floats:
         outcome = run_season(season, strategy, genes, crop)
-        return np.asarray(outcome.balance.net_profit - outcome.penalty)
+        too_damp = np.maximum(outcome.damp.T - most, 0.0).sum(axis=1)
+        worth = outcome.balance.net_profit - outcome.penalty
+        return np.asarray(np.where(too_damp > 0.0, NOT_ADMITTED * (1.0 + too_damp), worth))
 
     return value
 
