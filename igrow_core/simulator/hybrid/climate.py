@@ -283,6 +283,20 @@ def advance(
         added: further fluxes by channel (a learned residual model, a disturbance).
     """
     drivers = derive(xp, state, inputs, parameters, lamp_efficacy)
+    return step(xp, state, drivers, parameters, effects, seconds=seconds, added=added)
+
+
+def step(
+    xp: Any,
+    state: Values,
+    drivers: Drivers,
+    parameters: Values,
+    effects: ActiveEffects,
+    *,
+    seconds: float,
+    added: Mapping[str, Array] | None = None,
+) -> dict[str, Array]:
+    """Return the state `seconds` later, by the drivers that were derived from it; arguments as `advance`'s."""
     total = contributions(xp, drivers, state, effects, seconds)
     for channel, flux in (added or {}).items():
         total[channel] = total[channel] + flux if channel in total else flux

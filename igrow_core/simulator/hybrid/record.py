@@ -127,26 +127,19 @@ def free_run(
     extra = {channel: np.asarray(flux) for channel, flux in (added or {}).items()}
     state: dict[str, Array] = {name: values[..., begin] for name, values in states.items()}
     shown: dict[str, list[Floats]] = {name: [] for name in measurement.PREDICTED}
+    inputs, active = dict(zip(names, table[:, begin], strict=True)), _at_rows(effects, begin, len(record))
+    drivers = climate.derive(np, state, inputs, parameters, record.lamp_efficacy)
     for k in range(steps):
         row = begin + k
-        inputs: dict[str, Array] = dict(zip(names, table[:, row], strict=True))
-        active = _at_rows(effects, row, len(record))
         fluxes = {channel: flux[row] if flux.ndim == 1 else flux[k] for channel, flux in extra.items()}
-        for _ in range(substeps):
-            drivers_inputs = _corrected(inputs, state, parameters, active, record.lamp_efficacy)
-            state = climate.advance(
-                np,
-                state,
-                drivers_inputs,
-                parameters,
-                active,
-                seconds=record.step / substeps,
-                lamp_efficacy=record.lamp_efficacy,
-                added=fluxes,
-            )
-        following = dict(zip(names, table[:, row + 1], strict=True))
-        active = _at_rows(effects, row + 1, len(record))
-        drivers = climate.derive(np, state, following, parameters, record.lamp_efficacy)
+        for part in range(substeps):
+            if part > 0:
+                drivers = climate.derive(np, state, inputs, parameters, record.lamp_efficacy)
+            true = _corrected(inputs, drivers, state, parameters, active, record.lamp_efficacy)
+            state = climate.step(np, state, true, parameters, active, seconds=record.step / substeps, added=fluxes)
+        # What the sensors show at a row is what the next step begins with.
+        inputs, active = dict(zip(names, table[:, row + 1], strict=True)), _at_rows(effects, row + 1, len(record))
+        drivers = climate.derive(np, state, inputs, parameters, record.lamp_efficacy)
         for name, values in measurement.measured(np, drivers, state, active).items():
             shown[name].append(values)
     return {name: np.stack(np.broadcast_arrays(*values)) for name, values in shown.items()}
@@ -171,13 +164,13 @@ def _given(record: Record) -> list[Floats]:
 
 
 def _corrected(
-    inputs: Values, state: Values, parameters: Values, effects: ActiveEffects, lamp_efficacy: float
+    inputs: Values, drivers: Values, state: Values, parameters: Values, effects: ActiveEffects, lamp_efficacy: float
 ) -> Values:
-    """Take the pipe sensors' error out of the inputs, where one is active."""
+    """Take the pipe sensors' error out of the drivers that were derived from the inputs, where one is active."""
     if "pipe_temperature_offset" not in effects:
-        return inputs
-    drivers = climate.derive(np, state, inputs, parameters, lamp_efficacy)
-    return measurement.correct_inputs(np, inputs, drivers, state, effects)
+        return drivers
+    true = measurement.correct_inputs(np, inputs, drivers, state, effects)
+    return climate.derive(np, state, true, parameters, lamp_efficacy)
 
 
 def _at_rows(effects: ActiveEffects, rows: Integers, count: int) -> ActiveEffects:
