@@ -10,7 +10,6 @@ fit saw, by more than any does where nothing has changed.
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from igrow.core.arrays import Mask
 from igrow.core.effects import EFFECTS
@@ -22,7 +21,7 @@ from igrow.trainer.diagnosis.compare import Round
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.freerun import LogDays
 from igrow.trainer.diagnosis.knowledge import Knowledge, activate, home_drift
-from igrow.trainer.diagnosis.omission import WIDE, fall
+from igrow.trainer.diagnosis.omission import fall, fit_together
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.fit.climate import fit_climate
 from igrow.trainer.fit.evaluation import Model, held_out_errors
@@ -92,12 +91,7 @@ def _fit(record: Record, rows: Mask, prior: Gaussian, known: ActiveEffects, one:
     """Return parameters and the size of an effect, fitted together to free runs."""
     assert isinstance(one.cause, Candidate)
     size, shape = EFFECTS[one.effect].amplitude, one.cause.values
-    name = f"{one.effect}:{size.name}"
-    joint = Gaussian(
-        (*prior.names, name),
-        np.append(prior.mean, np.clip(one.amplitude, size.low, size.high)),
-        block_diag(prior.covariance, (WIDE * size.typical) ** 2),
-    )
-    fitted = fit_climate([(record, rows)], joint, {**known, one.effect: dict(shape)})
-    sizes = {size.name: fitted.values[name], **shape}
+    expected = {one.effect: float(np.clip(one.amplitude, size.low, size.high))}
+    fitted = fit_together(record, rows, prior, expected, {**known, one.effect: dict(shape)})
+    sizes = {size.name: fitted.values[f"{one.effect}:{size.name}"], **shape}
     return fitted.marginal(prior.names).values, {**known, one.effect: sizes}

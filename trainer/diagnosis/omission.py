@@ -134,6 +134,25 @@ def fall(errors: Sequence[HeldOutError]) -> float:
     return 1.0 - float(np.mean(day)) if day else 0.0
 
 
+def fit_together(
+    record: Record,
+    rows: Mask | None,
+    prior: Gaussian,
+    sizes: Mapping[str, float],
+    active: ActiveEffects,
+    start: Mapping[str, float] | None = None,
+) -> Gaussian:
+    """Return parameters and the `sizes` expected of effects, fitted together; other arguments as `fit_climate`'s."""
+    effects = [EFFECTS[name] for name in sizes]
+    typical = np.array([one.amplitude.typical for one in effects])
+    joint = Gaussian(
+        (*prior.names, *map(_name, effects)),
+        np.append(prior.mean, list(sizes.values())),
+        block_diag(prior.covariance, np.diag((WIDE * typical) ** 2)),
+    )
+    return fit_climate([(record, rows)], joint, active, start=start)
+
+
 def _promising(gains: Mapping[str, float], rules: DecisionRules) -> list[Effect]:
     """Return the terms that gain enough in the linear model to be fitted, that which gains most first."""
     ranked = sorted(gains, key=gains.__getitem__, reverse=True)
@@ -201,12 +220,7 @@ def _name(effect: Effect) -> str:
 
 def _fit(record: Record, rows: Mask | None, prior: Gaussian, terms: Sequence[Effect], start: Model) -> Gaussian:
     """Return parameters and the sizes of terms, fitted together to free runs, from another model's on."""
-    typical = np.array([one.amplitude.typical for one in terms])
-    joint = Gaussian(
-        (*prior.names, *map(_name, terms)),
-        np.concatenate([prior.mean, typical]),
-        block_diag(prior.covariance, np.diag((WIDE * typical) ** 2)),
-    )
     parameters, effects = start
-    sizes = {_name(EFFECTS[name]): values[EFFECTS[name].amplitude.name] for name, values in effects.items()}
-    return fit_climate([(record, rows)], joint, {one.name: _shape(one) for one in terms}, start={**parameters, **sizes})
+    known = {_name(EFFECTS[name]): values[EFFECTS[name].amplitude.name] for name, values in effects.items()}
+    sizes, active = {one.name: one.amplitude.typical for one in terms}, {one.name: _shape(one) for one in terms}
+    return fit_together(record, rows, prior, sizes, active, start={**parameters, **known})
