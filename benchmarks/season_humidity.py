@@ -1,6 +1,6 @@
 """What a humidity setpoint brings: seasons with and without it, in greenhouses whose climate computer takes one.
 
-    python -m benchmarks.season_humidity [--houses 8] [--generations 36] [--led 150]
+    python -m benchmarks.season_humidity [--houses 20] [--generations 36] [--led 150]
 
 The built-in bundle's simulator is given vents that open by the larger of what temperature and humidity ask, fitted to
 virtual seasons in which the humidity setpoint was moved each day. On it a rule and a strategy of six dates are tuned,
@@ -104,7 +104,7 @@ class TakingHouses(Houses):
 def main() -> int:
     """Teach, tune, lead and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--houses", type=int, default=8)
+    parser.add_argument("--houses", type=int, default=20)
     parser.add_argument("--generations", type=int, default=36)
     parser.add_argument("--led", type=int, default=150, help="days of the season that are led")
     arguments = parser.parse_args()
