@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from igrow.core.agronomy import Place
 from igrow.core.agronomy.inspection import violations
 from igrow.core.bundle import default_bundle_folder, read_bundle
-from igrow.core.greenhouse.recipe import HUMIDITY
+from igrow.core.greenhouse.recipe import COMPUTER
 from igrow.core.planner import Budget, PlanningState, optimise
 from igrow.core.planner.optimise import RADIATION
 from igrow.core.quantities import SETPOINTS, USUAL_SETPOINTS
@@ -75,7 +75,7 @@ def main() -> int:
         site, weather = random_site(rng), random_weather(rng)
         start = np.datetime64("2020-01-01T00:00:00") + np.timedelta64(int(rng.integers(366 * 24)), "h")
         usual = rng.random((HOURS, len(USUAL_SETPOINTS))) * [20.0, 1000.0, 1.0, 1.0] + [10.0, 300.0, 0.0, 0.0]
-        recipe = np.full((HOURS, len(SETPOINTS)), HUMIDITY)
+        recipe = np.tile([{**COMPUTER, **dict.fromkeys(USUAL_SETPOINTS, 0.0)}[name] for name in SETPOINTS], (HOURS, 1))
         recipe[:, [SETPOINTS.index(name) for name in USUAL_SETPOINTS]] = usual
         initial = {"air_temperature": float(rng.uniform(10, 30)), "air_humidity": float(rng.uniform(40, 98))}
         result = optimise(simulator, site, PlanningState(start, initial), weather, recipe, rng, QUICK)

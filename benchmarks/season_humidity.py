@@ -29,11 +29,11 @@ from benchmarks.seasons import GROWN_AND_USED, STRATEGIES, brought, described, s
 from igrow.core.arrays import Floats
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.greenhouse import GreenhouseParameters, Season, generate_weather, recipe, simulate_many, tomato
-from igrow.core.greenhouse.recipe import HUMIDITY
+from igrow.core.greenhouse.recipe import COMPUTER
 from igrow.core.planner.objective import Objective, damp_hours
 from igrow.core.planner.season import Strategy, run_season
 from igrow.core.planner.season.search import rule_and_strategy
-from igrow.core.quantities import SETPOINTS
+from igrow.core.quantities import USUAL_SETPOINTS
 from igrow.core.simulator.outcome import Outcome
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Site
@@ -44,6 +44,9 @@ from igrow.trainer.fit.model import FittedModel
 
 MOVED = (74.0, 92.0)
 """% between which the setpoint was moved in the seasons that teach the rules."""
+TAKEN = (*USUAL_SETPOINTS, "humidity_setpoint")
+HUMIDITY = COMPUTER["humidity_setpoint"]
+"""What the computers hold by themselves, %."""
 TAUGHT_DAYS = 28
 TAUGHT_BEGINS = ("2020-01-10T00:00:00", "2020-03-20T00:00:00")
 SEED = 31
@@ -54,7 +57,7 @@ PICKED_FROM = 100
 def taking(site: Site) -> Site:
     """Return the site with a humidity setpoint that plans may choose."""
     planning = replace(site.planning, optimise=(*site.planning.optimise, "humidity_setpoint"))
-    return replace(site, setpoints=SETPOINTS, planning=planning)
+    return replace(site, setpoints=TAKEN, planning=planning)
 
 
 def taught_season(begins: str, number: int) -> Season:
@@ -85,7 +88,7 @@ def taught(site: Site) -> FittedModel:
 
 
 class TakingHouses(Houses):
-    """Houses whose computers take all setpoints."""
+    """Houses whose computers take a humidity setpoint as well."""
 
     def __init__(self, site: Site, days: int, numbers: Sequence[int]) -> None:
         super().__init__(days, numbers)
@@ -95,7 +98,7 @@ class TakingHouses(Houses):
 
     def advance(self, setpoints: Floats, begin: np.datetime64) -> Outcome:
         """Live a day, and count its damp hours."""
-        outcome = run(self.plant, setpoints, SETPOINTS)
+        outcome = run(self.plant, setpoints, TAKEN)
         if begin >= START:
             self.damp.append(damp_hours(outcome, self._site))
         return outcome
@@ -122,12 +125,12 @@ def main() -> int:
         for name, kind in (("rule", "rule"), ("built-in", "season")):
             genes = np.array([given["strategies"]["today"][kind]["genes"]], dtype=np.float32)
             ways[name] = Led(ways_of(days)[kind], genes)
-        for name, humidity in (("without", False), ("with", True)):
-            rule, strategy = Strategy(days, 1, ends=True, humidity=humidity), Strategy(days, 6, humidity=humidity)
+        for name, optional in (("without", ()), ("with", ("humidity_setpoint",))):
+            rule, strategy = Strategy(days, 1, ends=True, optional=optional), Strategy(days, 6, optional=optional)
             found = rule_and_strategy(season, rule, strategy, crop, arguments.generations)
             best, _ = found["season"]
             ways[name] = Led(strategy, best[None])
-            if humidity:
+            if optional:
                 ways["rule with"] = Led(rule, found["rule"][0][None])
                 low, high = strategy.ranges["humidity"]
                 held = best.copy()

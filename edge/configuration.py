@@ -11,6 +11,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 from zoneinfo import ZoneInfo
 
 from igrow.core.agronomy import Place
@@ -18,7 +19,7 @@ from igrow.core.bundle import default_bundle_folder
 from igrow.core.errors import IgrowError
 from igrow.core.exchange.address import Address, parse_address
 from igrow.core.local_time import zone
-from igrow.core.quantities import SETPOINTS
+from igrow.core.quantities import QUANTITIES, SETPOINTS
 from igrow.core.site import Site, load_site
 from igrow.core.yaml_scalars import duration
 from igrow.core.yaml_schema import SchemaError, load, place
@@ -153,10 +154,10 @@ def put_together(path: Path, file: DaemonFile, site: Site, register_map: Registe
     _check_exchange(path, file)
     _check_heartbeat(path, register_map)
     setpoints = tuple(name for name in setpoints if name in site.setpoints)
-    if "humidity_setpoint" in setpoints and not file.recipe.humidity_setpoint:
-        # A recipe of before the PLC took it says nothing of it; plans and page compare with what it says.
-        always = Period(datetime.time(), site.limits.humidity_setpoint.safe)
-        file = replace(file, recipe=replace(file.recipe, humidity_setpoint=(always,)))
+    # A recipe of before the PLC took them says nothing of these; plans and page compare with what it says.
+    silent = [name for name in setpoints if QUANTITIES[name].optional and not file.recipe.periods(name)]
+    always: dict[str, Any] = {name: (Period(datetime.time(), site.limits[name].safe),) for name in silent}
+    file = replace(file, recipe=replace(file.recipe, **always))
     for name in file.guard.points:
         if name not in points or not points[name].writable:
             raise ConfigurationError(

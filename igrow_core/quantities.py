@@ -97,6 +97,15 @@ def _quantity_table() -> Mapping[str, Quantity]:
         *rows(
             Kind.SETPOINT,
             ("humidity_setpoint", "%", 50.0, 100.0, "relative humidity above which the PLC opens its vents"),
+            ("ventilation_setpoint", "degC", 5.0, 45.0, "air temperature above which the PLC opens its vents"),
+            (
+                "minimum_pipe_setpoint",
+                "degC",
+                0.0,
+                90.0,
+                "temperature below which the PLC never lets the pipe rail fall",
+            ),
+            ("energy_screen_setpoint", "%", 0.0, 100.0, "largest closure of the energy screen, 0 keeps it open"),
             optional=True,
         ),
         *rows(

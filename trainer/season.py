@@ -25,7 +25,7 @@ from igrow.core.greenhouse import generate_weather, recipe_by_hour
 from igrow.core.greenhouse.described import parameters_of
 from igrow.core.greenhouse.weather import WeatherClimate
 from igrow.core.planner.evolution import Genes
-from igrow.core.planner.season import Season, SeasonPlan, Strategy, valued
+from igrow.core.planner.season import OPTIONAL, Season, SeasonPlan, Strategy, valued
 from igrow.core.planner.season.course import DAY, STRETCH, typical_days
 from igrow.core.planner.season.plan import first_crop
 from igrow.core.planner.season.search import GENERATIONS, genetic, worth_of
@@ -76,14 +76,14 @@ def plan_season(
     season = season_of(site, bundle, begins or site.crop.planting_date, weather, progress)
     age = (begins or site.crop.planting_date) - site.crop.planting_date
     crop = first_crop(season.plant, age.days >= BEARING)
-    humidity = "humidity_setpoint" in chosen_setpoints(site, season.simulator.setpoints)
+    optional = tuple(name for name in chosen_setpoints(site, season.simulator.setpoints) if name in OPTIONAL)
     rule, strategy = (
-        Strategy(season.days, 1, ends=True, humidity=humidity),
-        Strategy(season.days, KNOTS, humidity=humidity),
+        Strategy(season.days, 1, ends=True, optional=optional),
+        Strategy(season.days, KNOTS, optional=optional),
     )
     # The strategy grows out of a rule, which takes a third of the search.
     third = generations // 3
-    found = _Partial(partial, f"{season.start} {season.days} {generations}" + " with humidity" * humidity)
+    found = _Partial(partial, " ".join([f"{season.start} {season.days} {generations}", *optional]))
     short = found.get("rule", lambda: genetic(worth_of(season, rule, crop), rule.genes, third, 1)[0])
     progress(f"the best rule for the {season.days} days is found")
     first = strategy.of_rule(rule, short)

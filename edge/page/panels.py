@@ -61,10 +61,21 @@ SKETCHES = (
     Sketch(N_("Sun outside"), (("global_radiation", "measured"),), "", 200.0, True),
     Sketch(N_("Wind"), (("wind_speed", "measured"),), "", 4.0, True),
     Sketch(
-        N_("Heating pipes"), (("rail_pipe_temperature", "measured"), ("grow_pipe_temperature", "other")), "", 10.0, True
+        N_("Heating pipes"),
+        (("rail_pipe_temperature", "measured"), ("grow_pipe_temperature", "other")),
+        "minimum_pipe_setpoint",
+        10.0,
+        True,
     ),
     Sketch(N_("Vents"), (("vent_lee", "measured"), ("vent_wind", "other")), "", 100.0, True),
-    Sketch(N_("Screens"), (("energy_screen", "measured"), ("blackout_screen", "other")), "", 100.0, True),
+    Sketch(N_("Vents open above"), (), "ventilation_setpoint", 4.0, True, height=100),
+    Sketch(
+        N_("Screens"),
+        (("energy_screen", "measured"), ("blackout_screen", "other")),
+        "energy_screen_setpoint",
+        100.0,
+        True,
+    ),
 )
 
 

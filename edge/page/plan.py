@@ -24,6 +24,18 @@ MORE = {
         N_("Damper before vents open than by your recipe ({usual})"),
         N_("Drier before vents open than by your recipe ({usual})"),
     ),
+    "ventilation_setpoint": (
+        N_("Warmer before vents open than by your recipe ({usual})"),
+        N_("Cooler before vents open than by your recipe ({usual})"),
+    ),
+    "minimum_pipe_setpoint": (
+        N_("A warmer minimum pipe than by your recipe ({usual})"),
+        N_("A cooler minimum pipe than by your recipe ({usual})"),
+    ),
+    "energy_screen_setpoint": (
+        N_("A screen that may close further than by your recipe ({usual})"),
+        N_("A screen that stays further open than by your recipe ({usual})"),
+    ),
 }
 PART_TEXTS = {
     "income": (N_("growth worth {amount} more"), N_("growth worth {amount} less")),
@@ -176,6 +188,7 @@ def limit_words(limit: str, limits: Agronomy, say: Words) -> str:
         "dark_hours": (N_("{value} dark hours a night"), limits.dark_hours, "1"),
         "light_sum": least,
         "light_sum_high": least,
+        "dead_zone": (N_("vents open at least {value} above the heating setpoint"), limits.dead_zone, "K"),
         "co2_with_people": (N_("at most {value} while people are inside"), limits.co2_with_people, "ppm"),
     }
     if limit in values:

@@ -42,6 +42,9 @@ class Recipe:
     lamp_on: tuple[Period, ...] = setting(help="0 to 1", default_factory=lambda: _periods((1, 1.0), (17, 0.0)))
     irrigation_on: tuple[Period, ...] = setting(help="0 to 1", default_factory=lambda: _periods((3, 1.0), (16, 0.0)))
     humidity_setpoint: tuple[Period, ...] = setting(help="%, of a PLC that takes one", default=())
+    ventilation_setpoint: tuple[Period, ...] = setting(help="degC, of a PLC that takes one", default=())
+    minimum_pipe_setpoint: tuple[Period, ...] = setting(help="degC, of a PLC that takes one", default=())
+    energy_screen_setpoint: tuple[Period, ...] = setting(help="%, of a PLC that takes one", default=())
     lamps_off_above: float | None = setting(
         unit="W m-2", low=0, high=1500, default=300.0, help="global radiation above which the lamps stay off, or null"
     )

@@ -27,6 +27,9 @@ SAFE_SETPOINTS: Mapping[str, float] = MappingProxyType(
         "lamp_on": 0.0,
         "irrigation_on": 0.1,
         "humidity_setpoint": ClimateComputer().humidity_start,
+        "ventilation_setpoint": 20.0,
+        "minimum_pipe_setpoint": 0.0,
+        "energy_screen_setpoint": 100.0,
     }
 )
 """What keeps a tomato crop alive without anybody's care: frost far away, no dosing, no lamps, some water, vents that

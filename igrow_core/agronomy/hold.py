@@ -23,7 +23,7 @@ from igrow.core.arrays import Array
 
 _EPSILON = 1e-9
 
-DARK, LIGHT, REST = "dark_hours", "light_sum_high", "rest"
+DARK, LIGHT, REST, DEAD_ZONE = "dark_hours", "light_sum_high", "rest", "dead_zone"
 
 
 @dataclass(frozen=True)
@@ -75,6 +75,14 @@ def hold(
             kept = tuple((limit, which) for limit, which in found if np.any(which))
             if kept:
                 binding[name] = kept
+    if "ventilation_setpoint" in wanted:
+        heating = np.asarray(setpoints.get("heating_setpoint", memory.heating), dtype=np.float64)
+        asked = np.asarray(wanted["ventilation_setpoint"], dtype=np.float64)
+        # A heating setpoint that is not known bounds nothing.
+        setpoints["ventilation_setpoint"] = np.fmax(asked, heating + place.limits.dead_zone)
+        raised = setpoints["ventilation_setpoint"] > asked
+        if np.any(raised):
+            binding["ventilation_setpoint"] = ((DEAD_ZONE, raised),)
     return Held(setpoints, binding)
 
 

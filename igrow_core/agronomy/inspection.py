@@ -19,7 +19,14 @@ QUARTER = 900.0
 
 
 def violations(
-    place: Place, start: float, heating: Floats, lamp: Floats, co2: Floats, sunlight: Floats, step: float = 3600.0
+    place: Place,
+    start: float,
+    heating: Floats,
+    lamp: Floats,
+    co2: Floats,
+    sunlight: Floats,
+    step: float = 3600.0,
+    ventilation: Floats | None = None,
 ) -> list[str]:
     """Return one sentence for each limit that a course leaves, in the order of time.
 
@@ -31,6 +38,7 @@ def violations(
         co2: ppm, (H,).
         sunlight: mol m-2 above the crop in each row, (H,).
         step: seconds for which a row stands.
+        ventilation: setpoint of each row, degC, (H,), where the PLC takes one.
 
     Nights and local days that the course does not hold as a whole are not judged by their sums.
     """
@@ -41,6 +49,7 @@ def violations(
         *_nights(place, times, lamp, step),
         *_people(place, times, co2, step),
         *_rests(place, lamp, step),
+        *(() if ventilation is None else _dead_zone(place, heating, ventilation)),
     ]
 
 
@@ -54,6 +63,11 @@ def _temperatures(place: Place, times: Floats, heating: Floats, step: float) -> 
                 yield f"row {row}: {value:.3f} degC by {'day' if up else 'night'}"
         if row and abs(value - heating[row - 1]) > place.drift * step / 3600.0 + _SLACK:
             yield f"row {row}: {value - heating[row - 1]:+.3f} K at once"
+
+
+def _dead_zone(place: Place, heating: Floats, ventilation: Floats) -> Iterator[str]:
+    for row in np.flatnonzero(ventilation - heating < place.limits.dead_zone - _SLACK).tolist():
+        yield f"row {row}: vents open at {ventilation[row]:.3f} degC, heated to {heating[row]:.3f}"
 
 
 def _days(place: Place, times: Floats, heating: Floats, lamp: Floats, sunlight: Floats, step: float) -> Iterator[str]:

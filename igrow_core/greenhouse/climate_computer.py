@@ -167,9 +167,10 @@ def control(
         settings: of the PLC.
         p: parameters of the greenhouse (capacities of its equipment).
         before: the PLC's memory.
-        setpoints: in the registry's units; a missing one is `SAFE_SETPOINTS`' value, of humidity `humidity_start`. An
-            opening in % under `vent_lee` or `vent_wind` takes the place of the PLC's own demand, within its limits of
-            frost and storm; NaN leaves it to the PLC.
+        setpoints: in the registry's units; a missing one is `SAFE_SETPOINTS`' value, of humidity `humidity_start`, of
+            the ventilation (NaN too) `ventilation_offset` above the heating; pipe and screen bound nothing then. Vents
+            never open for heat below the heating setpoint. An opening in % under `vent_lee` or `vent_wind` takes the
+            place of the PLC's own demand, within its limits of frost and storm; NaN leaves it to the PLC.
         seen: the readings.
         seconds: until the next call.
     """
@@ -190,12 +191,13 @@ def control(
     integral = before.integral + s.pipe_integral * clip(xp, lack, -1.0, 1.0) * (seconds / 3600.0)
     integral = clip(xp, integral, -20.0, 20.0)
     excess = clip(xp, excess, 0.0, s.rail_maximum)
-    rail_wanted = xp.minimum(air + excess, s.rail_maximum)
+    minimum = xp.maximum(excess, setpoints.get("minimum_pipe_setpoint", air) - air)
+    rail_wanted = xp.minimum(air + minimum, s.rail_maximum)
     grow_wanted = xp.minimum(air + s.grow_share * excess, s.grow_maximum)
     rail_holds = p.rail_exchange * xp.maximum(rail_wanted - air, 0.0)
     grow_holds = p.grow_exchange * xp.maximum(grow_wanted - air, 0.0)
     asks = (excess > 1.0) * 1.0
-    rail_heat = asks * xp.maximum(
+    rail_heat = (minimum > 1.0) * xp.maximum(
         rail_holds + p.rail_capacity * (rail_wanted - seen.rail_temperature) / s.valve_time, 0.0
     )
     grow_heat = asks * xp.maximum(
@@ -205,7 +207,11 @@ def control(
 
     # Ventilation
     band = s.ventilation_band + 0.25 * xp.maximum(15.0 - outdoor, 0.0)
-    by_temperature = clip(xp, (air - setpoint - s.ventilation_offset) / band, 0.0, 2.0)
+    offset: Array = s.ventilation_offset
+    if "ventilation_setpoint" in setpoints:
+        asked = setpoints["ventilation_setpoint"]
+        offset = xp.where(asked >= 0.0, xp.maximum(asked - setpoint, 0.0), s.ventilation_offset)
+    by_temperature = clip(xp, (air - setpoint - offset) / band, 0.0, 2.0)
     damp = humidity - setpoints.get("humidity_setpoint", s.humidity_start)
     by_humidity = s.humidity_opening * clip(xp, damp / s.humidity_band, 0.0, 1.0)
     demand = xp.maximum(xp.maximum(by_temperature, by_humidity), s.ventilation_minimum)
@@ -227,8 +233,9 @@ def control(
     screen_wanted = dark * cold * (1.0 - (1.0 - s.screen_under_lamps) * (lamp > 0.0))
     moisture = s.screen_moisture_gap * ramp(xp, humidity, 82.0, 92.0)
     # Vents that work for temperature need a screen that lets the air through.
-    warmth = ramp(xp, air - setpoint, s.ventilation_offset + 1.0, s.ventilation_offset + 3.0)
+    warmth = ramp(xp, air - setpoint, offset + 1.0, offset + 3.0)
     energy = screen_wanted * (1.0 - xp.maximum(moisture, 0.5 * warmth))
+    energy = xp.minimum(energy, 0.01 * setpoints.get("energy_screen_setpoint", 100.0))
     blackout = (radiation < s.blackout_radiation) * (lamp > 0.0) * (1.0 - xp.maximum(s.blackout_gap, 0.4 * warmth))
     travel = seconds / s.screen_travel
     energy_screen = _move(xp, before.energy_screen, energy, travel)

@@ -9,8 +9,13 @@ from igrow.core.greenhouse.climate_computer import ClimateComputer
 from igrow.core.quantities import SETPOINTS
 from igrow.core.sun import solar_hour
 
-HUMIDITY = ClimateComputer().humidity_start
-"""Humidity setpoint, %, where a table needs one: what these greenhouses do without."""
+COMPUTER = {
+    "humidity_setpoint": ClimateComputer().humidity_start,
+    "ventilation_setpoint": 24.0,
+    "minimum_pipe_setpoint": 0.0,
+    "energy_screen_setpoint": 100.0,
+}
+"""Setpoints that not every PLC takes, where a table needs them."""
 
 
 def recipe(time: np.datetime64, longitude: float = 4.53) -> dict[str, float]:
@@ -39,5 +44,5 @@ def recipe(time: np.datetime64, longitude: float = 4.53) -> dict[str, float]:
 def recipe_by_hour(start: np.datetime64, hours: int, longitude: float = 4.53) -> Floats:
     """Return the recipe at each hour from `start` (UTC) on, in the order of `SETPOINTS`, (hours, S)."""
     times = start + np.arange(hours) * np.timedelta64(3600, "s")
-    rows = [{"humidity_setpoint": HUMIDITY, **recipe(time, longitude)} for time in times]
+    rows = [COMPUTER | recipe(time, longitude) for time in times]
     return np.array([[row[name] for name in SETPOINTS] for row in rows])

@@ -35,6 +35,9 @@ NAMES: Mapping[str, str] = {
     "lamp_on": N_("lamp switch"),
     "irrigation_on": N_("irrigation switch"),
     "humidity_setpoint": N_("humidity setpoint"),
+    "ventilation_setpoint": N_("ventilation setpoint"),
+    "minimum_pipe_setpoint": N_("minimum pipe setpoint"),
+    "energy_screen_setpoint": N_("energy screen setpoint"),
     # actuators
     "rail_pipe_temperature": N_("pipe rail temperature"),
     "grow_pipe_temperature": N_("grow pipe temperature"),
@@ -96,6 +99,7 @@ NAMES: Mapping[str, str] = {
     "dark_hours": N_("dark hours"),
     "co2_with_people": N_("CO2 while people are inside"),
     "rest": N_("least times between switching"),
+    "dead_zone": N_("vents above the heating setpoint"),
     # regimes
     "day": N_("day"),
     "night": N_("night"),

@@ -25,6 +25,9 @@ SAME = {
     "lamp_on": 0.05,
     "irrigation_on": 0.05,
     "humidity_setpoint": 0.75,
+    "ventilation_setpoint": 0.25,
+    "minimum_pipe_setpoint": 2.0,
+    "energy_screen_setpoint": 5.0,
 }
 """A smaller difference from the recipe is none."""
 MOST = 8

@@ -31,7 +31,16 @@ BLOCK_STARTS = (0, 4, 7, 10, 13, 16, 19, 23)
 """Local hours at which a block begins."""
 BY_HOUR = ("lamp_on",)
 """Setpoints of which each hour is a block."""
-STEPS = {"heating_setpoint": 0.5, "co2_setpoint": 25.0, "lamp_on": 1.0, "irrigation_on": 0.05, "humidity_setpoint": 1.0}
+STEPS = {
+    "heating_setpoint": 0.5,
+    "co2_setpoint": 25.0,
+    "lamp_on": 1.0,
+    "irrigation_on": 0.05,
+    "humidity_setpoint": 1.0,
+    "ventilation_setpoint": 0.5,
+    "minimum_pipe_setpoint": 5.0,
+    "energy_screen_setpoint": 10.0,
+}
 """Setpoints are whole multiples of these: finer ones would not show in the greenhouse."""
 
 
@@ -57,6 +66,8 @@ class Template:
 
     free: tuple[str, ...]
     """Setpoints that the genes choose; the others follow the recipe."""
+    taken: tuple[str, ...]
+    """Setpoints that the crop's limits are asked of: every computer's, and others that the site's takes."""
     block: Mapping[str, NDArray[np.int64]]
     """By free setpoint: the block of each hour of the horizon, 0 and up, shape (H,)."""
     low: NDArray[np.float64]
@@ -150,9 +161,11 @@ class Template:
         held = []
         for hour, now in enumerate(self.moments):
             step = np.clip(limited[:, hour], before - self.slew, before + self.slew)
-            asked = {name: step[:, column] for column, name in enumerate(SETPOINTS)}
+            asked = {name: step[:, column] for column, name in enumerate(SETPOINTS) if name in self.taken}
             one = agronomy.hold(self.place, memory, now, asked, 1.0, self._sun_to_come(hour))
-            before = np.stack([one.setpoints[name] for name in SETPOINTS], axis=1)
+            before = step.copy()
+            for name, values in one.setpoints.items():
+                before[:, SETPOINTS.index(name)] = values
             memory = agronomy.observe(memory, self.place, now, one.setpoints, 1.0, float(self.sunlight[hour]))
             limited[:, hour] = before
             held.append(one)
@@ -200,6 +213,7 @@ def for_site(
     place = Place.of(site)
     return Template(
         free=free,
+        taken=tuple(name for name in SETPOINTS if name in USUAL_SETPOINTS or name in site.setpoints),
         block={name: (by_hour if name in BY_HOUR else by_period).astype(np.int64) for name in free},
         low=np.array([limit.low for limit in limits]),
         high=np.array([limit.high for limit in limits]),

@@ -3,9 +3,11 @@
 Parametric rules of Dutch climate computers (Bakker, Bot, Challa and van de Braak (1995), Greenhouse Climate
 Control, ch. 4): a pipe temperature from the shortage of heat and the weather, vents on a proportional band above
 the heating setpoint with an influence of humidity and a limit by wind, screens by radiation and outdoor
-temperature, lamps on request below a radiation limit, CO2 on a proportional band in the light. A computer that
-takes a humidity setpoint opens the vents by the larger of what temperature and humidity ask; where that setpoint
-is not known, damp air starts the vents earlier instead. The rules are fitted to the log of the very greenhouse
+temperature, lamps on request below a radiation limit, CO2 on a proportional band in the light. Some computers take
+more setpoints. By one of the humidity the vents open by the larger of what temperature and humidity ask; where it is
+not known, damp air starts the vents earlier instead. One of the ventilation has the band begin above itself in place of
+the heating setpoint, a minimum pipe bounds the pipe rail below, and the energy screen closes no further than its
+own. The rules are fitted to the log of the very greenhouse
 (`igrow.trainer.fit.actuation`), so they also stand for settings that no log holds. Pure, elementwise,
 traceable: numpy, torch and ONNX graphs run the same code.
 
@@ -14,7 +16,7 @@ Positions follow their targets with a lag, so the stage has a memory: the positi
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -48,7 +50,7 @@ class Rule:
     meaning: str
 
 
-def _pipe(name: str, base: float, gain: float, weather: float, highest: float) -> tuple[Rule, ...]:
+def _pipe(name: str, base: float, gain: float, weather: float, highest: float, *following: Rule) -> tuple[Rule, ...]:
     return (
         Rule(f"{name}_base", "K", base, -60.0, 60.0, "excess of the pipe over the air at the setpoint, mild weather"),
         Rule(f"{name}_gain", "1", gain, 0.0, 40.0, "more of it for each kelvin below the heating setpoint"),
@@ -59,6 +61,7 @@ def _pipe(name: str, base: float, gain: float, weather: float, highest: float) -
         Rule(f"{name}_humidity", "K per %", 0.0, 0.0, 4.0, "more of it for each % of humidity above 80"),
         Rule(f"{name}_highest", "K", highest, 5.0, 80.0, "largest excess"),
         Rule(f"{name}_least", "K", 0.0, 0.0, 40.0, "excess that is never left (minimum pipe)"),
+        *following,
     )
 
 
@@ -72,28 +75,35 @@ def _vent(name: str, offset: float, band: float) -> tuple[Rule, ...]:
         Rule(f"{name}_humidity", "K per %", 0.1, 0.0, 2.0, "earlier start for each % of humidity above 80"),
         Rule(f"{name}_humidity_opening", "1", 0.0, 0.0, 1.0, "largest opening for humidity above its setpoint"),
         Rule(f"{name}_humidity_band", "%", 10.0, 1.0, 40.0, "from the humidity setpoint to that opening"),
+        Rule(f"{name}_ventilation", "1", 0.0, 0.0, 1.0, "1: opens above the ventilation setpoint, not the heating's"),
         Rule(f"{name}_screened", "1", 0.3, 0.0, 1.5, "opening under a closed screen over that without"),
         Rule(f"{name}_wind_limit", "1", 0.0, 0.0, 0.2, "share of the opening lost for each m/s of wind above 6"),
         Rule(f"{name}_least", "%", 0.0, 0.0, 20.0, "opening that is never left"),
     )
 
 
-def _screen(name: str, radiation: float, outdoor: float) -> tuple[Rule, ...]:
+def _screen(name: str, radiation: float, outdoor: float, *following: Rule) -> tuple[Rule, ...]:
     return (
         Rule(f"{name}_radiation", "W m-2", radiation, -20.0, 400.0, "closes below this radiation"),
         Rule(f"{name}_outdoor", "degC", outdoor, -20.0, 40.0, "closes below this outdoor temperature"),
         Rule(f"{name}_unlit", "%", 90.0, 0.0, 100.0, "closure in the dark, lamps off"),
         Rule(f"{name}_lit", "%", 90.0, 0.0, 100.0, "closure in the dark, lamps on"),
         Rule(f"{name}_open", "%", 0.0, 0.0, 100.0, "closure by day"),
+        *following,
     )
 
 
 _RULES = (
-    *_pipe("rail", 10.0, 8.0, 0.8, 50.0),
+    *_pipe(
+        "rail", 10.0, 8.0, 0.8, 50.0, Rule("rail_minimum", "1", 0.0, 0.0, 1.0, "1: keeps the minimum pipe setpoint")
+    ),
     *_pipe("grow", 0.0, 4.0, 0.3, 30.0),
     *_vent("lee", 1.0, 6.0),
     *_vent("windward", 3.0, 8.0),
-    *_screen("energy_screen", 60.0, 12.0),
+    *_screen(
+        *("energy_screen", 60.0, 12.0),
+        Rule("energy_screen_limited", "1", 0.0, 0.0, 1.0, "1: closes no further than the energy screen setpoint"),
+    ),
     *_screen("blackout_screen", 5.0, 40.0),
     Rule("lamp_capacity", "W m-2", 100.0, 0.0, 500.0, "electric power of the lamps when they all burn"),
     Rule("lamp_radiation", "W m-2", 1500.0, 10.0, 1500.0, "lamps go off above this radiation"),
@@ -115,17 +125,33 @@ RULES: Mapping[str, Rule] = MappingProxyType({rule.name: rule for rule in _RULES
 
 VENTS: Mapping[str, str] = MappingProxyType({"vent_lee": "lee", "vent_wind": "windward"})
 """Vents, and what the names of their rules begin with."""
-FOR_HUMIDITY = frozenset(f"{vent}_humidity_{part}" for vent in VENTS.values() for part in ("opening", "band"))
-"""Rules of computers that take a humidity setpoint."""
+ANSWERS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "humidity_setpoint": tuple(f"{vent}_humidity_opening" for vent in VENTS.values()),
+        "ventilation_setpoint": tuple(f"{vent}_ventilation" for vent in VENTS.values()),
+        "minimum_pipe_setpoint": ("rail_minimum",),
+        "energy_screen_setpoint": ("energy_screen_limited",),
+    }
+)
+"""Setpoints that not every computer takes, and the rules by which one answers to them: 0 where it does not."""
+_BANDS = tuple(f"{vent}_humidity_band" for vent in VENTS.values())
+
+
+def rules_of(setpoint: str) -> tuple[str, ...]:
+    """Return the rules that only computers have which take a setpoint; none, where every computer takes it."""
+    return ANSWERS.get(setpoint, ()) + (_BANDS if setpoint == "humidity_setpoint" else ())
 
 
 def setpoints_of(rules: Mapping[str, float]) -> tuple[str, ...]:
-    """Return the setpoints that rules answer to, in the registry's order.
+    """Return the setpoints that rules answer to, in the registry's order: every computer's, and those of `ANSWERS`."""
+    answered = {name for name, own in ANSWERS.items() if any(rules.get(rule, 0.0) > 0.0 for rule in own)}
+    return tuple(name for name in SETPOINTS if name in USUAL_SETPOINTS or name in answered)
 
-    That of the humidity is one of them where a vent opens for it: the others are every computer's.
-    """
-    opens = any(rules.get(f"{vent}_humidity_opening", 0.0) > 0.0 for vent in VENTS.values())
-    return tuple(name for name in SETPOINTS if name in USUAL_SETPOINTS or opens)
+
+def rules_for(setpoints: Collection[str]) -> tuple[str, ...]:
+    """Return the names of `RULES` that a computer has which takes these setpoints, in their order."""
+    others = {rule for name in ANSWERS if name not in setpoints for rule in rules_of(name)}
+    return tuple(name for name in RULES if name not in others)
 
 
 def default_rules() -> dict[str, float]:
@@ -147,8 +173,8 @@ def act(
 
     Args:
         xp: the array namespace.
-        setpoints: heating_setpoint (degC), co2_setpoint (ppm), lamp_on and irrigation_on (0 to 1), and, where it is
-            known, humidity_setpoint (%).
+        setpoints: heating_setpoint (degC), co2_setpoint (ppm), lamp_on and irrigation_on (0 to 1), and those of
+            `ANSWERS` that are known, in the registry's units.
         weather: outdoor_temperature (degC), global_radiation (W m-2), wind_speed (m s-1).
         climate: air_temperature (degC), air_humidity (%), air_co2 (ppm), par (umol m-2 s-1) as measured now.
         memory: `POSITIONS` now.
@@ -197,7 +223,11 @@ def targets(
             + p[f"{name}_lamps"] * lamp
             + p[f"{name}_humidity"] * moist
         )
-        return temperature + xp.minimum(xp.maximum(excess, p[f"{name}_least"] + zero), p[f"{name}_highest"] + zero)
+        wanted = temperature + xp.minimum(xp.maximum(excess, p[f"{name}_least"] + zero), p[f"{name}_highest"] + zero)
+        if name == "rail" and "minimum_pipe_setpoint" in setpoints:
+            lowest = setpoints["minimum_pipe_setpoint"]
+            wanted = xp.maximum(wanted, wanted + p["rail_minimum"] * (lowest - wanted))
+        return wanted
 
     screened = 0.01 * xp.maximum(memory["energy_screen"], memory["blackout_screen"])
     daylight = xp.minimum(sun / 200.0, one)
@@ -208,6 +238,9 @@ def targets(
             1.0 + p[f"{name}_band_cold"] * xp.maximum(20.0 - weather["outdoor_temperature"], zero)
         )
         above = -short - start + p[f"{name}_humidity"] * moist
+        if "ventilation_setpoint" in setpoints:
+            later = setpoints["ventilation_setpoint"] - setpoints["heating_setpoint"]
+            above = above - p[f"{name}_ventilation"] * later
         share = xp.minimum(xp.maximum(above / band, zero), one)
         if "humidity_setpoint" in setpoints:
             damp = (climate["air_humidity"] - setpoints["humidity_setpoint"]) / p[f"{name}_humidity_band"]
@@ -220,7 +253,11 @@ def targets(
         dark = xp.minimum(xp.maximum((p[f"{name}_radiation"] - sun) / 10.0 + 0.5, zero), one)
         cool = xp.minimum(xp.maximum((p[f"{name}_outdoor"] - weather["outdoor_temperature"]) / 2.0 + 0.5, zero), one)
         closed = p[f"{name}_unlit"] + lamp * (p[f"{name}_lit"] - p[f"{name}_unlit"])
-        return p[f"{name}_open"] + dark * cool * (closed - p[f"{name}_open"])
+        wanted = p[f"{name}_open"] + dark * cool * (closed - p[f"{name}_open"])
+        if name == "energy_screen" and "energy_screen_setpoint" in setpoints:
+            most = setpoints["energy_screen_setpoint"]
+            wanted = xp.minimum(wanted, wanted + p["energy_screen_limited"] * (most - wanted))
+        return wanted
 
     lit = xp.where(sun + 1000.0 * lamp > 10.0, one, zero)
     dose = (

@@ -77,6 +77,9 @@ class Agronomy:
     temperature_drift: float = setting(
         unit="K h-1", low=0.1, high=20, default=2.0, help="fastest change of the heating setpoint"
     )
+    dead_zone: float = setting(
+        unit="K", low=0, high=10, default=1.0, help="least that vents begin to open above the heating setpoint"
+    )
     light_sum_high: float = setting(
         unit="mol m-2 d-1", low=1, high=100, default=30.0, help="light of sun and lamps beyond which no lamp may add"
     )

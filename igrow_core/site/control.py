@@ -60,6 +60,17 @@ class Limits:
         help="%, of a PLC that takes one", default_factory=lambda: _limits(70.0, 90.0, 85.0, 10.0, 0.5, 5)
     )
 
+    # Above every heating setpoint that is allowed, or heat goes out through the vents.
+    ventilation_setpoint: SetpointLimits = setting(
+        help="degC, of a PLC that takes one", default_factory=lambda: _limits(14.0, 32.0, 24.0, 4.0, 0.1, 5)
+    )
+    minimum_pipe_setpoint: SetpointLimits = setting(
+        help="degC, of a PLC that takes one", default_factory=lambda: _limits(0.0, 60.0, 0.0, 30.0, 1.0, 5)
+    )
+    energy_screen_setpoint: SetpointLimits = setting(
+        help="%, of a PLC that takes one", default_factory=lambda: _limits(0.0, 100.0, 100.0, None, 1.0, 15)
+    )
+
     def __post_init__(self) -> None:
         for field in fields(self):
             limits, quantity = self[field.name], QUANTITIES[field.name]

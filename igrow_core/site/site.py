@@ -60,6 +60,8 @@ class Site:
             for position, name in enumerate(getattr(self, key)):
                 if name not in known:
                     raise SettingError(f"{key} has {name}: {nearest(name, known)}", key, position)
+        if "ventilation_setpoint" in self.setpoints:
+            self._check_dead_zone()
 
     def _check_agronomy(self) -> None:
         """Raise SettingError where the limits of the heating setpoint leave nothing of what the crop needs."""
@@ -78,6 +80,18 @@ class Site:
                 f"{heating.low:g} to {heating.high:g}",
                 *("limits", "heating_setpoint"),
             )
+
+    def _check_dead_zone(self) -> None:
+        """Raise SettingError where heat and open vents could not be kept apart."""
+        heating, vents, zone = self.limits.heating_setpoint, self.limits.ventilation_setpoint, self.crop.agronomy
+        for key in ("high", "safe"):
+            least = getattr(heating, key) + zone.dead_zone
+            if getattr(vents, key) < least:
+                raise SettingError(
+                    f"limits.ventilation_setpoint.{key} is {getattr(vents, key):g} degC: at least {least:g} keeps it "
+                    f"crop.agronomy.dead_zone above limits.heating_setpoint.{key}",
+                    *("limits", "ventilation_setpoint", key),
+                )
 
 
 def load_site(path: str | os.PathLike[str]) -> Site:

@@ -14,6 +14,7 @@ from igrow.core.planner.template import for_site
 from igrow.core.quantities import SETPOINTS
 from igrow.core.site import Agronomy, Band, Rest, Site
 from igrow.core.telemetry import Telemetry
+from tests.setpoint_tables import OPTIONAL
 
 UNKNOWN = np.full(len(SETPOINTS), np.nan)
 ZONES = ("Europe/Amsterdam", "UTC", "Asia/Kolkata", "America/New_York", "Australia/Adelaide", "Asia/Kathmandu")
@@ -26,6 +27,7 @@ def some_site(rng: np.random.Generator) -> Site:
         float(rng.uniform(-75, 75)),
         float(rng.uniform(-180, 180)),
         ZONES[int(rng.integers(len(ZONES)))],
+        setpoints=SETPOINTS,
     )
     night_low, day_low = rng.uniform(12, 17), rng.uniform(13, 18)
     night_high, day_high = rng.uniform(19, 22), rng.uniform(19, 26)
@@ -41,6 +43,7 @@ def some_site(rng: np.random.Generator) -> Site:
         co2_with_people=float(rng.uniform(450, 1200)),
         people_from=time(int(rng.integers(24)), 30),
         people_until=time(int(rng.integers(24)), 15),
+        dead_zone=float(rng.uniform(0, 3)),
         rest={"lamp_on": Rest(timedelta(hours=float(rng.uniform(0, 4))), timedelta(hours=float(rng.uniform(0, 4))))},
     )
     return replace(site, crop=replace(site.crop, agronomy=crop))
@@ -54,14 +57,16 @@ def some_wish(rng: np.random.Generator, hours: int, count: int = 4) -> np.ndarra
     wish[..., 0] = 10 + 20 * wish[..., 0]
     wish[..., 1] = 300 + 1200 * wish[..., 1]
     wish[..., 2] = (wish[..., 2] > rng.random()) * 1.0
+    wish[..., SETPOINTS.index("ventilation_setpoint")] *= 40.0
     return wish
 
 
 def left(site: Site, start: np.datetime64, course: np.ndarray, radiation: np.ndarray) -> list[str]:
     place = Place.of(site)
     heating, co2, lamp = (course[:, SETPOINTS.index(name)] for name in ("heating_setpoint", "co2_setpoint", "lamp_on"))
+    vents = course[:, SETPOINTS.index("ventilation_setpoint")] if "ventilation_setpoint" in site.setpoints else None
     seconds = float(start.astype("datetime64[s]").astype(np.int64))
-    return violations(place, seconds, heating, lamp, co2, place.sunlight(1.0) * radiation)
+    return violations(place, seconds, heating, lamp, co2, place.sunlight(1.0) * radiation, ventilation=vents)
 
 
 @pytest.mark.parametrize("seed", range(60))
@@ -84,7 +89,8 @@ def test_what_leaves_no_limit_passes_unchanged() -> None:
     hour = np.arange(hours) % 24
     day = (hour >= 9) & (hour < 16)
     wish = np.column_stack(
-        [np.where(day, 19.5, 18.0), np.full(hours, 800.0), 1.0 * (hour < 16), 0.5 + 0.0 * hour, 80.0 + 0.0 * hour]
+        [np.where(day, 19.5, 18.0), np.full(hours, 800.0), 1.0 * (hour < 16), 0.5 + 0.0 * hour]
+        + [np.full(hours, value) for value in OPTIONAL]
     )
     template = for_site(site, start, hours)
     assert left(site, start, wish, np.zeros(hours)) == []
@@ -95,6 +101,7 @@ def test_what_leaves_no_limit_passes_unchanged() -> None:
 @pytest.mark.parametrize(
     ("column", "value", "limit"),
     [
+        (SETPOINTS.index("ventilation_setpoint"), 19.0, "dead_zone"),
         (0, 10.0, "night_temperature"),
         (0, 28.0, "day_temperature"),
         (2, 1.0, "dark_hours"),
@@ -102,10 +109,11 @@ def test_what_leaves_no_limit_passes_unchanged() -> None:
     ],
 )
 def test_the_limit_that_binds_is_named(column: int, value: float, limit: str) -> None:
-    site = Site("named", 52.0, 4.5, "Europe/Amsterdam")
+    site = Site("named", 52.0, 4.5, "Europe/Amsterdam", setpoints=SETPOINTS)
     site = replace(site, crop=replace(site.crop, agronomy=replace(site.crop.agronomy, co2_with_people=700.0)))
     start, hours = np.datetime64("2020-01-31T23:00:00"), 48
-    wish = np.tile([18.5, 600.0, 0.0, 0.5, 80.0], (1, hours, 1))
+    wish = np.tile([18.5, 600.0, 0.0, 0.5, *OPTIONAL], (1, hours, 1))
+    wish[..., SETPOINTS.index("ventilation_setpoint")] = 30.0
     wish[..., column] = value
     course = for_site(site, start, hours).follow(wish, UNKNOWN)
     named = {name for one in course.binding() for name in one.get(SETPOINTS[column], ())}
@@ -113,10 +121,19 @@ def test_the_limit_that_binds_is_named(column: int, value: float, limit: str) ->
     assert not any(set(one) - {SETPOINTS[column]} for one in course.binding())
 
 
+def test_vents_of_a_site_that_takes_no_ventilation_setpoint_bind_nothing() -> None:
+    site, start, hours = Site("own", 52.0, 4.5, "Europe/Amsterdam"), np.datetime64("2020-01-31T23:00:00"), 48
+    wish = np.tile([18.5, 600.0, 0.0, 0.5, *OPTIONAL], (1, hours, 1))
+    wish[..., SETPOINTS.index("ventilation_setpoint")] = 15.0
+    course = for_site(site, start, hours).follow(wish, UNKNOWN)
+    np.testing.assert_array_equal(course.setpoints, wish)
+    assert not any(course.binding())
+
+
 def test_the_inspection_sees_each_limit_that_is_left() -> None:
-    site = Site("seen", 52.0, 4.5, "Europe/Amsterdam")
+    site = Site("seen", 52.0, 4.5, "Europe/Amsterdam", setpoints=SETPOINTS)
     start, hours = np.datetime64("2020-01-31T23:00:00"), 72
-    good = np.tile([18.5, 600.0, 0.0, 0.5], (hours, 1))
+    good = np.tile([18.5, 600.0, 0.0, 0.5, *OPTIONAL], (hours, 1))
     dark = np.zeros(hours)
     assert left(site, start, good, dark) == []
 
@@ -134,6 +151,7 @@ def test_the_inspection_sees_each_limit_that_is_left() -> None:
     assert "are needed" in found(2, np.ones(hours))
     assert "from lamps" in found(2, 1.0 * (hour % 24 < 12), np.full(hours, 800.0))
     assert "ppm with people" in found(1, np.full(hours, 6000.0))
+    assert "vents open at" in found(SETPOINTS.index("ventilation_setpoint"), np.full(hours, 19.0))
 
 
 def test_history_counts_dark_hours_that_were_given() -> None:
@@ -141,7 +159,7 @@ def test_history_counts_dark_hours_that_were_given() -> None:
     site = Site("past", 52.0, 4.5, "Europe/Amsterdam")
     start = np.datetime64("2020-02-01T00:00:00")
     times = start - np.arange(12, 0, -1) * np.timedelta64(1, "h")
-    wish = np.tile([18.5, 600.0, 1.0, 0.5, 80.0], (1, 24, 1))
+    wish = np.tile([18.5, 600.0, 1.0, 0.5, *OPTIONAL], (1, 24, 1))
     lamps = {}
     for name, lit in (("dark", 0.0), ("lit", 1.0)):
         columns = {"lamp_on": np.full(12, lit), "heating_setpoint": np.full(12, 18.5)}

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from igrow.core.errors import IgrowError
+from igrow.core.quantities import QUANTITIES, SETPOINTS, USUAL_SETPOINTS
 from igrow.core.site import SetpointLimits
 from igrow.core.yaml_schema import SchemaError, parse, setting
 from igrow.edge.configuration import ConfigurationError, load_configuration
@@ -269,6 +270,24 @@ def test_a_site_that_names_a_humidity_setpoint_has_it_guarded_and_in_its_recipe(
     assert rule.slew == pytest.approx(10.0 / 3600.0)
     (always,) = configuration.file.recipe.humidity_setpoint
     assert always.value == 85.0
+
+
+def test_every_setpoint_that_not_each_computer_takes_has_a_recipe_once_a_site_names_it(tmp_path):
+    others = [name for name in SETPOINTS if name not in USUAL_SETPOINTS]
+    points = "".join(
+        f"  {name}: {{{{device: plc, function: holding, address: {4 + 2 * place}, type: float32, "
+        f'unit: "{QUANTITIES[name].unit}", writable: true}}}}\n'
+        for place, name in enumerate(others)
+    )
+    path = write_files(tmp_path, 5020, map_text=MAP + points)
+    site = tmp_path / "site.yaml"
+    site.write_text(site.read_text().replace("co2_setpoint]", f"co2_setpoint, {', '.join(others)}]"))
+    configuration = load_configuration(path)
+    assert configuration.setpoints[2:] == tuple(others)
+    for name in others:
+        (always,) = configuration.file.recipe.periods(name)
+        assert always.value == configuration.site.limits[name].safe
+        assert configuration.guard_rules.points[name].safe == always.value
 
 
 def test_a_recipes_own_humidity_setpoint_is_kept_and_checked(tmp_path):

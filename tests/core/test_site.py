@@ -91,10 +91,16 @@ def test_a_site_can_be_sent_to_another_process() -> None:
     assert pickle.loads(pickle.dumps(site)) == site
 
 
+LOW_VENTS = "limits: {ventilation_setpoint: {high: 20, safe: 20}}"
+
+
 def test_a_humidity_setpoint_is_there_for_sites_that_name_it_alone() -> None:
     four = ("heating_setpoint", "co2_setpoint", "lamp_on", "irrigation_on")
     assert parse(SHORT, Site).setpoints == USUAL_SETPOINTS == four
     site = parse(f"{SHORT}setpoints: [heating_setpoint, humidity_setpoint]", Site)
     assert site.setpoints == ("heating_setpoint", "humidity_setpoint")
+    with pytest.raises(IgrowError, match=r"ventilation_setpoint\.high is 20 degC: at least 29 keeps it"):
+        parse(f"{SHORT}setpoints: [ventilation_setpoint]\n{LOW_VENTS}", Site)
+    assert parse(f"{SHORT}{LOW_VENTS}", Site).limits.ventilation_setpoint.high == 20.0
     with pytest.raises(IgrowError, match=r"humidity_setpoint\.high is 101: 50 to 100 % makes sense"):
         parse(f"{SHORT}limits: {{humidity_setpoint: {{high: 101}}}}", Site)

@@ -105,39 +105,66 @@ def test_a_gap_that_is_longer_than_the_log_hides_no_setpoints() -> None:
     assert np.isin(setpoints["heating_setpoint"][:600], (17.0, 20.0)).mean() > 0.9
 
 
-DAMP_SITE = replace(SITE, setpoints=SETPOINTS)
+ALL_SITE = replace(SITE, setpoints=SETPOINTS)
+BETWEEN = {
+    "humidity_setpoint": (70.0, 90.0),
+    "ventilation_setpoint": (18.0, 26.0),
+    "minimum_pipe_setpoint": (0.0, 55.0),
+    "energy_screen_setpoint": (0.0, 100.0),
+}
 
 
 @pytest.fixture(scope="module")
 def moved() -> Telemetry:
-    """The log of a mechanistic greenhouse whose humidity setpoint is moved every six hours."""
-    start, end = np.datetime64("2020-02-20T00:00:00"), np.datetime64("2020-03-01T00:00:00")
-    levels = np.random.default_rng(4).uniform(70.0, 90.0, 41)
+    """The log of a mechanistic greenhouse whose further setpoints are moved every six hours, each by itself."""
+    start, end = np.datetime64("2020-03-15T00:00:00"), np.datetime64("2020-03-29T00:00:00")
+    random = np.random.default_rng(4)
+    levels = {name: random.uniform(*ends, 57) for name, ends in BETWEEN.items()}
 
     def schedule(time: np.datetime64) -> dict[str, float]:
-        return {**recipe(time), "humidity_setpoint": float(levels[int((time - start) / np.timedelta64(6, "h"))])}
+        now = int((time - start) / np.timedelta64(6, "h"))
+        return {**recipe(time), **{name: float(values[now]) for name, values in levels.items()}}
 
     weather = generate_weather(start, end, seed=3)
     return simulate(GreenhouseParameters(), weather, schedule, start, end, seed=2).measured
 
 
-def test_how_vents_answer_to_a_humidity_setpoint_is_read_off_the_plants_log(moved: Telemetry) -> None:
-    record = site_record(moved, DAMP_SITE, 300.0)
-    setpoints, inferred = setpoint_columns(moved, record, DAMP_SITE)
+def test_how_a_computer_answers_to_further_setpoints_is_read_off_the_plants_log(moved: Telemetry) -> None:
+    record = site_record(moved, ALL_SITE, 300.0)
+    setpoints, inferred = setpoint_columns(moved, record, ALL_SITE)
     assert (set(setpoints), inferred) == (set(SETPOINTS), ())
-    rules, computer = fit_actuation([(record, setpoints, None)], nominal(DAMP_SITE)), ClimateComputer()
+    rules, computer = fit_actuation([(record, setpoints, None)], nominal(ALL_SITE)), ClimateComputer()
     assert rules["lee_humidity"] == 0.0
     assert rules["lee_humidity_opening"] == pytest.approx(computer.humidity_opening, abs=0.04)
     assert rules["lee_humidity_band"] == pytest.approx(computer.humidity_band, abs=2.5)
-    assert unanswered(DAMP_SITE, rules) == ()
+    assert unanswered(ALL_SITE, rules) == ()
     # The windward vents open for heat alone.
     assert rules["windward_humidity_opening"] == 0.0
+    answers = ("lee_ventilation", "rail_minimum", "energy_screen_limited")
+    assert [rules[name] for name in answers] == [1.0, 1.0, 1.0]
+    asked = {name.removeprefix("setpoint:"): values for name, values in setpoints.items()}
+    inputs = {"par": np.zeros(len(record)), **record.inputs, **record.measured}
+    aims = actuation.targets(np, asked, inputs, inputs, inputs, rules)
+    for name, least in (("vent_lee", 5.0), ("energy_screen", 8.0)):
+        away = np.abs(aims[name] - record.inputs[name])
+        assert np.nanmean(away) < least, name
     assert actuation.setpoints_of(rules) == SETPOINTS
 
 
-def test_a_site_that_does_not_name_the_humidity_setpoint_is_fitted_as_if_its_log_had_none(moved: Telemetry) -> None:
+def test_a_setpoint_that_moves_and_that_nothing_follows_is_not_answered_to(moved: Telemetry) -> None:
+    """The columns of another greenhouse's setpoints, beside what this one did without."""
+    log = virtual_log(8, seed=1)
+    later = {name: moved[name][: len(log)] for name in BETWEEN}
+    log = log.with_columns({name: np.resize(values, len(log)) for name, values in later.items()})
+    record = site_record(log, ALL_SITE, 300.0)
+    setpoints, _ = setpoint_columns(log, record, ALL_SITE)
+    rules = fit_actuation([(record, setpoints, None)], nominal(ALL_SITE))
+    assert set(actuation.setpoints_of(rules)) <= {*USUAL_SETPOINTS, "humidity_setpoint"}
+
+
+def test_a_site_that_does_not_name_further_setpoints_is_fitted_as_if_its_log_had_none(moved: Telemetry) -> None:
     fitted = []
-    for log in (moved, moved.only(name for name in moved.columns if name != "humidity_setpoint")):
+    for log in (moved, moved.only(name for name in moved.columns if name not in BETWEEN)):
         record = site_record(log, SITE, 300.0)
         setpoints, inferred = setpoint_columns(log, record, SITE)
         assert (set(setpoints), inferred) == (set(USUAL_SETPOINTS), ())
@@ -147,11 +174,12 @@ def test_a_site_that_does_not_name_the_humidity_setpoint_is_fitted_as_if_its_log
     assert fitted[0]["lee_humidity"] > 0.0
 
 
-def test_a_log_without_the_humidity_setpoint_that_a_site_names_has_none_inferred() -> None:
+def test_a_log_without_the_further_setpoints_that_a_site_names_has_none_inferred() -> None:
     log = virtual_log(8, seed=1)
-    record = site_record(log, DAMP_SITE, 300.0)
-    setpoints, inferred = setpoint_columns(log, record, DAMP_SITE)
+    record = site_record(log, ALL_SITE, 300.0)
+    setpoints, inferred = setpoint_columns(log, record, ALL_SITE)
     assert (set(setpoints), inferred) == (set(USUAL_SETPOINTS), ())
-    (note,) = unanswered(DAMP_SITE, actuation.default_rules())
-    assert note == "in this log nothing answers to humidity_setpoint: plans leave it to the recipe"
+    notes = unanswered(ALL_SITE, actuation.default_rules())
+    assert notes[0] == "in this log nothing answers to humidity_setpoint: plans leave it to the recipe"
+    assert len(notes) == len(BETWEEN)
     assert unanswered(SITE, actuation.default_rules()) == ()

@@ -122,3 +122,25 @@ def test_a_humidity_setpoint_takes_the_place_of_the_computers_own() -> None:
     assert settle(moist, humidity_setpoint=computer.humidity_start).vent_lee == own
     assert settle(moist, humidity_setpoint=92.0).vent_lee == 0.0
     assert settle(moist, humidity_setpoint=80.0).vent_lee == pytest.approx(computer.humidity_opening)
+
+
+def test_a_ventilation_setpoint_takes_the_place_of_the_offset_and_is_never_below_the_heating() -> None:
+    computer, warm = ClimateComputer(), MILD._replace(air_temperature=23.0)
+    own = settle(warm).vent_lee
+    line = SETPOINTS["heating_setpoint"] + computer.ventilation_offset
+    assert own > 0.1
+    assert settle(warm, ventilation_setpoint=line).vent_lee == pytest.approx(own)
+    assert settle(warm, ventilation_setpoint=23.0).vent_lee == 0.0
+    below = settle(warm, ventilation_setpoint=10.0).vent_lee
+    assert below == pytest.approx(settle(warm, ventilation_setpoint=SETPOINTS["heating_setpoint"]).vent_lee)
+
+
+def test_a_minimum_pipe_is_heated_in_warm_air_and_the_energy_screen_keeps_to_its_own_setpoint() -> None:
+    warm = MILD._replace(air_temperature=23.0, rail_temperature=23.0, grow_temperature=23.0)
+    assert settle(warm).rail_heat == 0.0
+    held = settle(warm, minimum_pipe_setpoint=40.0)
+    assert held.rail_heat > 20.0
+    assert held.grow_heat == 0.0
+    night = MILD._replace(global_radiation=0.0, outdoor_temperature=-5.0, air_humidity=60.0)
+    assert settle(night).energy_screen > 0.9
+    assert settle(night, energy_screen_setpoint=40.0).energy_screen == pytest.approx(0.4)

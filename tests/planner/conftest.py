@@ -8,6 +8,7 @@ import pytest
 from igrow.core.planner import PlanningState
 from igrow.core.site import Site
 from tests.planner.toy_greenhouse import HOURS, START
+from tests.setpoint_tables import OPTIONAL
 
 
 @pytest.fixture
@@ -30,7 +31,8 @@ def recipe() -> np.ndarray:
     """A grower's two days, (48, S)."""
     hour = np.arange(HOURS) % 24
     day = (hour >= 7) & (hour < 19)
-    rows = [np.where(day, 20.0, 17.0), np.where(day, 600.0, 400.0), 1.0 * day, 0.5 * day, np.full(HOURS, 85.0)]
+    rows = [np.where(day, 20.0, 17.0), np.where(day, 600.0, 400.0), 1.0 * day, 0.5 * day]
+    rows += [np.full(HOURS, value) for value in OPTIONAL]
     return np.column_stack(rows)
 
 

@@ -11,6 +11,7 @@ import pytest
 from igrow.core.economics import product_price
 from igrow.core.planner import Objective
 from igrow.core.planner.objective import HARM_PER_DEGREE_HOUR, by_day, cautious
+from igrow.core.quantities import SETPOINTS
 from igrow.core.site import Prices, ProductPrice, Site
 from tests.planner.toy_greenhouse import HOURS, START, ToySimulator
 
@@ -76,8 +77,8 @@ def test_each_kelvin_of_cold_costs_a_day_more_than_the_one_before(site: Site, we
 def test_doubt_that_plan_and_recipe_share_does_not_count(site, weather, recipe) -> None:
     objective = Objective(site, TIME)
     simulator = ToySimulator(members=(0.5, 1.5))
-    warmer = recipe + np.array([1.0, 0.0, 0.0, 0.0, 0.0])
-    brighter = np.maximum(recipe, np.array([0.0, 0.0, 1.0, 0.0, 0.0]))
+    warmer = recipe + (np.arange(len(SETPOINTS)) == SETPOINTS.index("heating_setpoint"))
+    brighter = np.maximum(recipe, np.arange(len(SETPOINTS)) == SETPOINTS.index("lamp_on"))
     reference = objective.value(simulator.simulate({}, weather, recipe[None], START))
     assert reference.profit.std(axis=0)[0] > 0.01
     _, doubt = cautious(

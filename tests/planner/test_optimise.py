@@ -16,6 +16,7 @@ from igrow.core.quantities import SETPOINTS, USUAL_SETPOINTS
 from igrow.core.simulator.outcome import Simulator
 from igrow.core.site import Site
 from tests.planner.toy_greenhouse import HOURS, START, ToySimulator, with_planning
+from tests.setpoint_tables import OPTIONAL
 
 QUICK = Budget(generations=40, patience=15)
 
@@ -103,7 +104,7 @@ def test_a_recipe_is_not_charged_for_the_evening_of_the_plan_before(site, state,
 
 
 def test_doubt_about_the_lamps_keeps_a_cautious_planner_from_them(site, state, weather, recipe) -> None:
-    dark = recipe * np.array([1.0, 1.0, 0.0, 1.0, 1.0])
+    dark = recipe * (np.arange(len(SETPOINTS)) != SETPOINTS.index("lamp_on"))
     doubtful = ToySimulator(members=(0.2, 0.6, 1.4, 1.8))
     hours = [
         plan(doubtful, with_planning(site, caution=caution), state, weather, dark).setpoints[:, 2].sum()
@@ -113,7 +114,7 @@ def test_doubt_about_the_lamps_keeps_a_cautious_planner_from_them(site, state, w
 
 
 def test_leaving_the_range_of_the_data_costs_and_is_flagged(site, state, weather, recipe) -> None:
-    dark = recipe * np.array([1.0, 1.0, 0.0, 1.0, 1.0])
+    dark = recipe * (np.arange(len(SETPOINTS)) != SETPOINTS.index("lamp_on"))
     free = plan(ToySimulator(), site, state, weather, dark)
     bound = plan(ToySimulator(known_lamp_hours=6.0), site, state, weather, dark)
     assert not free.leaves_range
@@ -196,7 +197,7 @@ def test_a_humidity_setpoint_that_site_or_simulator_lacks_stays_the_recipes(
 def test_the_search_lets_the_air_be_as_damp_as_pays_and_not_beyond_the_crops_damp_hours(site, state, weather) -> None:
     """The toy's air is as damp as its setpoint, and each per cent drier costs heat."""
     hour = np.arange(HOURS) % 24
-    dry = np.column_stack([np.full(HOURS, one) for one in (19.0, 600.0, 0.0, 0.5, 78.0)])
+    dry = np.column_stack([np.full(HOURS, one) for one in (19.0, 600.0, 0.0, 0.5, 78.0, *OPTIONAL[1:])])
     dry[:, SETPOINTS.index("lamp_on")] = (hour >= 7) & (hour < 19)
     result = plan(ToySimulator(setpoints=SETPOINTS), damp_site(site), state, weather, dry)
     asked = result.setpoints[:, SETPOINTS.index("humidity_setpoint")]

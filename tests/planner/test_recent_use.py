@@ -22,6 +22,7 @@ from igrow.core.simulator.outcome import Outcome
 from igrow.core.site import Crop, Greenhouse
 from igrow.core.telemetry import Telemetry
 from tests.planner.toy_greenhouse import START, ToySimulator
+from tests.setpoint_tables import OPTIONAL
 
 
 def days(*values: float) -> dict[str, np.ndarray]:
@@ -54,7 +55,7 @@ def test_air_that_was_warmer_on_all_days_is_expected_to_be_so_again(weather) -> 
     assert warmer(expected, expected + np.array([0.3, -0.3, np.nan])) == pytest.approx(0.0)
     assert warmer(np.zeros(0), np.zeros(0)) == 0.0
     assert warmer(expected, expected + 20.0) == 1.0
-    setpoints = np.tile([20.0, 600.0, 1.0, 0.5, 85.0], (1, 24, 1))
+    setpoints = np.tile([20.0, 600.0, 1.0, 0.5, *OPTIONAL], (1, 24, 1))
     plain = ToySimulator().simulate({}, weather[:24], setpoints, START)
     colder = Corrected(ToySimulator(), dict.fromkeys(SCALED, 1.0), warmer=-0.3).simulate(
         {}, weather[:24], setpoints, START
@@ -64,7 +65,7 @@ def test_air_that_was_warmer_on_all_days_is_expected_to_be_so_again(weather) -> 
 
 
 def test_amounts_are_scaled_and_the_climate_is_not(weather) -> None:
-    setpoints = np.tile([20.0, 600.0, 1.0, 0.5, 85.0], (2, 48, 1))
+    setpoints = np.tile([20.0, 600.0, 1.0, 0.5, *OPTIONAL], (2, 48, 1))
     plain = ToySimulator().simulate({}, weather, setpoints, START)
     factor = dict(zip(SCALED, (0.5, 1.0, 2.0), strict=True))
     scaled = Corrected(ToySimulator(), factor).simulate({}, weather, setpoints, START)
@@ -79,7 +80,7 @@ def test_amounts_are_scaled_and_the_climate_is_not(weather) -> None:
 def test_growth_is_corrected_by_what_was_assimilated_and_not_by_a_factor(weather) -> None:
     """Twice the maintenance takes as much from a day with lamps as from one without: lamps stay worth what they add."""
     balance = GrowthBalance(0.6, 1e-4, np.diag([0.2, 2e-4]) ** 2)
-    setpoints = np.tile([20.0, 600.0, 0.0, 0.5, 85.0], (2, 48, 1))
+    setpoints = np.tile([20.0, 600.0, 0.0, 0.5, *OPTIONAL], (2, 48, 1))
     setpoints[1, :, 2] = 1.0
     plain = ToySimulator(members=(1.0, 1.0, 1.0)).simulate({}, weather, setpoints, START)
     days = [first_day(plain, one) for one in range(2)]

@@ -149,7 +149,7 @@ def damp(season: Season) -> Season:
 
 
 def test_a_strategy_says_a_humidity_where_the_computer_takes_one(season: Season, recipe: np.ndarray) -> None:
-    strategy, column = Strategy(DAYS, 2, humidity=True), SETPOINTS.index("humidity_setpoint")
+    strategy, column = Strategy(DAYS, 2, optional=("humidity_setpoint",)), SETPOINTS.index("humidity_setpoint")
     assert strategy.genes == Strategy(DAYS, 2).genes + 2
     genes = np.full(strategy.genes, 0.5, dtype=np.float32)
     plan = valued(damp(season), strategy, genes, tomato.mature_crop(PLANT, 1.0))
@@ -163,14 +163,35 @@ def test_a_strategy_says_a_humidity_where_the_computer_takes_one(season: Season,
 
 
 def test_a_season_without_a_humidity_is_written_as_before_it_was_known(plan: SeasonPlan) -> None:
-    assert "humidity" not in plan.to_json()
+    assert "optional" not in plan.to_json()
+
+
+def test_a_strategy_that_says_the_humidity_is_read_as_it_was_written_at_first(season: Season) -> None:
+    strategy = Strategy(DAYS, 2, optional=("humidity_setpoint",))
+    genes = np.full(strategy.genes, 0.5, dtype=np.float32)
+    text = valued(damp(season), strategy, genes, tomato.mature_crop(PLANT, 1.0)).to_json()
+    before = text.replace('"optional": ["humidity_setpoint"]', '"humidity": true')
+    assert before != text
+    assert SeasonPlan.from_json(before, "season.json").optional == ("humidity_setpoint",)
+    unknown = text.replace('"optional": ["humidity_setpoint"]', '"optional": ["fog_setpoint"]')
+    with pytest.raises(BundleError, match="says fog_setpoint, which this version does not know"):
+        SeasonPlan.from_json(unknown, "season.json")
+
+
+def test_a_strategy_has_vents_open_so_far_above_the_heating(season: Season, recipe: np.ndarray) -> None:
+    strategy = Strategy(DAYS, 1, optional=("ventilation_setpoint",))
+    genes = np.full((1, strategy.genes), 0.5, dtype=np.float32)
+    asked = strategy.setpoints(genes, 0.0, np.arange(24.0), np.arange(24) > 11, season.weather[0], recipe[:24])[0]
+    heating, vents = (asked[:, SETPOINTS.index(f"{name}_setpoint")] for name in ("heating", "ventilation"))
+    assert vents - heating == pytest.approx(np.full(24, 3.5))
+    assert np.ptp(heating) > 0.5
 
 
 def test_a_strategy_that_leaves_days_damper_than_the_crop_bears_is_not_admitted(season: Season) -> None:
     one = damp(season)
     # Where the toy's recipe holds 85 %, a crop that bears 86 is never damp under it.
     site = replace(one.site, crop=replace(one.site.crop, humidity_high=86.0))
-    strategy, crop = Strategy(DAYS, 1, humidity=True), tomato.mature_crop(PLANT, 1.0)
+    strategy, crop = Strategy(DAYS, 1, optional=("humidity_setpoint",)), tomato.mature_crop(PLANT, 1.0)
     genes = np.full((2, strategy.genes), 0.5, dtype=np.float32)
     genes[:, -1] = (0.2, 0.9)
     season = replace(one, site=site)

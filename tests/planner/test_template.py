@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from igrow.core.planner.template import BLOCK_STARTS, for_site
 from igrow.core.quantities import SETPOINTS
 from igrow.core.site import Site
+from tests.setpoint_tables import OPTIONAL
 
 SITE = Site("toy", 52.0, 4.5, "Europe/Amsterdam")
 MIDNIGHT = np.datetime64("2020-02-01T23:00:00", "s")
@@ -47,7 +48,7 @@ def test_every_candidate_stays_within_limits_and_slew(seed: int, hour: int, hour
     template = for_site(SITE, MIDNIGHT + np.timedelta64(hour, "h"), hours)
     genes = rng.random((5, template.genes), dtype=np.float32)
     recipe = rng.uniform(-50, 2000, size=(hours, len(SETPOINTS)))
-    applied = np.array([19.0, 500.0, 0.0, 0.2, 85.0])
+    applied = np.array([19.0, 500.0, 0.0, 0.2, *OPTIONAL])
     setpoints = template.decode(genes, recipe, applied)
     assert setpoints.shape == (5, hours, len(SETPOINTS))
     for column, name in enumerate(SETPOINTS):
@@ -61,7 +62,8 @@ def test_every_candidate_stays_within_limits_and_slew(seed: int, hour: int, hour
 
 def test_what_is_not_free_follows_the_recipe() -> None:
     template = for_site(SITE, MIDNIGHT, 24)
-    columns = [np.full(24, 20.0), np.full(24, 500.0), np.zeros(24), np.linspace(0, 0.5, 24), np.full(24, 85.0)]
+    columns = [np.full(24, 20.0), np.full(24, 500.0), np.zeros(24), np.linspace(0, 0.5, 24)]
+    columns += [np.full(24, value) for value in OPTIONAL]
     recipe = np.column_stack(columns)
     setpoints = template.decode(np.ones((1, template.genes), dtype=np.float32), recipe, UNKNOWN)
     assert "irrigation_on" not in template.free
@@ -71,7 +73,7 @@ def test_what_is_not_free_follows_the_recipe() -> None:
 def test_a_schedule_in_blocks_survives_encoding() -> None:
     template = for_site(SITE, MIDNIGHT, 48)
     genes = np.random.default_rng(0).random((1, template.genes), dtype=np.float32)
-    recipe = np.tile([18.0, 400.0, 0.0, 0.1, 85.0], (48, 1))
+    recipe = np.tile([18.0, 400.0, 0.0, 0.1, *OPTIONAL], (48, 1))
     first = template.decode(genes, recipe, UNKNOWN)[0]
     unlimited = template.encode(first)
     again = template.decode(unlimited[None], recipe, UNKNOWN)[0]

@@ -186,7 +186,9 @@ def test_a_plan_is_explained_and_names_the_limits_that_bind() -> None:
 def test_a_plan_holds_a_humidity_setpoint_only_where_the_site_takes_one(tmp_path: Path, taken: bool) -> None:
     """The bundle knows it in both cases."""
     damp = replace(
-        SITE, setpoints=SETPOINTS, planning=replace(SITE.planning, optimise=("heating_setpoint", "humidity_setpoint"))
+        SITE,
+        setpoints=(*USUAL_SETPOINTS, "humidity_setpoint"),
+        planning=replace(SITE.planning, optimise=("heating_setpoint", "humidity_setpoint")),
     )
     model = read_model(read_bundle(default_bundle_folder()), damp)
     rules = {"lee_humidity": 0.0, "windward_humidity": 0.0, "lee_humidity_opening": 0.4}
@@ -195,7 +197,7 @@ def test_a_plan_holds_a_humidity_setpoint_only_where_the_site_takes_one(tmp_path
     if taken:
         asked = replace(asked, recipe={**asked.recipe, "humidity_setpoint": (85.0,) * 24})
     plan = make_plan(damp if taken else SITE, asked)
-    assert set(plan.setpoints) == set(SETPOINTS if taken else USUAL_SETPOINTS)
+    assert set(plan.setpoints) == set(damp.setpoints if taken else USUAL_SETPOINTS)
     if taken:
         course, limits = np.array(plan.setpoints["humidity_setpoint"]), damp.limits.humidity_setpoint
         assert (course >= limits.low).all() and (course <= limits.high).all()

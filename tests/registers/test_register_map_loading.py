@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from igrow.core.errors import IgrowError
-from igrow.core.quantities import QUANTITIES, USUAL_SETPOINTS, Kind
+from igrow.core.quantities import QUANTITIES, SETPOINTS, USUAL_SETPOINTS, Kind
 from igrow.edge.registers.bus_load import BusLoad, estimate
 from igrow.edge.registers.loading import load_register_map, parse_register_map
 from igrow.edge.registers.model import ByteOrder, DataType, Function, Parity, Transport
@@ -44,7 +44,7 @@ def test_every_template_for_real_equipment_says_what_to_check_on_site() -> None:
 def test_the_virtual_plc_serves_every_quantity_and_every_setpoint_can_be_written() -> None:
     points = load_register_map(MAPS / "virtual-plc.yaml").points
     needed = {name for name, quantity in QUANTITIES.items() if quantity.kind is not Kind.MARK}
-    assert needed - {"humidity_setpoint"} <= set(points)
+    assert needed - {*SETPOINTS} | {*USUAL_SETPOINTS} <= set(points)
     writable = {name: point.refresh for name, point in points.items() if point.writable}
     assert writable == {**dict.fromkeys((*USUAL_SETPOINTS, "heartbeat")), "vent_lee": 900.0, "vent_wind": 900.0}
 

@@ -8,10 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from igrow.core.quantities import QUANTITIES, USUAL_SETPOINTS
+from igrow.core.quantities import SETPOINTS as SETPOINTS_OF_ALL
 from igrow.core.simulator import actuation
 from igrow.core.simulator.actuation import RULES, default_rules
+from tests.setpoint_tables import OPTIONAL
 
 SETPOINTS = {"heating_setpoint": 20.0, "co2_setpoint": 700.0, "lamp_on": 1.0, "irrigation_on": 0.5}
+OTHERS = dict(zip(actuation.ANSWERS, OPTIONAL, strict=True))
 WEATHER = {"outdoor_temperature": 5.0, "global_radiation": 0.0, "wind_speed": 3.0}
 CLIMATE = {"air_temperature": 20.0, "air_humidity": 80.0, "air_co2": 700.0, "par": 100.0}
 REST = {
@@ -77,7 +80,7 @@ def test_whatever_rules_and_climate_are_the_actuators_stay_in_range(
     }
     out = actuation.act(
         np,
-        SETPOINTS | {"heating_setpoint": setpoint, "lamp_on": lamp, "humidity_setpoint": 80.0},
+        SETPOINTS | OTHERS | {"heating_setpoint": setpoint, "lamp_on": lamp},
         {"outdoor_temperature": outdoor, "global_radiation": radiation, "wind_speed": wind},
         CLIMATE | {"air_temperature": temperature, "air_humidity": humidity},
         REST,
@@ -123,18 +126,59 @@ def test_a_vent_opens_by_the_larger_of_what_temperature_and_humidity_ask() -> No
     assert vents(90.0, 22.0)[0] == pytest.approx(20.0)
 
 
-def test_a_humidity_setpoint_that_no_rule_answers_to_changes_nothing() -> None:
+@pytest.mark.parametrize("name", actuation.ANSWERS)
+def test_a_setpoint_that_no_rule_answers_to_changes_nothing(name: str) -> None:
     for humidity in (60.0, 88.0, 97.0):
         for temperature in (18.0, 22.0, 27.0):
             seen = CLIMATE | {"air_humidity": humidity, "air_temperature": temperature}
             plain, told = (
                 actuation.targets(np, SETPOINTS | more, WEATHER, seen, REST, default_rules())
-                for more in ({}, {"humidity_setpoint": 75.0})
+                for more in ({}, {name: 21.0})
             )
             assert plain == told
 
 
-def test_which_setpoints_rules_answer_to() -> None:
+@pytest.mark.parametrize("name", actuation.ANSWERS)
+def test_which_setpoints_rules_answer_to(name: str) -> None:
     assert actuation.setpoints_of(default_rules()) == USUAL_SETPOINTS
     assert actuation.setpoints_of({}) == USUAL_SETPOINTS, "rules of before it was known"
-    assert actuation.setpoints_of(default_rules() | {"lee_humidity_opening": 0.3})[-1] == "humidity_setpoint"
+    rules = default_rules() | {actuation.ANSWERS[name][0]: 0.3}
+    assert actuation.setpoints_of(rules) == (*USUAL_SETPOINTS, name)
+    own = set(actuation.rules_for(SETPOINTS_OF_ALL)) - set(actuation.rules_for(USUAL_SETPOINTS))
+    assert set(actuation.ANSWERS[name]) <= set(actuation.rules_of(name)) <= own
+
+
+def following(name: str, **changes: float) -> dict[str, float]:
+    """Return the targets of a computer that follows one more setpoint."""
+    rules = default_rules() | dict.fromkeys(actuation.ANSWERS[name], 1.0)
+    seen = CLIMATE | {one: value for one, value in changes.items() if one in CLIMATE}
+    asked = SETPOINTS | {one: value for one, value in changes.items() if one not in CLIMATE}
+    found = actuation.targets(np, asked, WEATHER, seen, REST, rules)
+    return {one: float(value) for one, value in found.items()}
+
+
+def test_vents_open_above_the_ventilation_setpoint_whatever_is_heated_to() -> None:
+    warm = {"air_temperature": 24.0}
+    offset = RULES["lee_offset"].value
+    shut, open_ = (
+        following("ventilation_setpoint", ventilation_setpoint=24.0 - offset - above, **warm)["vent_lee"]
+        for above in (0.0, 3.0)
+    )
+    assert (shut, open_ > 10.0) == (0.0, True)
+    cooler = following("ventilation_setpoint", ventilation_setpoint=20.0, heating_setpoint=15.0, **warm)
+    assert cooler["vent_lee"] == following("ventilation_setpoint", ventilation_setpoint=20.0, **warm)["vent_lee"]
+
+
+def test_the_pipe_rail_stays_above_a_minimum_pipe_and_the_grow_pipe_does_not_follow_it() -> None:
+    warm = {"air_temperature": 26.0}
+    held = following("minimum_pipe_setpoint", minimum_pipe_setpoint=40.0, **warm)
+    assert (held["rail_pipe_temperature"], held["grow_pipe_temperature"]) == (40.0, 26.0)
+    cold = {"air_temperature": 15.0, "minimum_pipe_setpoint": 30.0}
+    assert following("minimum_pipe_setpoint", **cold)["rail_pipe_temperature"] > 40.0
+
+
+def test_the_energy_screen_closes_no_further_than_its_setpoint() -> None:
+    assert following("energy_screen_setpoint", energy_screen_setpoint=35.0)["energy_screen"] == 35.0
+    whole = following("energy_screen_setpoint", energy_screen_setpoint=100.0)
+    assert whole["energy_screen"] == pytest.approx(90.0)
+    assert following("energy_screen_setpoint", energy_screen_setpoint=35.0)["blackout_screen"] > 80.0

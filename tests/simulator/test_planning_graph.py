@@ -10,10 +10,11 @@ import pytest
 from igrow.core.bundle import Bundle, default_bundle_folder, read_bundle
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Greenhouse
+from tests.setpoint_tables import OPTIONAL
 
 START = np.datetime64("2020-02-01T00:00:00")
 NIGHT = np.tile([2.0, 85.0, 415.0, 0.0, 3.0, -8.0], (24, 1))
-WARM = np.tile([20.0, 400.0, 0.0, 0.0, 85.0], (1, 24, 1))
+WARM = np.tile([20.0, 400.0, 0.0, 0.0, *OPTIONAL], (1, 24, 1))
 
 
 @pytest.fixture(scope="module")

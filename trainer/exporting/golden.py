@@ -59,6 +59,9 @@ def golden_inputs(
         "lamp_on": sun > 0,
         "irrigation_on": 0.3 * sun,
         "humidity_setpoint": 85.0 - 5.0 * sun,
+        "ventilation_setpoint": 22.0 + 3.0 * sun,
+        "minimum_pipe_setpoint": 40.0 * (1.0 - sun),
+        "energy_screen_setpoint": 100.0 - 40.0 * sun,
     }
     setpoints = np.stack([asked[name] for name in blocks.setpoints], axis=1)[:, :, None]
     inputs: dict[str, dict[str, NDArray[Any]]] = {

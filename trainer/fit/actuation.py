@@ -17,7 +17,7 @@ from igrow.core.errors import IgrowError
 from igrow.core.quantities import QUANTITIES, SETPOINTS
 from igrow.core.separating_tests.definition import SOURCE
 from igrow.core.simulator import actuation
-from igrow.core.simulator.actuation import FOR_HUMIDITY, RULES, VENTS
+from igrow.core.simulator.actuation import ANSWERS, RULES, VENTS, rules_of
 from igrow.core.simulator.hybrid import climate
 from igrow.core.simulator.hybrid import record as records
 from igrow.core.simulator.hybrid.record import Record
@@ -38,6 +38,9 @@ OPENING = 0.2
 """Largest opening for humidity from which a fit begins where the log has a humidity setpoint."""
 LEAST_OPENING = 0.01
 """A smaller one is none: such vents do not answer to that setpoint."""
+CLOSER, LEAST_GAIN = 0.9, 5.0
+"""An actuator follows a setpoint that not every computer takes where that leaves at most this share of the misfit, and
+takes away at least so many squared errors of its size: an actuator that hardly moved tells nothing."""
 
 
 def setpoint_columns(telemetry: Telemetry, record: Record, site: Site) -> tuple[dict[str, Floats], tuple[str, ...]]:
@@ -163,16 +166,31 @@ def _samples(
 def _fit_rule(
     actuator: str, prefix: str, size: float, table: Mapping[str, Floats], rules: Mapping[str, float]
 ) -> dict[str, float]:
+    """Return the rules of an actuator that follows those setpoints of the log that bring it closer."""
+    found, misfit = _fit_following(actuator, prefix, size, table, rules)
+    for setpoint in ("ventilation_setpoint", "minimum_pipe_setpoint", "energy_screen_setpoint"):
+        following = {rule: 1.0 for rule in ANSWERS[setpoint] if rule.startswith(f"{prefix}_")}
+        if following and f"setpoint:{setpoint}" in table:
+            closer, left = _fit_following(actuator, prefix, size, table, {**rules, **following})
+            if left < min(CLOSER * misfit, misfit - LEAST_GAIN):
+                found, misfit = closer | following, left
+    return found
+
+
+def _fit_following(
+    actuator: str, prefix: str, size: float, table: Mapping[str, Floats], rules: Mapping[str, float]
+) -> tuple[dict[str, float], float]:
+    """Return the rules of an actuator and the misfit that they leave; which setpoints it follows `rules` says."""
     setpoints = {name: table[f"setpoint:{name}"] for name in SETPOINTS if f"setpoint:{name}" in table}
     held: dict[str, float] = {}
     rules = dict(rules)
-    settled = {"co2_capacity", "irrigation_rate"}
+    settled = {"co2_capacity", "irrigation_rate", *(rule for own in ANSWERS.values() for rule in own)}
     if "humidity_setpoint" not in setpoints:
-        settled |= FOR_HUMIDITY
+        settled |= {*rules_of("humidity_setpoint")}
     elif actuator in VENTS:
         held[f"{prefix}_humidity"] = 0.0
         rules[f"{prefix}_humidity_opening"] = OPENING
-        settled |= set(held)
+        settled = settled - {f"{prefix}_humidity_opening"} | set(held)
     rules |= held
     names = [name for name in RULES if name.startswith(f"{prefix}_") and name not in settled]
     low = np.array([RULES[name].low for name in names])
@@ -206,7 +224,9 @@ def _fit_rule(
     )
     found = held | dict(zip(names, np.clip(best.x, low, high).tolist(), strict=True))
     opening = f"{prefix}_humidity_opening"
-    return found | {opening: 0.0} if 0.0 < found.get(opening, 0.0) < LEAST_OPENING else found
+    if 0.0 < found.get(opening, 0.0) < LEAST_OPENING:
+        found[opening] = 0.0
+    return found, float(best.cost)
 
 
 def _usual_course(measured: Floats, step: float) -> Floats:

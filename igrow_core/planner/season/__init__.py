@@ -15,10 +15,11 @@ plan      what the season leaves to the days, as a bundle carries it
 
 from igrow.core.planner.season.course import Season, SeasonOutcome, run_season
 from igrow.core.planner.season.plan import SEASON_FILE, SeasonPlan, valued
-from igrow.core.planner.season.strategy import Strategy
+from igrow.core.planner.season.strategy import OPTIONAL, Strategy
 from igrow.core.planner.season.worth import CropWorth, marginal_values
 
 __all__ = [
+    "OPTIONAL",
     "SEASON_FILE",
     "CropWorth",
     "Season",

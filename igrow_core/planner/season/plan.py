@@ -20,7 +20,7 @@ from igrow.core.greenhouse.parameters import GreenhouseParameters
 from igrow.core.greenhouse.tomato import STAGES, Crop
 from igrow.core.planner.evolution import Genes
 from igrow.core.planner.season.course import DAY, Season, run_season
-from igrow.core.planner.season.strategy import Strategy
+from igrow.core.planner.season.strategy import OPTIONAL, Strategy
 from igrow.core.planner.season.worth import CropWorth, MarginalValues, marginal_values
 from igrow.core.planner.template import Setpoints, Template
 from igrow.core.quantities import SETPOINTS
@@ -50,13 +50,13 @@ class SeasonPlan:
     """As they are expected, one crop each: floats, and (STAGES,) for fruit."""
     weather: Floats
     """Of each date's typical day, a cold and a mild one in turn, hourly means in the registry's order, (D, 24, 6)."""
-    humidity: bool = False
-    """Whether the strategy says a setpoint of the humidity."""
+    optional: tuple[str, ...] = ()
+    """Setpoints that not every PLC takes and the strategy says."""
 
     @property
     def strategy(self) -> Strategy:
         """How the genes become a day's numbers."""
-        return Strategy(self.days, self.knots, humidity=self.humidity)
+        return Strategy(self.days, self.knots, optional=self.optional)
 
     def day_of(self, time: np.datetime64) -> float:
         """Return the day of the season at a UTC time, counted from its first."""
@@ -89,9 +89,10 @@ class SeasonPlan:
             days.append(self.strategy.setpoints(self.genes[None], day, clock, sun_up, weather[hours], recipe[hours])[0])
         asked = np.concatenate(days)
         # A site may have given up a setpoint since.
-        column = SETPOINTS.index("humidity_setpoint")
-        if "humidity_setpoint" not in template.free:
-            asked[:, column] = recipe[:, column]
+        for name in self.optional:
+            if name not in template.free:
+                column = SETPOINTS.index(name)
+                asked[:, column] = recipe[:, column]
         return asked
 
     def typical_weather(self, time: np.datetime64, hours: int) -> Floats:
@@ -145,7 +146,7 @@ class SeasonPlan:
             "weather": np.round(self.weather, 2).tolist(),
             "crops": [{name: np.asarray(part).tolist() for name, part in one._asdict().items()} for one in self.crops],
         }  # fmt: skip
-        return json.dumps(content | ({"humidity": True} if self.humidity else {}))
+        return json.dumps(content | ({"optional": self.optional} if self.optional else {}))
 
     @classmethod
     def from_json(cls, text: str, where: str) -> SeasonPlan:
@@ -170,10 +171,14 @@ class SeasonPlan:
                     for one in given["crops"]
                 ),
                 np.array(given["weather"], dtype=np.float64),
-                bool(given.get("humidity", False)),
+                tuple(given.get("optional", ("humidity_setpoint",) if given.get("humidity") else ())),
             )
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise BundleError(f"{where}: is no season: {error}") from None
+        if unknown := [name for name in plan.optional if name not in OPTIONAL]:
+            raise BundleError(
+                f"{where}: its strategy says {', '.join(map(str, unknown))}, which this version does not know"
+            )
         whole = len(plan.values) == len(plan.crops) == len(plan.weather) > 0 and len(plan.genes) == plan.strategy.genes
         if not whole or plan.weather.shape[1:] != (24, 6) or any(one.fruit.shape != (STAGES,) for one in plan.values):
             raise BundleError(f"{where}: is no season: its parts do not fit each other")
@@ -210,7 +215,7 @@ def valued(season: Season, strategy: Strategy, genes: Genes, crop: Crop) -> Seas
     weather = season.weather[: len(crops)]
     return SeasonPlan(
         season.start, season.days, season.every, strategy.knots, genes, net_profit, values, crops, weather,
-        strategy.humidity,
+        strategy.optional,
     )  # fmt: skip
 
 

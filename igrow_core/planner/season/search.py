@@ -27,7 +27,7 @@ def worth_of(season: Season, strategy: Strategy, crop: Crop) -> Callable[[Genes]
     One that chooses the humidity and expects damper days than the crop bears is not admitted (Deb's rule, as in the
     search of a plan).
     """
-    most = bearable_damp(season) if strategy.humidity else np.inf
+    most = bearable_damp(season) if "humidity_setpoint" in strategy.optional else np.inf
 
     def value(genes: Genes) -> Floats:
         outcome = run_season(season, strategy, genes, crop)

@@ -27,8 +27,12 @@ RANGES = {
 }
 """What a strategy says, and between what: degC, degC, K for each 100 W m-2 of the day's mean radiation, ppm while there
 is light, h a day, local hour (before midnight negative), W m-2 of sun above which lamps rest."""
-HUMIDITY = {"humidity": (75.0, 90.0)}
-"""What it says beside where the climate computer takes a humidity setpoint: % above which vents open."""
+OPTIONAL = {
+    "humidity_setpoint": {"humidity": (75.0, 90.0)},
+    "ventilation_setpoint": {"vents_above": (1.0, 6.0)},
+}
+"""What it says beside by setpoint, where the climate computer takes that one: % above which vents open for damp air; K
+above the heating setpoint from which they open for heat."""
 UNITS = {
     "day_temperature": "degC",
     "night_temperature": "degC",
@@ -38,6 +42,7 @@ UNITS = {
     "lamps_from": "h",
     "lamps_below": "W m-2",
     "humidity": "%",
+    "vents_above": "K",
 }
 """Units of what a strategy says, as its sentences name them."""
 NO_CO2 = 400.0
@@ -54,13 +59,13 @@ class Strategy:
     """Dates, evenly over the season."""
     ends: bool = False
     """Whether one more gene tells the day from which on the lamps stay off."""
-    humidity: bool = False
-    """Whether the climate computer takes a setpoint of the humidity."""
+    optional: tuple[str, ...] = ()
+    """Setpoints of `OPTIONAL` that it says as well."""
 
     @property
     def ranges(self) -> dict[str, tuple[float, float]]:
         """What it says, and between what."""
-        return RANGES | HUMIDITY if self.humidity else RANGES
+        return RANGES | {name: ends for one in self.optional for name, ends in OPTIONAL[one].items()}
 
     @property
     def genes(self) -> int:
@@ -124,8 +129,10 @@ class Strategy:
             ("co2_setpoint", np.where(light, said["co2"], NO_CO2)),
         ):
             setpoints[:, :, SETPOINTS.index(name)] = values
-        if self.humidity:
-            setpoints[:, :, SETPOINTS.index("humidity_setpoint")] = said["humidity"]
+        heating = setpoints[:, :, SETPOINTS.index("heating_setpoint")]
+        for name in self.optional:
+            values = said["humidity"] if name == "humidity_setpoint" else heating + said["vents_above"]
+            setpoints[:, :, SETPOINTS.index(name)] = values
         return setpoints
 
     def table(self, genes: NDArray[np.float32], every: int = 14) -> list[str]:

@@ -22,8 +22,7 @@ SECONDS = 3600.0 / STEPS_PER_HOUR
 
 def settings(setpoints: Sequence[str]) -> tuple[str, ...]:
     """Return the parameters of the fitted rules of a computer that takes these setpoints."""
-    rules = [name for name in actuation.RULES if "humidity_setpoint" in setpoints or name not in actuation.FOR_HUMIDITY]
-    return (*tags("actuation", rules), *tags("holding", holding.PARAMETERS))
+    return (*tags("actuation", actuation.rules_for(setpoints)), *tags("holding", holding.PARAMETERS))
 
 
 def equipment_block(weather: Sequence[str], setpoints: Sequence[str]) -> Block:
@@ -79,6 +78,10 @@ def _control(xp: Any, arrays: Mapping[str, Any]) -> Mapping[str, Any]:
     zero = 0.0 * temperature
     idle = drivers | {"rail_pipe_excess": zero, "grow_pipe_excess": zero, "co2_dosing": zero}
     parts = climate.balances(xp, state, idle, parameters, named.get("added", {}))
+    if "minimum_pipe_setpoint" in setpoints:
+        excess = xp.maximum(setpoints["minimum_pipe_setpoint"] - arrays["shown_temperature"], zero)
+        held = named["actuation"]["rail_minimum"] * parameters["rail_pipe_heat_transfer"] * excess
+        settings = settings | {"heating_minimum": xp.maximum(settings["heating_minimum"] + zero, held)}
     heat = holding.heat_to_hold(
         xp, setpoints["heating_setpoint"], arrays["shown_temperature"], parts["air_temperature"], settings, SECONDS
     )
