@@ -55,7 +55,7 @@ def lines(state: Mapping[str, Any]) -> Iterator[str]:
     for name, setpoint in state["setpoints"].items():
         held = "; changed by hand, respected" if setpoint["held_until"] is not None else ""
         yield (
-            f"  {name:<18} asked {_number(setpoint['requested'])}, written {_number(setpoint['applied'])}, "
+            f"  {name:<22} asked {_number(setpoint['requested'])}, written {_number(setpoint['applied'])}, "
             f"PLC shows {_number(setpoint['shown'])}{_unit(name)} ({setpoint['source'] or 'nobody'}{held})"
         )
     yield "measured"

@@ -133,7 +133,7 @@ async def test_an_override_reaches_the_plc_and_status_says_so(tmp_path, capsys):
         await asyncio.to_thread(main, ["override", str(path), "heating_setpoint=17", "--for", "300 d"])
         await until(lambda: plant.shows("heating_setpoint") == 17.0)
         status = ["status", str(path), "--port", str(status_port(daemon))]
-        text, said = "", "heating_setpoint   asked 17, written 17, PLC shows 17 degC (override)"
+        text, said = "", "heating_setpoint       asked 17, written 17, PLC shows 17 degC (override)"
         for _ in range(200):
             # The daemon sees what it wrote with its next reading.
             assert await asyncio.to_thread(main, status) == 0
