@@ -68,14 +68,13 @@ def test_an_error_of_whatever_kind_ends_the_work_and_not_the_thread(error: type[
 
 
 def test_posts_from_many_threads_are_each_done_once_and_in_the_order_of_their_thread() -> None:
-    aside, done = HandOff("work"), []
+    aside = HandOff("work")
+    done: list[tuple[int, int]] = []
 
     def post(thread: int) -> None:
         for number in range(500):
-            aside.post(lambda: done.append((thread, number_of[thread].pop(0))))
-            number_of[thread].append(number)
+            aside.post(partial(done.append, (thread, number)))
 
-    number_of: dict[int, list[int]] = {thread: [] for thread in range(8)}
     threads = [threading.Thread(target=post, args=(thread,)) for thread in range(8)]
     for one in threads:
         one.start()
