@@ -12,7 +12,7 @@ from benchmarks.diagnosis.greenhouses import VirtualGreenhouse
 from igrow.core import sun
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.effects import EFFECTS
-from igrow.core.greenhouse import Disturbances, recipe, simulate_many
+from igrow.core.greenhouse import Disturbances, GreenhouseParameters, recipe, simulate_many
 from igrow.core.greenhouse.tomato import Crop
 from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
 from igrow.core.simulator.hybrid.record import Record
@@ -95,7 +95,7 @@ def simulate_cases(known: Reference, cases: Sequence[Case], days: int) -> list[T
     start = known.greenhouse.start
     end = start + np.timedelta64(days, "D")
     seasons = simulate_many(
-        [known.greenhouse.plant.varied(np.random.default_rng(case.seed), relative=MISMATCH) for case in cases],
+        [moved(known.greenhouse, case) for case in cases],
         [known.greenhouse.weather(start, end, case.seed) for case in cases],
         recipe,
         start,
@@ -106,6 +106,11 @@ def simulate_cases(known: Reference, cases: Sequence[Case], days: int) -> list[T
         disturbances=[disturbances(case) for case in cases],
     )
     return [one.measured for one in seasons]
+
+
+def moved(greenhouse: VirtualGreenhouse, case: Case) -> GreenhouseParameters:
+    """Return the greenhouse that the log of a case is of: not quite the one that the model was calibrated on."""
+    return greenhouse.plant.varied(np.random.default_rng(case.seed), relative=MISMATCH)
 
 
 def simulated_cases(job: tuple[Reference, Sequence[Case], int]) -> list[Telemetry]:

@@ -20,7 +20,7 @@ import numpy as np
 
 from benchmarks.diagnosis.cases import CHANGES, FORMS, SEASONS, Case, Turn
 from benchmarks.diagnosis.logs import Reference
-from benchmarks.diagnosis.nurseries import calibrated, calibration_logs, later_logs, nursery
+from benchmarks.diagnosis.nurseries import calibrated, calibration_logs, later, later_logs, nursery
 from benchmarks.diagnosis.scoring import Outcome, judge
 from benchmarks.jobs import Jobs
 from igrow.core.effects import EFFECTS
@@ -167,7 +167,8 @@ def prepared(job: tuple[str, str, int, int, int]) -> list[tuple[Case, Telemetry,
 
 
 def _judge(job: tuple[Case, Telemetry, Reference], names: Sequence[str]) -> dict[str, Outcome]:
-    return {name: judge(*job, RULES[name]) for name in names}
+    case, log, known = job
+    return {name: judge(case, log, known, later(known.greenhouse, case), RULES[name]) for name in names}
 
 
 def main(options: Namespace) -> int:
