@@ -199,6 +199,13 @@ RESULTS = {
         "45000 to 45004",
         long=True,
     ),
+    "harvests": Result(
+        "Harvests of ten compartments",
+        ("benchmarks.harvests", "../shared/data"),
+        "Each predicted by what was fitted to the others; the mean of these is what a predictor has to beat.",
+        "0",
+        long=True,
+    ),
     "diagnosis-same": Result(
         "The same greenhouse later",
         ("benchmarks.diagnosis", "same", "--greenhouses", "2", "--cases", "60", "--history-only"),

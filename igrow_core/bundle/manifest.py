@@ -67,6 +67,11 @@ class Estimate:
     high: float
     unit: str
 
+    @classmethod
+    def about(cls, value: float, reach: float, unit: str) -> Estimate:
+        """Return a value whose interval reaches as far to either side."""
+        return cls(value, value - reach, value + reach, unit)
+
 
 @dataclass(frozen=True)
 class EffectRecord:

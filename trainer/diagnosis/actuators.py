@@ -50,8 +50,7 @@ class Share:
 
     def interval(self, rules: DecisionRules) -> Estimate:
         """Return it with its interval."""
-        reach = normal_quantile(rules) * self.deviation
-        return Estimate(self.value, self.value - reach, self.value + reach, "1")
+        return Estimate.about(self.value, normal_quantile(rules) * self.deviation, "1")
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,8 @@ def changed(design: Design, explained: float, rng: np.random.Generator, *, cause
         needed = max(rules.least_pattern_change, rules.pattern_over_change * gained, explained)
         if net_gain(design, pattern) >= needed and proven_gain(design, pattern) >= rules.least_proven_pattern:
             return replace(nothing, patterns=(pattern,))
-    if cause is None or proven_gain(design, cause) < needed_gain(design, cause):
+    assert design.history is not None and design.history.drift is not None
+    if cause is None or proven_gain(design, cause) < design.history.drift.needed_gain(cause.effect, rules):
         return nothing
     if pattern is not None and left_by_hour(design, null, cause, rng) >= rules.least_left_by_hour:
         return replace(nothing, patterns=(pattern,))
@@ -63,12 +64,6 @@ def best(design: Design, scored: list[Hypothesis]) -> Hypothesis | None:
     """Return the hypothesis with the largest net gain, None for none."""
     known = design.history.without if design.history is not None else frozenset()
     return max((one for one in scored if one.effect not in known), key=lambda one: net_gain(design, one), default=None)
-
-
-def needed_gain(design: Design, one: Hypothesis) -> float:
-    """Return what a change must gain: by some more than it did in any greenhouse in which nothing had changed."""
-    assert design.history is not None and design.history.drift is not None
-    return design.history.drift.needed_gain(one.effect, design.rules)
 
 
 def net_gain(design: Design, one: Hypothesis) -> float:

@@ -214,7 +214,7 @@ def _sized(change: ParameterChange, before: Gaussian, after: Gaussian, rules: De
     weights = 1.0 / (len(names) * was)
     deviation = float(np.sqrt(weights @ now.covariance @ weights))
     wide = max(normal_quantile(rules) * deviation, 0.5 * (change.share.high - change.share.low))
-    return replace(change, share=Estimate(share, share - wide, share + wide, change.share.unit))
+    return replace(change, share=Estimate.about(share, wide, change.share.unit))
 
 
 def _with_patterns(

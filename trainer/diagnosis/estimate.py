@@ -77,7 +77,7 @@ def estimate(found: Round, rng: np.random.Generator) -> Estimated | None:
     return Estimated(
         hypothesis,
         ActiveTerm(hypothesis.effect, amplitude, shape, None if onset is None else onset.time),
-        Estimate(amplitude, amplitude - wide, amplitude + wide, EFFECTS[hypothesis.effect].amplitude.unit),
+        Estimate.about(amplitude, wide, EFFECTS[hypothesis.effect].amplitude.unit),
         hypothesis.gain,
         onset,
         _confounded(design, null, hypothesis, gain, rng),
@@ -98,11 +98,8 @@ def with_refitted(one: Estimated, refitted: Refitted, rules: DecisionRules) -> E
     form = rules.form_deviation * amplitude
     wide = normal_quantile(rules) * float(np.hypot(rules.deviation_inflation * refitted.deviation, form))
     unit = definition.amplitude.unit
-    regimes = {
-        name: Estimate(value, value - errors * deviation, value + errors * deviation, unit)
-        for name, (value, deviation) in refitted.regimes.items()
-    }
-    interval = Estimate(amplitude, amplitude - wide, amplitude + wide, unit)
+    regimes = {name: Estimate.about(value, errors * own, unit) for name, (value, own) in refitted.regimes.items()}
+    interval = Estimate.about(amplitude, wide, unit)
     return replace(one, term=refitted.term, amplitude=interval, shapes=shapes, regimes=regimes)
 
 

@@ -191,7 +191,7 @@ def _active(fitted: Gaussian, terms: Sequence[Effect]) -> dict[str, dict[str, fl
 def _estimated(fitted: Gaussian, effect: Effect, rules: DecisionRules) -> EffectRecord:
     size = fitted.values[_name(effect)]
     reach = normal_quantile(rules) * rules.deviation_inflation * fitted.deviations[_name(effect)]
-    estimates = {effect.amplitude.name: Estimate(size, size - reach, size + reach, effect.amplitude.unit)}
+    estimates = {effect.amplitude.name: Estimate.about(size, reach, effect.amplitude.unit)}
     estimates |= {one.name: Estimate(one.typical, one.low, one.high, one.unit) for one in effect.shapes}
     return EffectRecord(effect.name, effect.kind, estimates, effect.balances)
 

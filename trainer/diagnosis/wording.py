@@ -154,9 +154,8 @@ def discrepancy(patterns: Sequence[Hypothesis], rules: DecisionRules) -> Finding
         drivers |= dict.fromkeys(pattern.drivers)
         size = channel["size"]
         reach = normal_quantile(rules) * abs(one.amplitude) / max(one.statistic, 1e-9)
-        parameters[f"{pattern.channel}: {pattern.when}"] = Estimate(
-            size * one.amplitude, size * (one.amplitude - reach), size * (one.amplitude + reach), channel["unit"]
-        )
+        where = f"{pattern.channel}: {pattern.when}"
+        parameters[where] = Estimate.about(size * one.amplitude, size * reach, channel["unit"])
         words.append(f"{channel['name']} ({'more' if one.amplitude > 0 else 'less'}, {pattern.when})")
     return Finding(
         DISCREPANCY,

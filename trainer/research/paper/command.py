@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from inspect import signature
 
-from igrow.trainer.research.paper import figure3, harvests, incremental, pilot, seasons, table1
+from igrow.trainer.research.paper import figure3, incremental, pilot, seasons, table1
 
 EXAMPLE = "igrow-trainer reproduce table1 --data data/wur2020 --out reproduced"
 
@@ -15,7 +15,6 @@ PARTS = {
     "seasons": (seasons, "R2 of a trained network bundle on seasons that it has not seen"),
     "figure3": (figure3, "net profit of the 2020 champion, predicted against measured"),
     "pilot": (pilot, "the pilot in Liaoyang: its table with spreads and tests, figures 5 and S4 to S13"),
-    "harvests": (harvests, "harvests of the challenges' compartments, each predicted from the others"),
 }
 
 

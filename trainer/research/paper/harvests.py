@@ -1,4 +1,4 @@
-"""Measured harvests of ten compartments against four predictors, each fitted without the compartment it predicts.
+"""Four predictors of a compartment's harvest, each fitted to other compartments.
 
 The data are few: six tomato crops of one season side by side, four cucumber crops of another. So the first predictor
 is the one that any model has to beat: the mean harvest of the other compartments, which knows nothing of the crop.
@@ -6,12 +6,8 @@ is the one that any model has to beat: the mean harvest of the other compartment
 
 from __future__ import annotations
 
-import json
-from argparse import ArgumentParser
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 
@@ -27,7 +23,7 @@ from igrow.core.greenhouse.tomato import (
     rates,
     young_crop,
 )
-from igrow.trainer.research.paper.compartments import Compartment, read_2018, read_2019
+from igrow.trainer.research.paper.compartments import Compartment
 from igrow.trainer.training.stage import StageData, StageLayout, TrainingPlan, run_stage, train_stage, untrained
 
 Predictor = Callable[[Sequence[Compartment], Compartment], Floats]
@@ -141,73 +137,3 @@ PREDICTORS: dict[str, Predictor] = {
     "learned stage": learned,
     "mechanistic crop": mechanistic,
 }
-
-
-@dataclass(frozen=True)
-class HarvestError:
-    """Errors of one predictor on one compartment that it had not seen, kg m-2."""
-
-    compartment: str
-    predictor: str
-    mean_absolute: float
-    """Of the cumulative harvest over the harvest days."""
-    season: float
-    """Predicted less measured at the last harvest."""
-    measured: float
-    """Measured total."""
-
-
-def leave_one_out(compartments: Sequence[Compartment]) -> list[HarvestError]:
-    """Return the errors of all predictors on each compartment, fitted on the others."""
-    errors = []
-    for crop in compartments:
-        others = [other for other in compartments if other is not crop]
-        for name, predictor in PREDICTORS.items():
-            miss = predictor(others, crop)[crop.harvest_day] - crop.harvested
-            errors.append(
-                HarvestError(crop.name, name, float(np.abs(miss).mean()), float(miss[-1]), float(crop.harvested[-1]))
-            )
-    return errors
-
-
-def as_text(title: str, errors: Sequence[HarvestError]) -> str:
-    """Return a table: compartments down, predictors across; mean absolute error and season's error in kg m-2."""
-    names = list(PREDICTORS)
-    rows = [
-        f"{title}: mean absolute error of the cumulative harvest (error of the season's total), kg m-2",
-        "| compartment | measured | " + " | ".join(names) + " |",
-        "|---" * (len(names) + 2) + "|",
-    ]
-    for crop in dict.fromkeys(error.compartment for error in errors):
-        mine = {error.predictor: error for error in errors if error.compartment == crop}
-        cells = [f"{mine[name].mean_absolute:.2f} ({mine[name].season:+.2f})" for name in names]
-        rows.append(f"| {crop} | {mine[names[0]].measured:.2f} | " + " | ".join(cells) + " |")
-    cells = []
-    for name in names:
-        mine_all = [error for error in errors if error.predictor == name]
-        absolute = np.mean([error.mean_absolute for error in mine_all])
-        cells.append(f"{absolute:.2f} ({np.mean([abs(error.season) for error in mine_all]):.2f} absolute)")
-    rows.append("| mean | | " + " | ".join(cells) + " |")
-    return "\n".join(rows)
-
-
-def run(agc2019: Path | None, agc2018: Path | None, out: Path) -> dict[str, list[HarvestError]]:
-    """Print both tables and write harvests.json to `out`."""
-    results: dict[str, list[HarvestError]] = {}
-    if agc2019 is not None:
-        results["agc2019, cherry tomato"] = leave_one_out(read_2019(agc2019))
-    if agc2018 is not None:
-        results["agc2018, cucumber"] = leave_one_out(read_2018(agc2018))
-    for title, errors in results.items():
-        print(as_text(title, errors))
-    out.mkdir(parents=True, exist_ok=True)
-    content = {title: [asdict(error) for error in errors] for title, errors in results.items()}
-    (out / "harvests.json").write_text(json.dumps(content, indent=1))
-    return results
-
-
-def add_arguments(parser: ArgumentParser) -> None:
-    """Add the arguments of `reproduce harvests`."""
-    parser.add_argument("--agc2019", type=Path, help="folder of the second challenge")
-    parser.add_argument("--agc2018", type=Path, help="folder of the first challenge")
-    parser.add_argument("--out", type=Path, required=True, help="folder for harvests.json")
