@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,9 +14,9 @@ import pytest
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
-from igrow.trainer.service import first_calibration, history, recalibration
+from igrow.trainer.service import first_calibration, history, recalibration, seasons
 from igrow.trainer.service.archive import Archive, SiteLog
-from igrow.trainer.service.recalibration import Diagnosed, recalibrate, relative_gain
+from igrow.trainer.service.recalibration import recalibrate, relative_gain
 from igrow.trainer.service.site_memory import bundle_in_force, forget_old
 from tests.tiny_bundle import write_tiny_bundle
 
@@ -41,17 +42,18 @@ def diagnosed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Put a diagnosis of no time in the place of the real one; collects the bundles that it is asked to build on."""
     asked: list[str] = []
 
-    def diagnose(site, log, bundle, target, now, drift):
+    def diagnose(site, log, bundle, target, drift):
         asked.append(bundle.identity)
-        offset = 10.0 + len(asked)
+        errors = {"air_temperature": {"24_h": {"deployed": 1.0, "corrected": 0.8}}}
+        causes = (SimpleNamespace(effect="wind_infiltration"),)
+        return SimpleNamespace(verdict="named", findings=causes, errors=errors, notes=(), corrected=10.0 + len(asked))
 
-        def write(folder: Path) -> tuple[str, ...]:
-            write_tiny_bundle(folder, site="house", offset=offset)
-            return ()
-
-        return Diagnosed("named", ("wind_infiltration",), 0.2, (), write)
+    def write(offset: float, now: datetime, folder: Path) -> tuple[str, ...]:
+        write_tiny_bundle(folder, site="house", offset=offset)
+        return ()
 
     monkeypatch.setattr(recalibration, "_diagnose", diagnose)
+    monkeypatch.setattr(seasons, "export_planned", write)
     return asked
 
 

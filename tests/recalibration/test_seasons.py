@@ -6,6 +6,7 @@ import datetime
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from igrow.trainer.fit import FittedModel
 from igrow.trainer.season import plan_season
 from igrow.trainer.service import recalibration, seasons
 from igrow.trainer.service.archive import Archive
-from igrow.trainer.service.recalibration import Diagnosed, recalibrate
+from igrow.trainer.service.recalibration import recalibrate
 from tests.made_once import made_once
 
 CROP = Crop(planting_date=datetime.date(2020, 2, 21), end_date=datetime.date(2020, 3, 31))
@@ -105,10 +106,9 @@ def test_a_model_in_force_that_has_no_season_is_published_once_with_one(
     time = np.datetime64("2020-02-20T00:00:00") + np.arange(0, 9 * 86_400, 600).astype("timedelta64[s]")
     archive.add_telemetry("house", Telemetry(time, {"air_temperature": np.full(len(time), 20.0)}))
 
-    def nothing_better(*_: object) -> Diagnosed:
-        return Diagnosed("nothing", (), 0.0, (), lambda _: pytest.fail("a worse model was written"))
-
-    monkeypatch.setattr(recalibration, "_diagnose", nothing_better)
+    nothing_better = SimpleNamespace(verdict="nothing", findings=(), errors={}, notes=(), corrected=None)
+    monkeypatch.setattr(recalibration, "_diagnose", lambda *_: nothing_better)
+    monkeypatch.setattr(seasons, "export_planned", lambda *_: pytest.fail("a worse model was written"))
     published: list[Path] = []
     turn = recalibrate(SITE, archive, tmp_path / "state", published.append, now=NOON)
     assert turn.published and turn.note.endswith("the model in force, with the season planned")

@@ -24,7 +24,6 @@ from igrow.trainer.data.plausibility import find_faults
 from igrow.trainer.data.plot import plot_log
 from igrow.trainer.diagnosis import Diagnosis, plots
 from igrow.trainer.diagnosis.open_vents import OpenVents
-from igrow.trainer.diagnosis.persistence import persistence_errors
 from igrow.trainer.report import render_report, sentences, verdicts, write_diagnosis
 from igrow.trainer.report.page import error_rows
 from igrow.trainer.report.worth import Worth, worth
@@ -88,7 +87,7 @@ def test_yesterdays_readings_are_taken_on_unseen_days_alone(leak: Diagnosis) -> 
     air, day = record.measured["air_temperature"], round(86_400 / record.step)
     rows = [row for row in range(day, len(record)) if not split.fit_rows[row]]
     by_hand = np.nanmean([abs(air[row] - air[row - day]) for row in rows])
-    assert persistence_errors(leak.evidence.log, ["air_temperature"])["air_temperature"] == pytest.approx(by_hand)
+    assert leak.evidence.log.persistence_errors(["air_temperature"])["air_temperature"] == pytest.approx(by_hand)
 
 
 def test_a_leak_costs_what_the_outdoor_air_that_comes_in_must_be_heated(leak: Diagnosis) -> None:

@@ -5,17 +5,15 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.errors import IgrowError
-from igrow.core.quantities import QUANTITIES
 from igrow.trainer.cli.log_arguments import add_log_arguments, log_of
 from igrow.trainer.cli.progress import progress
-from igrow.trainer.fit.evaluation import Evaluation
 from igrow.trainer.scoring.bundles import score_bundle, unseen_part
+from igrow.trainer.scoring.comparison import as_table
 
 EXAMPLE = "igrow-trainer evaluate later.csv --bundle out/bundle --site config/site.yaml"
 
@@ -37,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
         found = score_bundle(log, bundle, progress=say)
     if not any(found.values()):
         raise IgrowError(f"{log.name}: no stretch of the log is complete enough to run the bundle on")
-    print(f"\n{bundle.label} on {log.name}\n{table(found)}")
+    print(f"\n{bundle.label} on {log.name}\n{as_table(found, intervals=True)}")
     if arguments.out is not None:
         content = {
             how: {name: {horizon: asdict(one) for horizon, one in by.items()} for name, by in scores.items()}
@@ -45,20 +43,3 @@ def run(arguments: argparse.Namespace) -> int:
         }
         arguments.out.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
     return 0
-
-
-def table(found: Mapping[str, Evaluation]) -> str:
-    """Return mean absolute errors with their 90 % intervals over days, a line for each quantity and horizon."""
-    lines = [f"{'mean absolute error':18}{'horizon':>8}{'persistence':>13}" + "".join(f"{how:>30}" for how in found)]
-    first = next(iter(found.values()))
-    for quantity, by_horizon in first.items():
-        for horizon, naive in by_horizon.items():
-            cells = ""
-            for scores in found.values():
-                one = scores.get(quantity, {}).get(horizon)
-                text = f"{one.mae:.3g} [{one.mae_low:.3g}, {one.mae_high:.3g}]" if one else "-"
-                cells += f"{text:>30}"
-            lines.append(
-                f"{quantity:18}{horizon:>8}{naive.persistence:13.3g}{cells}  {QUANTITIES[quantity].difference_unit}"
-            )
-    return "\n".join(lines)

@@ -147,17 +147,14 @@ def with_inputs(days: LogDays, inputs: Mapping[str, Floats]) -> LogDays:
     return replace(days, record=replace(seen, inputs={**seen.inputs, **inputs}, missing=missing))
 
 
-def _errors(days: LogDays, values: Mapping[str, float], knowledge: Knowledge) -> Floats:
-    """Return the errors of day runs on the fit days over their usual size, 0 where they do not count, (3, r, steps)."""
-    try:
-        line = sensitivity.linearise(days.record, days.runs, values, activate(days.record, knowledge.terms))
-    except DivergenceError:
-        return np.full(days.runs.weight.shape, np.inf)
-    return np.asarray(np.where(days.split.fit[days.runs.day][None, :, None], line.errors / SCALES, 0.0))
-
-
 def _loss(days: LogDays, knowledge: Knowledge) -> float:
-    return float(np.sum(np.abs(_errors(days, knowledge.posterior.values, knowledge))))
+    """Return the sum of the absolute errors of day runs on the fit days, over their usual size."""
+    values, effects = knowledge.posterior.values, activate(days.record, knowledge.terms)
+    try:
+        line = sensitivity.linearise(days.record, days.runs, values, effects)
+    except DivergenceError:
+        return float("inf")
+    return float(np.sum(np.abs(line.errors / SCALES) * days.split.fit[days.runs.day][None, :, None]))
 
 
 def share_of_course(days: LogDays, trial: LogDays, knowledge: Knowledge, rules: DecisionRules) -> Share:

@@ -17,6 +17,7 @@ import numpy as np
 import yaml
 from scipy.signal import lfilter
 
+from igrow.core import sun
 from igrow.core.arrays import Floats
 from igrow.core.effects import EFFECTS, Effect
 from igrow.core.effects.definition import Parameter
@@ -132,8 +133,7 @@ def effect_columns(line: Linearisation, without: Collection[str] = ()) -> Effect
 def patterns(record: Record, longitude: float) -> list[tuple[str, tuple[str, ...], Floats]]:
     """Return (when, drivers, course (n,)) of every pattern, without the channel."""
     hour = np.asarray(record.inputs["hour"])
-    seconds = record.time.astype("datetime64[s]").astype(np.int64) + int(240.0 * longitude)
-    weekday = (seconds // 86_400 + 3) % 7
+    weekday = sun.weekday(sun.solar_day(record.time, longitude))
     working: Floats = (weekday < 5).astype(np.float64)
     table: list[tuple[str, tuple[str, ...], Floats]] = []
 

@@ -6,7 +6,7 @@ A forecast is judged by its free run, so the parameters that are shipped are tho
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -132,6 +132,17 @@ class LogDays:
             error = shown[name] - record.measured[name][samples]
             errors[name] = np.where(wanted[samples], error, np.nan)
         return FreeRuns(shown, errors, self.split.day[starts])
+
+    def persistence_errors(self, quantities: Iterable[str]) -> dict[str, float]:
+        """Return the mean absolute error of yesterday's readings on held-out days, by quantity that has any."""
+        rows = round(86_400.0 / self.record.step)
+        unseen, errors = ~self.split.fit_rows[rows:], dict[str, float]()
+        for quantity in quantities:
+            values = self.record.measured[quantity]
+            change = np.abs(values[rows:] - values[:-rows])[unseen]
+            if np.isfinite(change).any():
+                errors[quantity] = float(np.nanmean(change))
+        return errors
 
 
 def log_days(log: Log, model: FittedModel) -> LogDays:

@@ -64,29 +64,19 @@ def gains_of(
     block, columns = design.block("parameter"), design.block("effect").columns
     physical = history.physical_prior(site, posterior)
     null = LinearModel(tuple(block.columns), physical.precision, physical.mean - posterior.mean)
-    typical = _typical(design)
-    for place, effect in typical:
+    asked = []
+    for place, effect in _typical(design):
         if effect.name in known:
             null = null.with_term(Term(columns[place]))
+        else:
+            asked.append((columns[place], effect))
+    # What a model has too much of it does not lack.
+    limits = np.array([(max(one.amplitude.low, 0.0), one.amplitude.high) for _, one in asked]).reshape(-1, 2)
+    chosen, rng = [column for column, _ in asked], np.random.default_rng(0)
     current = linear.fit(design.grams, null)
-    found = {}
-    for place, effect in typical:
-        if effect.name in known:
-            continue
-        bound = effect.amplitude
-        scanned = search.scan(
-            design.grams,
-            current,
-            [columns[place]],
-            [None],
-            [None],
-            # What a model has too much of it does not lack.
-            np.array([[max(bound.low, 0.0), bound.high]]),
-            np.random.default_rng(0),
-            0,
-        )
-        found[effect.name] = float(min(scanned.gain[0, 0], 0.5 * scanned.statistic[0, 0] ** 2))
-    return found
+    scanned = search.scan(design.grams, current, chosen, [None] * len(asked), [None], limits, rng, 0)
+    gains = np.minimum(scanned.gain[0], 0.5 * scanned.statistic[0] ** 2)
+    return {effect.name: float(gain) for (_, effect), gain in zip(asked, gains, strict=True)}
 
 
 def examine(

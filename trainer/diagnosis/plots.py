@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from igrow.core.arrays import Floats, Mask
@@ -79,14 +81,7 @@ def residual_by_date(evidence: Evidence, language: Language = ENGLISH) -> Figure
     shown = _shown(line.runs.weight)
     figure, places = panels(len(shown), 0.5 + _PANEL * len(shown))
     for axes, balance in zip(places, shown, strict=True):
-        counted = line.runs.weight[balance]
-        mean = _mean(line.errors[balance], counted)
-        quantity = PREDICTED[balance]
-        unit = QUANTITIES[quantity].difference_unit
-        axes.axhline(0.0, color=COLOURS["ink"], linewidth=0.8)
-        axes.plot(when, language.shown(unit).all(mean), color=COLOURS[quantity], marker="o", markersize=2.5)
-        name_above(axes, f"{language.name(quantity)}, {language.unit(unit)}")
-        few_ticks(axes)
+        _draw_residual(axes, balance, when, _mean(line.errors[balance], line.runs.weight[balance]), language)
     date_axis(places[-1], language)
     places[-1].set_xlabel(language.text("measured minus predicted, mean of each day"))
     return figure
@@ -110,14 +105,7 @@ def residual_against_driver(evidence: Evidence, driver: str, language: Language 
         middle = 0.5 * (edges[1:] + edges[:-1])
         place = np.clip(np.digitize(x, edges) - 1, 0, len(middle) - 1)
         means = np.array([np.mean(y[place == k]) if np.any(place == k) else np.nan for k in range(len(middle))])
-        quantity = PREDICTED[balance]
-        unit = QUANTITIES[quantity].difference_unit
-        axes.plot(
-            across.all(middle), language.shown(unit).all(means), marker="o", markersize=3, color=COLOURS[quantity]
-        )
-        axes.axhline(0.0, color=COLOURS["ink"], linewidth=0.8)
-        name_above(axes, f"{language.name(quantity)}, {language.unit(unit)}")
-        few_ticks(axes)
+        _draw_residual(axes, balance, across.all(middle), means, language)
     written = language.text(across.unit)
     places[-1].set_xlabel(f"{language.name(driver)}{f', {written}' if written else ''}")
     return figure
@@ -137,6 +125,16 @@ def coefficient_by_regime(regimes: Mapping[str, Estimate], language: Language = 
     size, written = language.text("size"), language.unit(unit)
     axes.set_xlabel(f"{size}, {written}" if written else size)
     return figure
+
+
+def _draw_residual(axes: Axes, balance: int, across: Any, missing: Floats, language: Language) -> None:
+    """Draw what is missing in one balance, both (n,), about none."""
+    quantity = PREDICTED[balance]
+    unit = QUANTITIES[quantity].difference_unit
+    axes.axhline(0.0, color=COLOURS["ink"], linewidth=0.8)
+    axes.plot(across, language.shown(unit).all(missing), color=COLOURS[quantity], marker="o", markersize=2.5)
+    name_above(axes, f"{language.name(quantity)}, {language.unit(unit)}")
+    few_ticks(axes)
 
 
 def _shown(weight: Mask) -> list[int]:

@@ -13,7 +13,6 @@ from igrow.core.effects import EFFECTS
 from igrow.core.language import Language, speak
 from igrow.core.quantities import QUANTITIES
 from igrow.trainer.data.screening import Screened
-from igrow.trainer.diagnosis.persistence import persistence_errors
 from igrow.trainer.diagnosis.uncalibrated import FIRST, NO_NAME, how_to_calibrate
 from igrow.trainer.diagnosis.visible_parameters import VISIBLE
 
@@ -148,7 +147,7 @@ class Diagnosis:
         stage = "deployed" if self.verdict == "nothing" else "corrected"
         return tuple(
             Misfit(quantity, error, yesterday)
-            for quantity, yesterday in persistence_errors(self.evidence.log, self.errors).items()
+            for quantity, yesterday in self.evidence.log.persistence_errors(self.errors).items()
             if (error := self.errors[quantity].get("24_h", {}).get(stage)) is not None and error >= yesterday
         )
 

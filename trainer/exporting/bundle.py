@@ -74,10 +74,8 @@ def export(model: FittedModel, folder: Path | str, *, created: datetime | None =
     }
     reference = model.training_span.start if model.training_span else created
     values = _parameter_values(model, reference)
-    golden = {}
-    for name, inputs in golden_inputs(planning, values, settings, random).items():
-        session = open_model(graphs[name])
-        golden[name] = Golden(inputs, run_graph(session, inputs))
+    inputs = golden_inputs(planning, values, settings, random)
+    golden = {name: Golden(given, run_graph(open_model(graphs[name]), given)) for name, given in inputs.items()}
     drawn = model.posterior.sample(random, MEMBERS, *bounds(model.posterior.names))
     manifest = Manifest(
         site=model.site.name,
@@ -89,10 +87,8 @@ def export(model: FittedModel, folder: Path | str, *, created: datetime | None =
         training_span=model.training_span,
         effects=model.effects,
         parameters={
-            name: FittedParameter(float(mean), float(deviation), PARAMETERS[name].unit)
-            for name, mean, deviation in zip(
-                model.posterior.names, model.posterior.mean, model.posterior.standard_deviation, strict=True
-            )
+            name: FittedParameter(mean, model.posterior.deviations[name], PARAMETERS[name].unit)
+            for name, mean in model.posterior.values.items()
         },
         covariance=tuple(tuple(float(value) for value in row) for row in model.posterior.covariance),
         calibrated_on=model.calibrated_on,

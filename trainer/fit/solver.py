@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
@@ -168,15 +169,14 @@ def by_differences(batch: Batch, prior: Gaussian, high: Floats) -> tuple[Residua
         prior: of the parameters; a difference is `DIFFERENCE` of its standard deviation.
         high: largest value of each parameter, (p,); a difference that would pass it goes the other way.
     """
-    known: dict[bytes, Floats] = {}
+
+    @lru_cache(maxsize=1)
+    def known(point: bytes) -> Floats:
+        errors: Floats = batch(np.frombuffer(point)[None])[0]
+        return errors
 
     def residuals(point: Floats) -> Floats:
-        key = point.tobytes()
-        if key not in known:
-            errors = batch(point[None])[0]
-            known.clear()
-            known[key] = errors
-        return known[key]
+        return known(point.tobytes())
 
     def jacobian(point: Floats) -> Floats:
         step = DIFFERENCE * prior.standard_deviation

@@ -12,7 +12,7 @@ from igrow.core.errors import IgrowError
 from igrow.core.quantities import QUANTITIES
 from igrow.trainer.data import Log
 from igrow.trainer.exporting import read_model
-from igrow.trainer.fit.evaluation import CARRIED, Evaluation, errors_of, summarise
+from igrow.trainer.fit.evaluation import CARRIED, ErrorSummary, Evaluation, errors_of, summarise
 from igrow.trainer.fit.model import FittedModel
 from igrow.trainer.given import READ, must_be
 from igrow.trainer.scoring.bundles import BY_SETPOINTS, runs_by_actuators, score_bundle, unseen_part
@@ -41,7 +41,7 @@ class Comparison:
                 "mae_low": one.mae_low,
                 "mae_high": one.mae_high,
                 PERSISTENCE: one.persistence,
-                "unit": QUANTITIES[quantity].unit,
+                "unit": QUANTITIES[quantity].difference_unit,
             }
             for name, evaluation in self.scores.items()
             for quantity, horizons in evaluation.items()
@@ -49,23 +49,38 @@ class Comparison:
         ]
 
     def __repr__(self) -> str:
-        names = list(self.scores)
-        width = max(14, *(len(name) + 2 for name in names))
-        columns = "".join(f"{name:>{width}}" for name in names)
-        lines = [f"{'mean absolute error':20}{'ahead':>7}{PERSISTENCE:>14}{columns}"]
-        found = {(row["quantity"], row["horizon"], row["simulator"]): row for row in self.rows()}
-        for quantity, horizon in dict.fromkeys((key[0], key[1]) for key in found):
-            cells = [found.get((quantity, horizon, name)) for name in names]
-            naive = next(cell[PERSISTENCE] for cell in cells if cell is not None)
-            texts = "".join(f"{'-' if cell is None else format(cell['mae'], '.3g'):>{width}}" for cell in cells)
-            lines.append(f"{quantity:20}{horizon:>7}{naive:14.3g}{texts}  {QUANTITIES[quantity].unit}")
-        return "\n".join(lines)
+        return as_table(self.scores)
 
     def to_pandas(self) -> Any:
         """Return `rows` as a `pandas.DataFrame`."""
         import pandas as pd  # noqa: PLC0415  (slow to import)
 
         return pd.DataFrame(self.rows())
+
+
+def as_table(scores: Mapping[str, Evaluation], *, intervals: bool = False) -> str:
+    """Return mean absolute errors beside persistence, a line for each quantity and horizon.
+
+    Args:
+        scores: by the simulator's name, or by how it is driven.
+        intervals: with their 90 % intervals over days.
+    """
+
+    def cell(one: ErrorSummary | None) -> str:
+        if one is None:
+            return "-"
+        return f"{one.mae:.3g} [{one.mae_low:.3g}, {one.mae_high:.3g}]" if intervals else f"{one.mae:.3g}"
+
+    width = max(30 if intervals else 14, *(len(name) + 2 for name in scores))
+    names = "".join(f"{name:>{width}}" for name in scores)
+    lines = [f"{'mean absolute error':20}{'ahead':>7}{PERSISTENCE:>14}{names}"]
+    every = [(quantity, horizon) for one in scores.values() for quantity, by in one.items() for horizon in by]
+    for quantity, horizon in dict.fromkeys(every):
+        found = [one.get(quantity, {}).get(horizon) for one in scores.values()]
+        naive = next(one.persistence for one in found if one is not None)
+        cells = "".join(f"{cell(one):>{width}}" for one in found)
+        lines.append(f"{quantity:20}{horizon:>7}{naive:14.3g}{cells}  {QUANTITIES[quantity].difference_unit}")
+    return "\n".join(lines)
 
 
 def compare(

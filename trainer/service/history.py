@@ -6,7 +6,7 @@ import json
 import os
 import traceback
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -37,17 +37,7 @@ class Turn:
 
     def to_json(self) -> dict[str, Any]:
         """Return the line of the history."""
-        return {
-            "time": self.time.strftime("%Y-%m-%dT%H:%M:%SZ"),
-            "command": self.command,
-            "site": self.site,
-            "verdict": self.verdict,
-            "causes": list(self.causes),
-            "gain": round(self.gain, 4),
-            "published": self.published,
-            "note": self.note,
-            "notes": list(self.notes),
-        }
+        return asdict(self) | {"time": self.time.strftime("%Y-%m-%dT%H:%M:%SZ"), "gain": round(self.gain, 4)}
 
 
 def keep(folder: Path, command: str, site: str, now: datetime, work: Callable[[], Turn]) -> Turn:

@@ -10,11 +10,11 @@ and the last diagnosis. A bundle that the gateway refused, or took back, is not 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from datetime import datetime, timedelta
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from igrow.core.bundle import Bundle
 from igrow.core.errors import IgrowError
@@ -23,6 +23,9 @@ from igrow.trainer.service import history, seasons
 from igrow.trainer.service.archive import Archive, SiteLog
 from igrow.trainer.service.history import Turn
 from igrow.trainer.service.site_memory import Publish, bundle_in_force, publish_new
+
+if TYPE_CHECKING:
+    from igrow.trainer.diagnosis import Diagnosis
 
 COMMAND = "recalibrate"
 LEAST_GAIN = 0.01
@@ -86,21 +89,22 @@ def _run(
     if len(log.telemetry) == 0:
         raise IgrowError(f"no telemetry of site {site.name} in the last {days} days: nothing was collected of it")
     bundle, unreadable = bundle_in_force(folder, log.reports)
-    outcome = _diagnose(site, log, bundle, folder / "diagnosis", now, drift)
-    notes += unreadable + outcome.notes
+    found = _diagnose(site, log, bundle, folder / "diagnosis", drift)
+    notes += unreadable + found.notes
+    causes, fall = tuple(one.effect for one in found.findings), relative_gain(found.errors)
 
     def turn(note: str, *, published: bool = False) -> Turn:
-        return Turn(COMMAND, site.name, now, outcome.verdict, published, note, outcome.causes, outcome.gain, notes)
+        return Turn(COMMAND, site.name, now, found.verdict, published, note, causes, fall, notes)
 
-    if outcome.write_bundle is None:
-        return turn("; ".join(outcome.notes) or "nothing to publish")
-    better = outcome.gain >= LEAST_GAIN
-    gain = f"{100 * outcome.gain:.1f} %"
+    if found.verdict == "data_fault":
+        return turn("; ".join(found.notes))
+    better = fall >= LEAST_GAIN
+    gain = f"{100 * fall:.1f} %"
     if publish_bundle is None and better:
         return turn(f"a model with {gain} less error a day ahead on unseen days was found")
     if publish_bundle is None or not (better or seasons.lacking(bundle, site, now)):
         return turn(f"the bundle in force stays: the new model is only {gain} better on unseen days")
-    write = outcome.write_bundle
+    write = partial(seasons.export_planned, found.corrected, now)
     if not better:
         model, unplanned = seasons.with_season(read_model(bundle, site), now)
         if unplanned:
@@ -113,19 +117,7 @@ def _run(
     return turn(f"published {name}: {why}", published=True)
 
 
-@dataclass(frozen=True)
-class Diagnosed:
-    """What a diagnosis means for the loop."""
-
-    verdict: str
-    causes: tuple[str, ...]
-    gain: float
-    notes: tuple[str, ...]
-    write_bundle: Callable[[Path], tuple[str, ...]] | None
-    """Writes the corrected model with its season as a bundle, and returns notes; None where there is none."""
-
-
-def _diagnose(site: Site, log: SiteLog, bundle: Bundle, target: Path, now: datetime, drift: Path | None) -> Diagnosed:
+def _diagnose(site: Site, log: SiteLog, bundle: Bundle, target: Path, drift: Path | None) -> Diagnosis:
     """Diagnose a log against a bundle, and write diagnosis and report to `target`."""
     from igrow.trainer.data import prepare_log  # noqa: PLC0415  (scipy is slow to import)
     from igrow.trainer.diagnosis import diagnose  # noqa: PLC0415
@@ -136,10 +128,7 @@ def _diagnose(site: Site, log: SiteLog, bundle: Bundle, target: Path, now: datet
     prepared = prepare_log(log.telemetry, site, name=site.name)
     diagnosis = diagnose(prepared, read_model(bundle, site), drift=None if drift is None else read_drift(drift))
     write_diagnosis(target, diagnosis)
-    sound = diagnosis.verdict != "data_fault"
-    write_bundle = partial(seasons.export_planned, diagnosis.corrected, now) if sound else None
-    causes = tuple(one.effect for one in diagnosis.findings)
-    return Diagnosed(diagnosis.verdict, causes, relative_gain(diagnosis.errors), tuple(diagnosis.notes), write_bundle)
+    return diagnosis
 
 
 def relative_gain(errors: Mapping[str, Mapping[str, Mapping[str, float]]]) -> float:

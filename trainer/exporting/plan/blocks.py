@@ -35,15 +35,7 @@ class PlanBlocks:
     @property
     def blocks(self) -> list[Block]:
         """Every block, for the model's list of functions."""
-        return [
-            *self.climate.blocks,
-            self.equipment,
-            self.control,
-            self.growth,
-            self.net_growth,
-            self.harvest,
-            self.range,
-        ]
+        return [*self.climate.blocks, *(one for one in vars(self).values() if isinstance(one, Block))]
 
 
 def plan_blocks(
