@@ -1,6 +1,7 @@
 """Algorithm 1 with and without its lower level, in greenhouses that lack something the simulator does not know.
 
-    python -m benchmarks.algorithm_1 [--days 35] [--houses 3] [--first 0] [--generations 5] [--every 14] [--figure FILE]
+    python -m benchmarks.algorithm_1 [--days 35] [--greenhouses 3] [--first 0] [--generations 5] [--every 14]
+        [--figure FILE]
 
 Mechanistic greenhouses, each with other parameters (8 %), disturbances, sensor noise, and two undeclared effects: one
 stands, one begins a week later. After four weeks under the recipe the upper level plans every day (K1)
@@ -22,8 +23,8 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.logged_houses import LATER, LoggedHouses
-from benchmarks.season_houses import Houses, Morning, Recipe, Way, lead, money
+from benchmarks.logged_greenhouses import LATER, LoggedGreenhouses
+from benchmarks.season_greenhouses import Greenhouses, Morning, Recipe, Way, lead, money
 from benchmarks.season_plans import Planned
 from benchmarks.seasons import brought, described, season_of, ways_of
 from igrow.core.arrays import Floats
@@ -48,7 +49,7 @@ JUDGED = ("profit", "net_growth", "heat", "electricity", "co2")
 
 
 class Watched(Planned):
-    """Plans whose expectations are kept beside what the houses then did."""
+    """Plans whose expectations are kept beside what the greenhouses then did."""
 
     def __init__(
         self, site: Site, simulator: BundleSimulator, season: SeasonPlan, generations: int, *, corrected: bool
@@ -57,41 +58,41 @@ class Watched(Planned):
         self._corrected = corrected
         self._plans: dict[int, PlanResult] = {}
         self.books: dict[tuple[str, str], dict[int, float]] = {}
-        """Sums over days, by what and whether expected or obtained, then by house."""
+        """Sums over days, by what and whether expected or obtained, then by greenhouse."""
 
-    def believed(self, house: int) -> Simulator:
+    def believed(self, greenhouse: int) -> Simulator:
         """Return the simulator in force, corrected or as it is."""
-        return super().believed(house) if self._corrected else self.simulator(house)
+        return super().believed(greenhouse) if self._corrected else self.simulator(greenhouse)
 
-    def plan(self, morning: Morning, house: int) -> PlanResult:
-        """Return the plan of a house."""
-        self._plans[house] = super().plan(morning, house)
-        return self._plans[house]
+    def plan(self, morning: Morning, greenhouse: int) -> PlanResult:
+        """Return the plan of a greenhouse."""
+        self._plans[greenhouse] = super().plan(morning, greenhouse)
+        return self._plans[greenhouse]
 
     def learn(self, morning: Morning, outcome: Outcome, weather: Floats) -> None:
         """Book both sides of the day."""
         super().learn(morning, outcome, weather)
-        for house, plan in self._plans.items():
-            one = Outcome(**{name: value[:, [house]] for name, value in vars(outcome).items()})
+        for greenhouse, plan in self._plans.items():
+            one = Outcome(**{name: value[:, [greenhouse]] for name, value in vars(outcome).items()})
             for side, what in (("expected", plan.outcome.first(24)), ("obtained", one)):
                 found = {name: each.item() for name, each in totals(what).items()}
                 found["profit"] = plan.objective.first(24).value(what).profit.mean().item()
                 for name, amount in found.items():
                     book = self.books.setdefault((name, side), {})
-                    book[house] = book.get(house, 0.0) + amount
+                    book[greenhouse] = book.get(greenhouse, 0.0) + amount
 
     def expected_over_obtained(self, name: str) -> float:
-        """Return the median house's ratio over the season."""
+        """Return the median greenhouse's ratio over the season."""
         expected, obtained = self.books[name, "expected"], self.books[name, "obtained"]
-        return float(np.median([expected[house] / obtained[house] for house in expected]))
+        return float(np.median([expected[greenhouse] / obtained[greenhouse] for greenhouse in expected]))
 
 
 @dataclass(frozen=True)
 class Turn:
-    """One run of the lower level in one house."""
+    """One run of the lower level in one greenhouse."""
 
     day: int
-    house: int
+    greenhouse: int
     before: FittedModel
     """The model in force."""
     after: FittedModel
@@ -99,7 +100,7 @@ class Turn:
 
 
 class Renewed(Watched):
-    """The same with the lower level: each house's simulator is renewed from its log every so many days."""
+    """The same with the lower level: each greenhouse's simulator is renewed from its log every so many days."""
 
     def __init__(
         self, site: Site, simulator: BundleSimulator, season: SeasonPlan, generations: int, every: int, out: Path
@@ -111,27 +112,27 @@ class Renewed(Watched):
         self._built_in = read_model(read_bundle(default_bundle_folder()), site)
         self._models: dict[int, FittedModel] = {}
         self.turns: list[Turn] = []
-        self.houses: LoggedHouses | None = None
+        self.greenhouses: LoggedGreenhouses | None = None
         """Whose logs are read; known when they stand."""
 
     def log(self, row: int, first: int, last: int) -> Log:
         """Return the log that was collected of a row."""
-        assert self.houses is not None
-        return prepare_log(self.houses.telemetry(row, first, last), self._site)
+        assert self.greenhouses is not None
+        return prepare_log(self.greenhouses.telemetry(row, first, last), self._site)
 
-    def simulator(self, house: int) -> BundleSimulator:
-        """Return the newest simulator of a house."""
-        return self._simulators.get(house, self._simulator)
+    def simulator(self, greenhouse: int) -> BundleSimulator:
+        """Return the newest simulator of a greenhouse."""
+        return self._simulators.get(greenhouse, self._simulator)
 
-    def plan(self, morning: Morning, house: int) -> PlanResult:
-        """Return the plan of a house, on a simulator that is renewed where that is due."""
+    def plan(self, morning: Morning, greenhouse: int) -> PlanResult:
+        """Return the plan of a greenhouse, on a simulator that is renewed where that is due."""
         if morning.day % self._every == 0:
-            self._renew(house, morning.day, morning.rows.start + house)
-        return super().plan(morning, house)
+            self._renew(greenhouse, morning.day, morning.rows.start + greenhouse)
+        return super().plan(morning, greenhouse)
 
-    def _renew(self, house: int, day: int, row: int) -> None:
-        log, before = self.log(row, day - LOOKED_AT, day), self._models.get(house, self._built_in)
-        if house not in self._models:
+    def _renew(self, greenhouse: int, day: int, row: int) -> None:
+        log, before = self.log(row, day - LOOKED_AT, day), self._models.get(greenhouse, self._built_in)
+        if greenhouse not in self._models:
             after, said = calibrate(log), "calibrated"
         else:
             result = diagnose(log, before)
@@ -139,22 +140,22 @@ class Renewed(Watched):
             after = result.corrected if better else before
             causes = ", ".join(one.effect for one in result.findings)
             said = f"{result.verdict} {causes}".strip() + ("" if better else "; the model stays")
-        self.turns.append(Turn(day, house, before, after, said))
-        print(f"\nday {day}, house {house}: {said}", file=sys.stderr, flush=True)
+        self.turns.append(Turn(day, greenhouse, before, after, said))
+        print(f"\nday {day}, greenhouse {greenhouse}: {said}", file=sys.stderr, flush=True)
         if after is not before:
-            bundle = export(after, self._out / f"{house}-{day}")
-            self._models[house] = after
-            self._simulators[house] = BundleSimulator(bundle, self._site.greenhouse, members=1)
+            bundle = export(after, self._out / f"{greenhouse}-{day}")
+            self._models[greenhouse] = after
+            self._simulators[greenhouse] = BundleSimulator(bundle, self._site.greenhouse, members=1)
 
 
 def climate_errors(renewed: Renewed, row: int, days: int, every: int) -> dict[int, dict[str, list[Floats]]]:
-    """Return by day of the turn, and ``before`` or ``after``: each house's errors a day ahead by `CLIMATE`.
+    """Return by day of the turn, and ``before`` or ``after``: each greenhouse's errors a day ahead by `CLIMATE`.
 
-    On the days until the next turn, which no step of the lower level had seen; `row` is the first house's.
+    On the days until the next turn, which no step of the lower level had seen; `row` is the first greenhouse's.
     """
     found: dict[int, dict[str, list[Floats]]] = {}
     for turn in renewed.turns:
-        later = renewed.log(row + turn.house, turn.day, min(turn.day + every, days))
+        later = renewed.log(row + turn.greenhouse, turn.day, min(turn.day + every, days))
         scores = compare({"before": turn.before, "after": turn.after}, later, ("24_h",)).scores
         for name, one in scores.items():
             errors = np.array([one[quantity]["24_h"].mae for quantity in CLIMATE])
@@ -166,13 +167,13 @@ def main() -> int:
     """Tune, lead and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--days", type=int, default=35)
-    parser.add_argument("--houses", type=int, default=3)
+    parser.add_argument("--greenhouses", type=int, default=3)
     parser.add_argument("--first", type=int, default=0, help="number of the first greenhouse")
     parser.add_argument("--generations", type=int, default=5, help="of each day's search")
     parser.add_argument("--every", type=int, default=14, help="days between two runs of the lower level (K2)")
     parser.add_argument("--figure", type=Path, help="SVG to write")
     given = parser.parse_args()
-    numbers = list(range(given.first, given.first + given.houses))
+    numbers = list(range(given.first, given.first + given.greenhouses))
     site, kinds = described("today", given.days), ways_of(given.days)
     season = season_of(site, given.days)
     crop = tomato.mature_crop(season.plant, 1.0)
@@ -188,12 +189,12 @@ def main() -> int:
         }
         ways: dict[str, Way] = {"recipe": Recipe(), **planned}
 
-        def stood(days: int, numbers: Sequence[int]) -> Houses:
-            renewed.houses = LoggedHouses(days, numbers)
-            return renewed.houses
+        def stood(days: int, numbers: Sequence[int]) -> Greenhouses:
+            renewed.greenhouses = LoggedGreenhouses(days, numbers)
+            return renewed.greenhouses
 
         books, _ = lead(site, given.days, ways, dict.fromkeys(ways, numbers), stood)
-        errors = climate_errors(renewed, list(ways).index("lower level") * given.houses, given.days, given.every)
+        errors = climate_errors(renewed, list(ways).index("lower level") * given.greenhouses, given.days, given.every)
     brought(f"{given.days} days", {name: (money(site, book), book) for name, book in books.items()})
     print(f"\n{'expected / obtained':22s}" + "".join(f"{name:>12s}" for name in JUDGED))
     for name, way in planned.items():
@@ -213,10 +214,10 @@ def tell(renewed: Renewed, errors: Mapping[int, Mapping[str, list[Floats]]]) -> 
             cells = "".join(f"{value:18.2f}" for value in np.mean(each, axis=0))
             print(f"{f'day {day}, {when}':22s}{cells}")
     print("\nwhat the lower level said")
-    assert renewed.houses is not None
+    assert renewed.greenhouses is not None
     for turn in renewed.turns:
-        stands, begins = renewed.houses.hidden[turn.house]
-        print(f"house {turn.house} ({stands}; from day {LATER} on {begins}), day {turn.day}: {turn.said}")
+        stands, begins = renewed.greenhouses.hidden[turn.greenhouse]
+        print(f"greenhouse {turn.greenhouse} ({stands}; from day {LATER} on {begins}), day {turn.day}: {turn.said}")
 
 
 def draw(
@@ -229,7 +230,7 @@ def draw(
     days = books["recipe"]["kg"].shape[1]
 
     def net(name: str) -> Floats:
-        """Return the net profit of the houses until each day, (days,), mean."""
+        """Return the net profit of the greenhouses until each day, (days,), mean."""
         until = range(1, days + 1)
         return np.array(
             [money(site, {key: one[:, :day] for key, one in books[name].items()})["net"].mean() for day in until]

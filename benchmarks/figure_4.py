@@ -1,10 +1,10 @@
 """Figure 4 of Cao et al. (2022) as far as data allow: a season by the genetic algorithm, SAC, and as growers led it.
 
-    python -m benchmarks.figure_4 [--houses 3] [--minutes 15] [--data FOLDER] [--figure FILE]
+    python -m benchmarks.figure_4 [--greenhouses 3] [--minutes 15] [--data FOLDER] [--figure FILE]
 
-Each way leads a whole season in our simulator, and the same houses' season in the mechanistic plant, which differs from
-it by 8 % in each parameter and two undeclared effects, through the PLC's own control. Net profit is fruit that was ripe
-and picked, less costs; six dark hours and all other limits of the crop hold for all.
+Each way leads a whole season in our simulator, and the same greenhouses' season in the mechanistic plant, which
+differs from it by 8 % in each parameter and two undeclared effects, through the PLC's own control. Net profit is fruit
+that was ripe and picked, less costs; six dark hours and all other limits of the crop hold for all.
 
 recipe     the grower's day of the annotated site
 growers    the realised setpoints of the growers' compartment (Reference) of the second Autonomous Greenhouse Challenge,
@@ -27,7 +27,7 @@ import numpy as np
 
 from benchmarks.figure_4_ways import DAYS, GROWN, SIMULATED, Learning, Tuning, World, led, prepare
 from benchmarks.jobs import Jobs
-from benchmarks.season_houses import money
+from benchmarks.season_greenhouses import money
 from benchmarks.seasons import brought, described
 from igrow.core.arrays import Floats
 from igrow.core.planner.season.search import GENERATIONS, SETTINGS
@@ -37,7 +37,7 @@ from igrow.core.site import Site
 def main() -> int:
     """Tune, train, lead and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--houses", type=int, default=3)
+    parser.add_argument("--greenhouses", type=int, default=3)
     parser.add_argument("--minutes", type=float, default=15.0, help="of the processor for SAC's training")
     parser.add_argument("--data", type=Path, default=Path("../shared/data/agc2019"))
     parser.add_argument("--figure", type=Path, help="SVG to write")
@@ -45,7 +45,9 @@ def main() -> int:
     with Jobs("figure 4", processes=2) as jobs:
         tuning, learning = jobs.each(prepare, [0.0, given.minutes])
         assert isinstance(tuning, Tuning) and isinstance(learning, Learning)
-        worlds = [World(where, tuning, learning, given.houses, given.data.resolve()) for where in (SIMULATED, GROWN)]
+        worlds = [
+            World(where, tuning, learning, given.greenhouses, given.data.resolve()) for where in (SIMULATED, GROWN)
+        ]
         books = dict(zip((SIMULATED, GROWN), jobs.each(led, worlds), strict=True))
     each = SETTINGS.offspring * GENERATIONS
     course = ", ".join(f"{gain:+.3f}" for gain in learning.course)
@@ -65,7 +67,7 @@ def main() -> int:
 
 
 def draw(path: Path, site: Site, books: Mapping[str, Mapping[str, Mapping[str, Floats]]]) -> None:
-    """Draw cumulative net profit from day to day, mean over the houses, in the simulator and in the plant."""
+    """Draw cumulative net profit from day to day, mean over the greenhouses, in the simulator and in the plant."""
     from igrow.trainer.figure_style import name_above, panels  # noqa: PLC0415, only this draws
 
     figure, axes = panels(2, 6.4, width=6.0)

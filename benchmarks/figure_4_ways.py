@@ -12,9 +12,9 @@ import numpy as np
 import torch
 
 from benchmarks.onnx_policy import OnnxPolicy
-from benchmarks.season_houses import DAY, HOUR, START, Houses, Led, Morning, Recipe, Way, lead
+from benchmarks.season_greenhouses import DAY, HOUR, START, Greenhouses, Led, Morning, Recipe, Way, lead
 from benchmarks.seasons import described, season_of, ways_of
-from benchmarks.simulated_houses import SimulatedHouses
+from benchmarks.simulated_greenhouses import SimulatedGreenhouses
 from igrow.core.arrays import Floats
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.gaps import held
@@ -44,7 +44,7 @@ class Published(Recipe):
     """(DAYS, 24, S); NaN where the recipe's count."""
 
     def ask(self, morning: Morning) -> Floats:
-        """Return the day's for each house."""
+        """Return the day's for each greenhouse."""
         said = self.setpoints[morning.day]
         return np.repeat(np.where(np.isfinite(said), said, morning.recipe)[None], len(morning.weather), axis=0)
 
@@ -57,7 +57,7 @@ class Policed(Recipe):
     policy: OnnxPolicy
 
     def ask(self, morning: Morning) -> Floats:
-        """Return what it says of each house's day."""
+        """Return what it says of each greenhouse's day."""
         seen = observe(self.site, morning.present, morning.weather, morning.begin)
         return chosen(self.site, to_setpoints(self.site, self.policy.act(seen)), morning.recipe)
 
@@ -130,17 +130,17 @@ def prepare(minutes: float) -> Tuning | Learning:
 
 @dataclass(frozen=True)
 class World:
-    """Where all lead their houses."""
+    """Where all lead their greenhouses."""
 
     where: str
     tuning: Tuning
     learning: Learning
-    houses: int
+    greenhouses: int
     data: Path
 
 
 def led(world: World) -> dict[str, dict[str, Floats]]:
-    """Return what the houses of each way used and picked by day."""
+    """Return what the greenhouses of each way used and picked by day."""
     site, kinds = described("today", DAYS), ways_of(DAYS)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "policy.onnx"
@@ -153,5 +153,5 @@ def led(world: World) -> dict[str, dict[str, Floats]]:
         **{name: Led(kinds[name], genes[None]) for name, genes in world.tuning.genes.items()},
         "SAC": Policed(site, policy),
     }
-    stood = partial(SimulatedHouses, site, simulator_of(site)) if world.where == SIMULATED else Houses
-    return lead(site, DAYS, ways, {name: list(range(world.houses)) for name in ways}, stood)[0]
+    stood = partial(SimulatedGreenhouses, site, simulator_of(site)) if world.where == SIMULATED else Greenhouses
+    return lead(site, DAYS, ways, {name: list(range(world.greenhouses)) for name in ways}, stood)[0]

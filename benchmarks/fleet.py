@@ -112,7 +112,7 @@ def on_the_gateway(step: float) -> None:
             store.close()
             sizes.append((Path(text) / "telemetry.db").stat().st_size)
     grows = (sizes[-1] - sizes[0]) / (len(sizes) - 1)
-    sent = len(seal_day("house", 0, "", step, 0)[1])
+    sent = len(seal_day("greenhouse", 0, "", step, 0)[1])
     print(f"in the gateway's own log              {grows / 1e6:8.3f} MB a day: "
           f"{limits.telemetry_bytes / 2**20:.0f} MB hold {limits.telemetry_bytes / grows:.0f} days")  # fmt: skip
     budget = TransferRules().budget
@@ -130,7 +130,7 @@ def collect_fleet(sites: int, step: float) -> Collected:
         sent = 0
         place = FolderPlace(root / "exchange")
         for number in range(sites):
-            site = f"house-{number:05}"
+            site = f"greenhouse-{number:05}"
             (fleet / "sites" / f"{site}.yaml").write_text(f"name: {site}\nlatitude: 52\nlongitude: 4.5\n")
             name, data, _ = seal_day(site, 0, "", step, number % 20)
             place.put(f"{site}/segments/{name}", data)
@@ -195,15 +195,17 @@ def with_history(days: int, step: float) -> float:
         root, previous, seconds = Path(text), "", []
         place, archive = CountingPlace(root / "exchange"), Archive(root / "archive")
         for day in range(days):
-            name, data, previous = seal_day("house", day, previous, step, day % 20)
-            place.put(f"house/segments/{name}", data)
+            name, data, previous = seal_day("greenhouse", day, previous, step, day % 20)
+            place.put(f"greenhouse/segments/{name}", data)
             place.asked = 0
             began = time.perf_counter()
-            collect(place, "house", archive, datetime.fromtimestamp(START + (day + 1) * DAY, UTC))
+            collect(place, "greenhouse", archive, datetime.fromtimestamp(START + (day + 1) * DAY, UTC))
             seconds.append(time.perf_counter() - began)
         week, year = float(np.median(seconds[1:8])), float(np.median(seconds[-7:]))
-        ledger = (root / "archive" / "ledger" / "house.json").stat().st_size
-        receipt = len(json.dumps(json.loads(next((root / "exchange" / "house" / "receipts").iterdir()).read_text())))
+        ledger = (root / "archive" / "ledger" / "greenhouse.json").stat().st_size
+        receipt = len(
+            json.dumps(json.loads(next((root / "exchange" / "greenhouse" / "receipts").iterdir()).read_text()))
+        )
         shutil.rmtree(root / "exchange")
     print(f"behind {days} days of history             {year / week:8.2f} times the time behind a week "
           f"(ledger {ledger / 1e3:.0f} kB, receipt {receipt} bytes, {place.asked} requests)")  # fmt: skip
@@ -214,20 +216,20 @@ def weekly_diagnosis(days: int) -> tuple[float, float]:
     """Diagnose one virtual greenhouse as the fleet does; returns seconds of processor and MB."""
     with tempfile.TemporaryDirectory() as text:
         root = Path(text)
-        site = root / "house.yaml"
-        site.write_text("name: house\nlatitude: 52\nlongitude: 4.5\n")
+        site = root / "greenhouse.yaml"
+        site.write_text("name: greenhouse\nlatitude: 52\nlongitude: 4.5\n")
         command = [sys.executable, "-c", "import sys; from igrow.trainer.cli import main; sys.exit(main())"]
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, [str(Path.cwd()), *sys.path]))}
         generate = ["generate", "--site", str(site), "--days", str(days), "--start", "2026-02-01", "--seed", "1"]
         subprocess.run([*command, *generate, "--out", str(root / "log")], env=environment, check=True,
                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)  # fmt: skip
         archive = Archive(root / "state" / "archive")
-        archive.add_telemetry("house", read_log(root / "log").telemetry)
+        archive.add_telemetry("greenhouse", read_log(root / "log").telemetry)
         now = datetime(2026, 2, 1, tzinfo=UTC).timestamp() + days * DAY
         exchange = {"url": str(root / "exchange"), "base": str(root), "known_hosts": None, "identity": None}
         arguments = {"file": str(site), "state": str(root / "state"), "exchange": exchange, "keys": str(root / "keys"),
                      "now": now, "publish": False, "force": True, "days": 56}  # fmt: skip
-        task = Task("house", "igrow.trainer.fleet.work:recalibrate_site", arguments, 3600.0, 8000, 0)
+        task = Task("greenhouse", "igrow.trainer.fleet.work:recalibrate_site", arguments, 3600.0, 8000, 0)
         (outcome,) = run_tasks([task])
         assert outcome.ending is Ending.DONE, outcome.note
     print(f"a diagnosis of {days} days               {outcome.processor:8.0f} s of processor, "

@@ -61,47 +61,47 @@ class Greenhouse:
 Predictors = Mapping[str, tuple[Predictor, Mapping[str, ErrorGrowth]]]
 
 
-def predictors(house: Greenhouse, model: Forecaster) -> Predictors:
+def predictors(greenhouse: Greenhouse, model: Forecaster) -> Predictors:
     """All ways to drive a model, with their intervals."""
-    by_actuators = remembering(model.predictor(house.record))
+    by_actuators = remembering(model.predictor(greenhouse.record))
     found = {"hybrid, actuators": (by_actuators, model.growth)}
     if model.rules:
-        by_setpoints = remembering(model.closed_predictor(house.record, house.setpoints))
+        by_setpoints = remembering(model.closed_predictor(greenhouse.record, greenhouse.setpoints))
         found["hybrid, setpoints"] = (by_setpoints, model.closed_growth)
         if model.combinations:
-            both = model.combined_predictor(house.record, house.setpoints, by_actuators, by_setpoints)
+            both = model.combined_predictor(greenhouse.record, greenhouse.setpoints, by_actuators, by_setpoints)
             found["hybrid, combined"] = (remembering(both), model.combined_growth)
     return found
 
 
 def all_errors(
-    house: Greenhouse, ways: Predictors, rows: Mask, begin: Mask | None, every: float
+    greenhouse: Greenhouse, ways: Predictors, rows: Mask, begin: Mask | None, every: float
 ) -> dict[str, dict[tuple[str, str], Errors]]:
     return {
-        name: errors_of(house.record, predict, HORIZONS, rows, begin=begin, every=every)
+        name: errors_of(greenhouse.record, predict, HORIZONS, rows, begin=begin, every=every)
         for name, (predict, _) in ways.items()
     }
 
 
 def rivals(
-    house: Greenhouse, fit: Mask, rows: Mask, begin: Mask | None, every: float
+    greenhouse: Greenhouse, fit: Mask, rows: Mask, begin: Mask | None, every: float
 ) -> dict[str, dict[tuple[str, str], Errors]]:
     """What learns from the same rows and knows no physics, driven by the measured actuators."""
-    network = network_predictor(house.record, house.setpoints, fit)
+    network = network_predictor(greenhouse.record, greenhouse.setpoints, fit)
     return {
-        "network": errors_of(house.record, network, HORIZONS, rows, begin=begin, every=every),
-        "gradient boosting": boosted(house, fit, rows, begin, every),
+        "network": errors_of(greenhouse.record, network, HORIZONS, rows, begin=begin, every=every),
+        "gradient boosting": boosted(greenhouse, fit, rows, begin, every),
     }
 
 
 def boosted(
-    house: Greenhouse, fit: Mask, rows: Mask, begin: Mask | None, every: float
+    greenhouse: Greenhouse, fit: Mask, rows: Mask, begin: Mask | None, every: float
 ) -> dict[tuple[str, str], Errors]:
     """A plain gradient-boosted regression: drivers now and an hour ago, the measured start, and the lead time."""
-    record = house.record
+    record = greenhouse.record
     generator = np.random.default_rng(0)
-    columns = [*record.inputs, *house.setpoints]
-    table = np.stack([*record.inputs.values(), *house.setpoints.values()], axis=1)
+    columns = [*record.inputs, *greenhouse.setpoints]
+    table = np.stack([*record.inputs.values(), *greenhouse.setpoints.values()], axis=1)
     lag = round(3600.0 / STEP)
     quantities = list(record.measured)
     measured = np.stack([record.measured[name] for name in quantities], axis=1)
@@ -161,76 +161,78 @@ def show(title: str, found: Mapping[str, Sequence[Mapping[tuple[str, str], Error
     return result
 
 
-def later(house: Greenhouse, every: float) -> dict[str, object]:
-    count = int(house.week[-1]) + 1
+def later(greenhouse: Greenhouse, every: float) -> dict[str, object]:
+    count = int(greenhouse.week[-1]) + 1
     fit_weeks, selection_weeks = round(0.6 * count), max(2, round(0.15 * count))
-    fit = house.week < fit_weeks
-    selection = (house.week >= fit_weeks) & (house.week < fit_weeks + selection_weeks)
-    rows = house.week >= fit_weeks + selection_weeks
+    fit = greenhouse.week < fit_weeks
+    selection = (greenhouse.week >= fit_weeks) & (greenhouse.week < fit_weeks + selection_weeks)
+    rows = greenhouse.week >= fit_weeks + selection_weeks
     began = time.monotonic()
-    model = house.fit(fit, selection)
-    print(f"{house.log.name}: fitted in {time.monotonic() - began:.0f} s")
-    ways = predictors(house, model)
-    found = {name: [errors] for name, errors in all_errors(house, ways, rows, None, every).items()}
-    found |= {name: [errors] for name, errors in rivals(house, fit | selection, rows, None, every).items()}
+    model = greenhouse.fit(fit, selection)
+    print(f"{greenhouse.log.name}: fitted in {time.monotonic() - began:.0f} s")
+    ways = predictors(greenhouse, model)
+    found = {name: [errors] for name, errors in all_errors(greenhouse, ways, rows, None, every).items()}
+    found |= {name: [errors] for name, errors in rivals(greenhouse, fit | selection, rows, None, every).items()}
     title = (
-        f"{house.log.name}, later: weeks 1-{fit_weeks} fit, {selection_weeks} selection, "
+        f"{greenhouse.log.name}, later: weeks 1-{fit_weeks} fit, {selection_weeks} selection, "
         f"{count - fit_weeks - selection_weeks} test"
     )
     table = show(title, found)
-    print_coverage([coverage(house.record, ways, rows, None, every)])
-    print_range(house, ways["hybrid, setpoints"][0], fit, rows, every)
-    print_totals([daily_totals(house.record, house.setpoints, model, rows)])
+    print_coverage([coverage(greenhouse.record, ways, rows, None, every)])
+    print_range(greenhouse, ways["hybrid, setpoints"][0], fit, rows, every)
+    print_totals([daily_totals(greenhouse.record, greenhouse.setpoints, model, rows)])
     return table
 
 
 def weekly(
-    house: Greenhouse, every: float, refit: int, chosen: Sequence[int] | None, first: int = 8
+    greenhouse: Greenhouse, every: float, refit: int, chosen: Sequence[int] | None, first: int = 8
 ) -> dict[str, object]:
     found: dict[str, list[Mapping[tuple[str, str], Errors]]] = {}
     covered, totals = [], []
-    count = int(house.week[-1]) + 1
+    count = int(greenhouse.week[-1]) + 1
     tested = [week for week in range(first, count, refit) if chosen is None or week + 1 in chosen]
     for test in tested:
-        fit = (house.week >= test - 8) & (house.week < test - 2)
-        selection = (house.week >= test - 2) & (house.week < test)
-        model = house.fit(fit, selection)
-        begin, rows = (house.week >= test) & (house.week < test + refit), house.week >= test
-        ways = predictors(house, model)
-        for name, errors in all_errors(house, ways, rows, begin, every).items():
+        fit = (greenhouse.week >= test - 8) & (greenhouse.week < test - 2)
+        selection = (greenhouse.week >= test - 2) & (greenhouse.week < test)
+        model = greenhouse.fit(fit, selection)
+        begin, rows = (greenhouse.week >= test) & (greenhouse.week < test + refit), greenhouse.week >= test
+        ways = predictors(greenhouse, model)
+        for name, errors in all_errors(greenhouse, ways, rows, begin, every).items():
             found.setdefault(name, []).append(errors)
-        for name, errors in rivals(house, fit | selection, rows, begin, every).items():
+        for name, errors in rivals(greenhouse, fit | selection, rows, begin, every).items():
             found.setdefault(name, []).append(errors)
-        covered.append(coverage(house.record, ways, rows, begin, every))
-        totals.append(daily_totals(house.record, house.setpoints, model, rows, begin))
+        covered.append(coverage(greenhouse.record, ways, rows, begin, every))
+        totals.append(daily_totals(greenhouse.record, greenhouse.setpoints, model, rows, begin))
         print(f"week {test + 1} of {count} done", file=sys.stderr)
     names = ", ".join(str(week + 1) for week in tested)
-    table = show(f"{house.log.name}, weekly: refitted every {refit} weeks; tested on weeks {names}", found)
+    table = show(f"{greenhouse.log.name}, weekly: refitted every {refit} weeks; tested on weeks {names}", found)
     print_coverage(covered)
     print_totals(totals)
     return table
 
 
-def across(houses: Sequence[Greenhouse], every: float) -> dict[str, object]:
+def across(greenhouses: Sequence[Greenhouse], every: float) -> dict[str, object]:
     tables: dict[str, object] = {}
-    for house in houses:
-        others = [one for one in houses if one is not house]
+    for greenhouse in greenhouses:
+        others = [one for one in greenhouses if one is not greenhouse]
         parts = [(one.record, one.setpoints, one.week % 4 != 3, one.week % 4 == 3) for one in others]
-        model = fit_forecaster(parts, site_prior(house.site), {}, actuation=False)
-        rows, later_rows = np.ones(len(house.record), dtype=bool), house.week >= 1
+        model = fit_forecaster(parts, site_prior(greenhouse.site), {}, actuation=False)
+        rows, later_rows = np.ones(len(greenhouse.record), dtype=bool), greenhouse.week >= 1
         found = {
-            "fitted on others": [errors_of(house.record, model.predictor(house.record), HORIZONS, rows, every=every)]
+            "fitted on others": [
+                errors_of(greenhouse.record, model.predictor(greenhouse.record), HORIZONS, rows, every=every)
+            ]
         }
-        first = house.week < 1
-        adapted = adapt(model, house.record, first)
+        first = greenhouse.week < 1
+        adapted = adapt(model, greenhouse.record, first)
         found["and first 7 days"] = [
-            errors_of(house.record, adapted.predictor(house.record), HORIZONS, later_rows, every=every)
+            errors_of(greenhouse.record, adapted.predictor(greenhouse.record), HORIZONS, later_rows, every=every)
         ]
-        alone = from_few_days(house.record, first, site_prior(house.site))
+        alone = from_few_days(greenhouse.record, first, site_prior(greenhouse.site))
         found["first 7 days alone"] = [
-            errors_of(house.record, alone.predictor(house.record), HORIZONS, later_rows, every=every)
+            errors_of(greenhouse.record, alone.predictor(greenhouse.record), HORIZONS, later_rows, every=every)
         ]
-        tables[house.log.name] = show(f"{house.log.name}, across", found)
+        tables[greenhouse.log.name] = show(f"{greenhouse.log.name}, across", found)
     return tables
 
 
@@ -292,14 +294,14 @@ def print_coverage(parts: Sequence[Mapping[tuple[str, str], tuple[float, float]]
         print(f"  {driven:10s} {what:28s} {inside / max(number, 1):.3f}")
 
 
-def print_range(house: Greenhouse, predict: Predictor, fit: Mask, rows: Mask, every: float) -> None:
+def print_range(greenhouse: Greenhouse, predict: Predictor, fit: Mask, rows: Mask, every: float) -> None:
     """Tell whether runs outside the training range are worse: the error of 24 h runs.
 
     Outside is what a bundle's graph tells planning: beyond the bounds of single quantities
     (`igrow.trainer.fit.model.training_envelope`).
     """
-    record = house.record
-    known = {**record.inputs, **record.measured, **house.setpoints}
+    record = greenhouse.record
+    known = {**record.inputs, **record.measured, **greenhouse.setpoints}
     bounds = training_envelope({name: known[name][fit] for name in RANGED})
     excess = [np.maximum(low - known[name], known[name] - high) for name, (low, high) in bounds.items()]
     outside = np.max(excess, axis=0) > 0.0
@@ -354,19 +356,19 @@ def main() -> int:
         result: dict[str, object] = {}
         if "metered" in given.tables:
             result["metered"] = {log.name: metered(log) for log in logs}
-        houses = [Greenhouse(log) for log in logs] if set(given.tables) != {"metered"} else []
+        greenhouses = [Greenhouse(log) for log in logs] if set(given.tables) != {"metered"} else []
     except IgrowError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
     for table in given.tables:
         if table == "across":
-            result["across"] = across(houses, given.every)
+            result["across"] = across(greenhouses, given.every)
         elif table != "metered":
             result[table] = {
-                house.log.name: later(house, given.every)
+                greenhouse.log.name: later(greenhouse, given.every)
                 if table == "later"
-                else weekly(house, given.every, given.refit, given.test_weeks)
-                for house in houses
+                else weekly(greenhouse, given.every, given.refit, given.test_weeks)
+                for greenhouse in greenhouses
             }
     if given.json is not None:
         given.json.write_text(json.dumps(result, indent=1))

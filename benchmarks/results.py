@@ -127,7 +127,7 @@ RESULTS = {
     ),
     "season-plans": Result(
         "A plan a day through a short season",
-        ("benchmarks.season_plans", "--days", "40", "--houses", "3", "--generations", "24"),
+        ("benchmarks.season_plans", "--days", "40", "--greenhouses", "3", "--generations", "24"),
         "With the season's marginal values, and with an average price instead; the same greenhouses for all.",
         "greenhouses and weather 700; searches 0 and on",
         long=True,
@@ -153,7 +153,7 @@ RESULTS = {
             "benchmarks.strategies",
             "--days",
             "5",
-            "--houses",
+            "--greenhouses",
             "2",
             "--starts",
             "2020-03-09",

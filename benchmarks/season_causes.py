@@ -1,6 +1,6 @@
 """Why a season brings less than was expected of it: the strategy led through greenhouses that differ by one thing more.
 
-    python -m benchmarks.season_causes [--first 20] [--houses 20]
+    python -m benchmarks.season_causes [--first 20] [--greenhouses 20]
 
 Each greenhouse stands three times under its own weather: as the mean of its kind, with its own parameters (8 % off),
 and with its two undeclared effects too. Printed is what the season's simulator expects of the tuned strategy (today's
@@ -19,7 +19,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.season_houses import EFFECTS, House, Houses, Led, lead, money
+from benchmarks.season_greenhouses import EFFECTS, Greenhouse, Greenhouses, Led, lead, money
 from benchmarks.seasons import GROWN_AND_USED, STRATEGIES, described, season_of, ways_of
 from igrow.core.arrays import Floats
 from igrow.core.greenhouse import GreenhouseParameters, tomato
@@ -32,14 +32,14 @@ MONTH = 30
 """Days."""
 
 
-class Kinds(Houses):
-    """Houses in the order of `KINDS`, as many of each."""
+class Kinds(Greenhouses):
+    """Greenhouses in the order of `KINDS`, as many of each."""
 
     hidden: list[set[str]]
-    """Names of each house's undeclared effects, where it has them."""
+    """Names of each greenhouse's undeclared effects, where it has them."""
 
-    def stand(self, each: Sequence[House]) -> Plant:
-        """Return the plant that these houses are."""
+    def stand(self, each: Sequence[Greenhouse]) -> Plant:
+        """Return the plant that these greenhouses are."""
         count = len(each) // len(KINDS)
         self.hidden = [{effect.name for effect in one.effects} for one in each[-count:]]
         mean = [replace(one, parameters=GreenhouseParameters(), effects=()) for one in each[:count]]
@@ -57,13 +57,13 @@ def main() -> int:
     """Lead and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--first", type=int, default=20, help="number of the first greenhouse")
-    parser.add_argument("--houses", type=int, default=20)
+    parser.add_argument("--greenhouses", type=int, default=20)
     arguments = parser.parse_args()
     given = json.loads(STRATEGIES.read_text(encoding="utf-8"))
     days = given["days"]
     site, strategy = described("today", days), ways_of(days)["season"]
     genes = np.array([given["strategies"]["today"]["season"]["genes"]], dtype=np.float32)
-    numbers = list(range(arguments.first, arguments.first + arguments.houses))
+    numbers = list(range(arguments.first, arguments.first + arguments.greenhouses))
     stood: list[Kinds] = []
 
     def stand(length: int, rows: Sequence[int]) -> Kinds:

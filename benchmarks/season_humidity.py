@@ -1,6 +1,6 @@
 """What a humidity setpoint brings: seasons with and without it, in greenhouses whose climate computer takes one.
 
-    python -m benchmarks.season_humidity [--houses 20] [--generations 36] [--led 150]
+    python -m benchmarks.season_humidity [--greenhouses 20] [--generations 36] [--led 150]
 
 The built-in bundle's simulator is given vents that open by the larger of what temperature and humidity ask, fitted to
 virtual seasons in which the humidity setpoint was moved each day. On it a rule and a strategy of six dates are tuned,
@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.led_greenhouses import run
-from benchmarks.season_houses import DAY, PARTS, START, Houses, Led, Recipe, Way, lead, money
+from benchmarks.season_greenhouses import DAY, PARTS, START, Greenhouses, Led, Recipe, Way, lead, money
 from benchmarks.seasons import GROWN_AND_USED, STRATEGIES, brought, described, season_of, ways_of
 from igrow.core.arrays import Floats
 from igrow.core.bundle import default_bundle_folder, read_bundle
@@ -87,8 +87,8 @@ def taught(site: Site) -> FittedModel:
     return replace(model, actuation=fit_actuation(parts, model.posterior.values))
 
 
-class TakingHouses(Houses):
-    """Houses whose computers take a humidity setpoint as well."""
+class TakingGreenhouses(Greenhouses):
+    """Greenhouses whose computers take a humidity setpoint as well."""
 
     def __init__(self, site: Site, days: int, numbers: Sequence[int]) -> None:
         super().__init__(days, numbers)
@@ -107,7 +107,7 @@ class TakingHouses(Houses):
 def main() -> int:
     """Teach, tune, lead and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--houses", type=int, default=20)
+    parser.add_argument("--greenhouses", type=int, default=20)
     parser.add_argument("--generations", type=int, default=36)
     parser.add_argument("--led", type=int, default=150, help="days of the season that are led")
     arguments = parser.parse_args()
@@ -143,19 +143,19 @@ def main() -> int:
                 continue
             net = float(run_season(season, way.strategy, way.genes, crop).balance.net_profit[0])
             print(f"{name:10s}expected net {net:.2f} EUR m-2", flush=True)
-    led_through(site, ways, arguments.led, arguments.houses)
+    led_through(site, ways, arguments.led, arguments.greenhouses)
     return 0
 
 
-def led_through(site: Site, ways: Mapping[str, Way], days: int, houses: int) -> None:
+def led_through(site: Site, ways: Mapping[str, Way], days: int, greenhouses: int) -> None:
     """Lead greenhouses through the first days of a season, and print what came of it."""
-    stood: list[TakingHouses] = []
+    stood: list[TakingGreenhouses] = []
 
-    def stand(length: int, rows: Sequence[int]) -> TakingHouses:
-        stood.append(TakingHouses(site, length, rows))
+    def stand(length: int, rows: Sequence[int]) -> TakingGreenhouses:
+        stood.append(TakingGreenhouses(site, length, rows))
         return stood[-1]
 
-    books, _ = lead(site, days, ways, {name: list(range(houses)) for name in ways}, stand)
+    books, _ = lead(site, days, ways, {name: list(range(greenhouses)) for name in ways}, stand)
     spent = {name: money(site, book) for name, book in books.items()}
     if days > PICKED_FROM:
         brought(f"energy at today's prices, {days} days", {name: (spent[name], books[name]) for name in ways})
@@ -163,7 +163,7 @@ def led_through(site: Site, ways: Mapping[str, Way], days: int, houses: int) -> 
     fresh = site.crop.fruit_share / site.crop.dry_matter_fraction
     heads = ("growth", "heat", "electricity", "CO2", "EUR m-2", "over first", "worst", "damp h/day", "damp days %")
     print(f"{f'{days} days':10s}" + "".join(f"{head:>12s}" for head in heads))
-    damp = dict(zip(ways, np.stack(stood[0].damp, axis=1).reshape(len(ways), houses, days), strict=True))
+    damp = dict(zip(ways, np.stack(stood[0].damp, axis=1).reshape(len(ways), greenhouses, days), strict=True))
     margin = {}
     for name, book in books.items():
         used = {key: book[key].sum(axis=1) for key in GROWN_AND_USED}

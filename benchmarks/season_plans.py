@@ -1,6 +1,6 @@
 """A plan a day through a whole season: with the season's marginal values, and with an average price instead.
 
-    python -m benchmarks.season_plans [--days 45] [--houses 2] [--generations 30]
+    python -m benchmarks.season_plans [--days 45] [--greenhouses 2] [--generations 30]
 
 A season of `--days` is tuned (as many generations as a plan of a day has, a rule beside it), and its marginal values
 are taken. Then greenhouses that no simulator was fitted to are led by the recipe, the rule, the season's strategy, and
@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.season_houses import Led, Morning, Recipe, Way, lead, money
+from benchmarks.season_greenhouses import Led, Morning, Recipe, Way, lead, money
 from benchmarks.seasons import brought, described, season_of, ways_of
 from benchmarks.strategies import Day, recently
 from igrow.core.agronomy.memory import one_of
@@ -42,7 +42,7 @@ SEARCH = NumpyGeneration(EvolutionSettings(parents=24, offspring=48))
 
 @dataclass(frozen=True)
 class Lived:
-    """A day that a house lived through."""
+    """A day that a greenhouse lived through."""
 
     begin: np.datetime64
     present: dict[str, float]
@@ -75,45 +75,45 @@ class Planned(Recipe):
         self._chosen: list[Floats] = []
 
     def ask(self, morning: Morning) -> Floats:
-        """Return the first day of a plan for each house."""
-        self._chosen = [self.plan(morning, house).setpoints[:24] for house in range(len(morning.weather))]
+        """Return the first day of a plan for each greenhouse."""
+        self._chosen = [self.plan(morning, greenhouse).setpoints[:24] for greenhouse in range(len(morning.weather))]
         return np.stack(self._chosen)
 
-    def simulator(self, house: int) -> BundleSimulator:
+    def simulator(self, greenhouse: int) -> BundleSimulator:
         """Return the simulator in force."""
         return self._simulator
 
-    def believed(self, house: int) -> Simulator:
+    def believed(self, greenhouse: int) -> Simulator:
         """Return it corrected by what the last days used and grew."""
-        simulator = self.simulator(house)
-        past = self._past.get(house, ())
+        simulator = self.simulator(greenhouse)
+        past = self._past.get(greenhouse, ())
         return recently(simulator, self._site, [one.beside(simulator) for one in past])
 
-    def plan(self, morning: Morning, house: int) -> PlanResult:
-        """Return the plan of a house."""
-        present = _present(morning, house)
-        row = morning.rows.start + house
+    def plan(self, morning: Morning, greenhouse: int) -> PlanResult:
+        """Return the plan of a greenhouse."""
+        present = _present(morning, greenhouse)
+        row = morning.rows.start + greenhouse
         state = PlanningState(
             morning.begin,
             present,
-            dict(zip(SETPOINTS, morning.applied[house].tolist(), strict=True)),
-            co2_before=float(morning.co2_before[house]),
+            dict(zip(SETPOINTS, morning.applied[greenhouse].tolist(), strict=True)),
+            co2_before=float(morning.co2_before[greenhouse]),
             memory=one_of(morning.memory, row),
         )
-        weather, recipe = np.tile(morning.weather[house], (2, 1)), np.tile(morning.recipe, (2, 1))
+        weather, recipe = np.tile(morning.weather[greenhouse], (2, 1)), np.tile(morning.recipe, (2, 1))
         template = for_site(self._site, morning.begin, len(weather), radiation=weather[:, RADIATION])
         worth, seeds = None, []
         if self._season is not None:
-            past = self._past.get(house)
+            past = self._past.get(greenhouse)
             worth = self._season.worth(self._site, morning.begin, present, past[-1].warmth if past else None)
             seeds = [self._season.setpoints(template, weather, recipe, morning.begin)]
         return optimise(
-            self.believed(house),
+            self.believed(greenhouse),
             self._site,
             state,
             weather,
             recipe,
-            np.random.default_rng(1000 * morning.day + house),
+            np.random.default_rng(1000 * morning.day + greenhouse),
             self._budget,
             generation=SEARCH,
             template=template,
@@ -123,22 +123,22 @@ class Planned(Recipe):
 
     def learn(self, morning: Morning, outcome: Outcome, weather: Floats) -> None:
         """Remember what the day was."""
-        for house, chosen in enumerate(self._chosen):
-            had = {name: each[[house]] for name, each in totals(outcome).items()}
-            warmth = float(outcome.air_temperature[:, house].mean())
-            lived = Lived(morning.begin, _present(morning, house), weather[house], chosen, had, warmth)
-            self._past.setdefault(house, deque(maxlen=RECENT_DAYS)).append(lived)
+        for greenhouse, chosen in enumerate(self._chosen):
+            had = {name: each[[greenhouse]] for name, each in totals(outcome).items()}
+            warmth = float(outcome.air_temperature[:, greenhouse].mean())
+            lived = Lived(morning.begin, _present(morning, greenhouse), weather[greenhouse], chosen, had, warmth)
+            self._past.setdefault(greenhouse, deque(maxlen=RECENT_DAYS)).append(lived)
 
 
-def _present(morning: Morning, house: int) -> dict[str, float]:
-    return {name: float(value[house]) for name, value in morning.present.items()}
+def _present(morning: Morning, greenhouse: int) -> dict[str, float]:
+    return {name: float(value[greenhouse]) for name, value in morning.present.items()}
 
 
 def main() -> int:
     """Tune, lead and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--days", type=int, default=45)
-    parser.add_argument("--houses", type=int, default=2)
+    parser.add_argument("--greenhouses", type=int, default=2)
     parser.add_argument("--generations", type=int, default=30)
     given = parser.parse_args()
     site, kinds = described("today", given.days), ways_of(given.days)
@@ -154,7 +154,7 @@ def main() -> int:
         "by price": Planned(site, simulator, None, given.generations),
         "by season": Planned(site, simulator, plan, given.generations),
     }
-    books, _ = lead(site, given.days, ways, {name: list(range(given.houses)) for name in ways})
+    books, _ = lead(site, given.days, ways, {name: list(range(given.greenhouses)) for name in ways})
     title = f"{given.days} days, energy at today's prices"
     brought(title, {name: (money(site, book), book) for name, book in books.items()})
     return 0

@@ -2,7 +2,7 @@
 
     python -m benchmarks.seasons tune  [--generations 36] [--search genetic CMA-ES]
     python -m benchmarks.seasons expect
-    python -m benchmarks.seasons judge [--houses 20]
+    python -m benchmarks.seasons judge [--greenhouses 20]
     python -m benchmarks.seasons rank  [--drawn 200]
 
 `tune` searches, with the same number of simulated seasons each, a rule for the whole season (one date, and a day
@@ -10,7 +10,7 @@ from which on the lamps stay off) and a strategy of six dates, at today's and at
 writes them to `benchmarks/season_strategies.json`. `expect` prints what the simulator expects of them. `judge`
 leads mechanistic greenhouses by them, each with other parameters (8 %), weather and two undeclared effects, through
 the PLC's own control, and counts fruit that was ripe and picked, less costs; then it compares what was expected, by
-the bundle alone and corrected by what each house used in the weeks before. `rank` asks whether the simulator puts
+the bundle alone and corrected by what each greenhouse used in the weeks before. `rank` asks whether the simulator puts
 random strategies in the order that one greenhouse does. All, the recipe too, keep the crop's limits, six dark hours
 among them. Greenhouses and weather are not those of the tuning.
 """
@@ -32,7 +32,7 @@ from scipy.stats import spearmanr
 from scipy.stats import t as student
 
 from benchmarks.led_greenhouses import SITE
-from benchmarks.season_houses import DAY, PARTS, START, Led, Past, Recipe, Way, lead, money
+from benchmarks.season_greenhouses import DAY, PARTS, START, Led, Past, Recipe, Way, lead, money
 from igrow.core.arrays import Floats
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.greenhouse import generate_weather, hourly_weather, recipe_by_hour, tomato
@@ -147,14 +147,16 @@ def expect(arguments: argparse.Namespace) -> None:
 
 
 def judge(arguments: argparse.Namespace) -> None:
-    """Lead all houses by all ways at once, and print the tables."""
+    """Lead all greenhouses by all ways at once, and print the tables."""
     given = json.loads(arguments.strategies.read_text(encoding="utf-8"))
     days, kinds = given["days"], ways_of(given["days"])
     ways: dict[str, Way] = {"recipe": Recipe()}
     for prices in PRICES:
         for name, entry in given["strategies"][prices].items():
             ways[f"{name} {prices}"] = Led(kinds[name], np.array([entry["genes"]], dtype=np.float32))
-    books, past = lead(described("today", days), days, ways, {name: list(range(arguments.houses)) for name in ways})
+    books, past = lead(
+        described("today", days), days, ways, {name: list(range(arguments.greenhouses)) for name in ways}
+    )
     if arguments.json:
         arguments.json.write_text(
             json.dumps({name: {key: one.tolist() for key, one in book.items()} for name, book in books.items()})
@@ -189,9 +191,9 @@ def brought(title: str, found: dict[str, tuple[dict[str, Floats], dict[str, Floa
 def expected_and_obtained(
     site: Site, days: int, ways: dict[str, Way], books: Any, led: dict[str, str], past: Past
 ) -> None:
-    """Print the median house's ratio of what was expected to what was obtained, by strategy.
+    """Print the median greenhouse's ratio of what was expected to what was obtained, by strategy.
 
-    As the season's simulator has it, and corrected by what each house used under the recipe before the season.
+    As the season's simulator has it, and corrected by what each greenhouse used under the recipe before the season.
     """
     season = season_of(site, days)
     crop = tomato.mature_crop(season.plant, 1.0)
@@ -243,8 +245,8 @@ def main() -> int:
     judging = commands.add_parser("judge")
     judging.set_defaults(function=judge)
     judging.add_argument("--strategies", type=Path, default=STRATEGIES)
-    judging.add_argument("--houses", type=int, default=20)
-    judging.add_argument("--json", type=Path, help="file for what each house used and picked by day")
+    judging.add_argument("--greenhouses", type=int, default=20)
+    judging.add_argument("--json", type=Path, help="file for what each greenhouse used and picked by day")
     ranking = commands.add_parser("rank")
     ranking.set_defaults(function=rank)
     ranking.add_argument("--days", type=int, default=150)

@@ -1,9 +1,9 @@
 """Which strategy earns most: weeks in mechanistic greenhouses, led by what a bundle's simulator advises.
 
-    python -m benchmarks.strategies [--bundle FOLDER] [--policy NAME=policy.onnx ...] [--days 14] [--houses 4]
+    python -m benchmarks.strategies [--bundle FOLDER] [--policy NAME=policy.onnx ...] [--days 14] [--greenhouses 4]
 
-Every strategy leads the same greenhouses (each differs from the described one, as one house from the next) under the
-same weather, in winter and in spring. None of them has seen greenhouse or weather; all of them plan with the bundle's
+Every strategy leads the same greenhouses (each differs from the described one, as one from the next) under the same
+weather, in winter and in spring. None of them has seen greenhouse or weather; all of them plan with the bundle's
 simulator, which is not the greenhouse. "One day alone" is the genetic algorithm that does not look at the day after the
 one that it chooses. For each the table tells what the simulator expected of the coming hours
 whenever setpoints were chosen, and what the greenhouse then obtained, by the same rules of value
@@ -93,7 +93,7 @@ Strategy = Callable[[Situation], Floats]
 
 @dataclass
 class Book:
-    """What one strategy expected and obtained at each choice, EUR m-2, (houses,), by part of the balance."""
+    """What one strategy expected and obtained at each choice, EUR m-2, (greenhouses,), by part of the balance."""
 
     expected: dict[str, list[Floats]] = field(default_factory=dict)
     obtained: dict[str, list[Floats]] = field(default_factory=dict)
@@ -128,30 +128,34 @@ def lead(
     corrected: bool,
 ) -> dict[str, Book]:
     """Lead copies of the same greenhouses by each strategy, which chooses anew every `every` hours."""
-    houses = Greenhouses(site, scenario)
+    greenhouses = Greenhouses(site, scenario)
     for _ in range(SETTLING):
         # A grown crop is set down in the greenhouse; it and the soil need days to fit each other.
-        houses.advance(np.repeat(recipe_by_hour(houses.time, 24, site.longitude)[None], houses.count, axis=0))
+        greenhouses.advance(
+            np.repeat(recipe_by_hour(greenhouses.time, 24, site.longitude)[None], greenhouses.count, axis=0)
+        )
     books = {name: Book() for name in strategies}
-    co2 = np.zeros(houses.count)
-    past: list[deque[Day]] = [deque(maxlen=round(RECENT_DAYS * 24 / every)) for _ in range(houses.count)]
+    co2 = np.zeros(greenhouses.count)
+    past: list[deque[Day]] = [deque(maxlen=round(RECENT_DAYS * 24 / every)) for _ in range(greenhouses.count)]
     for choice in range((scenario.days - SETTLING) * 24 // every):
-        begin = houses.time
-        present, applied = houses.measurements(), houses.applied()
+        begin = greenhouses.time
+        present, applied = greenhouses.measurements(), greenhouses.applied()
         recipe = recipe_by_hour(begin, HORIZON, site.longitude)
-        coming = houses.coming_weather(HORIZON)
+        coming = greenhouses.coming_weather(HORIZON)
         chosen, expected, states = [], [], []
         for place, (name, strategy) in enumerate(strategies.items()):
-            for house in range(scenario.count):
-                row = place * scenario.count + house
+            for greenhouse in range(scenario.count):
+                row = place * scenario.count + greenhouse
                 if forecast == "persistence":
-                    weather = persistence(_past(houses.weather[house], begin), int(unix_seconds(begin)), HORIZON)
+                    weather = persistence(
+                        _past(greenhouses.weather[greenhouse], begin), int(unix_seconds(begin)), HORIZON
+                    )
                 else:
                     weather = coming[row]
                 now = {key: float(value[row]) for key, value in present.items()}
                 model = recently(simulator, site, past[row]) if corrected else simulator
-                seed = 1000 * choice + house
-                had = houses.memory(row)
+                seed = 1000 * choice + greenhouse
+                had = greenhouses.memory(row)
                 situation = Situation(begin, now, applied[row], weather, recipe, float(co2[row]), model, seed, had)
                 began = time.monotonic()
                 setpoints = strategy(situation)
@@ -159,7 +163,7 @@ def lead(
                 chosen.append(setpoints)
                 states.append(now)
                 expected.append(model.simulate(now, weather, setpoints[None], begin).first(every))
-        outcome = houses.advance(np.stack(chosen)[:, :every])
+        outcome = greenhouses.advance(np.stack(chosen)[:, :every])
         for row, now in enumerate(states):
             again = simulator.simulate(now, coming[row], chosen[row][None], begin).first(every)
             used = {name: each[[row]] for name, each in totals(outcome).items()}
@@ -298,7 +302,7 @@ def main() -> int:
     parser.add_argument("--bundle", type=Path, default=default_bundle_folder(), help="whose simulator plans")
     parser.add_argument("--policy", action="append", default=[], metavar="NAME=FILE", help="a policy.onnx to compare")
     parser.add_argument("--days", type=int, default=14)
-    parser.add_argument("--houses", type=int, default=4, help="greenhouses in each season")
+    parser.add_argument("--greenhouses", type=int, default=4, help="greenhouses in each season")
     parser.add_argument("--every", type=int, default=24, help="hours between choices (K1)")
     parser.add_argument("--forecast", choices=("persistence", "true"), default="persistence", help="weather ahead")
     parser.add_argument("--uncorrected", action="store_true", help="do not correct plans by what the last days used")
@@ -327,11 +331,11 @@ def main() -> int:
             continue
         begin = np.datetime64(start) - SETTLING * DAY
         days, copies = SETTLING + given.days, len(strategies)
-        scenario = Scenario(begin, days, given.houses, seed=FIRST_SEED + number, copies=copies)
+        scenario = Scenario(begin, days, given.greenhouses, seed=FIRST_SEED + number, copies=copies)
         books = lead(site, scenario, strategies, simulator, given.every, given.forecast, not given.uncorrected)
         for name, book in books.items():
             found[name].append(book)
-        title = f"{given.days} days from {start[:10]}, {given.houses} greenhouses"
+        title = f"{given.days} days from {start[:10]}, {given.greenhouses} greenhouses"
         result[start] = table(title, {name: [book] for name, book in books.items()}, given.days)
     result["all"] = table("all seasons", found, given.days)
     if given.json is not None:

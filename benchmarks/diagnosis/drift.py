@@ -157,12 +157,12 @@ def unchanged(jobs: Jobs) -> list[tuple[Reference, Case, Telemetry]]:
         references.append(one)
         print(f"{len(references)} of {len(own)} calibrated", file=sys.stderr, flush=True)
     by_season = [references[place : place + GREENHOUSES] for place in range(0, len(references), GREENHOUSES)]
-    cases = [null_cases(season, houses) for season, houses in zip(SEEDS, by_season, strict=True)]
+    cases = [null_cases(season, greenhouses) for season, greenhouses in zip(SEEDS, by_season, strict=True)]
     later = jobs.each(_later, list(zip(by_season, cases, strict=True)))
     return [
         (one, case, log)
-        for houses, asked, logs in zip(by_season, cases, later, strict=True)
-        for one, mine, seen in zip(houses, asked, logs, strict=True)
+        for greenhouses, asked, logs in zip(by_season, cases, later, strict=True)
+        for one, mine, seen in zip(greenhouses, asked, logs, strict=True)
         for case, log in zip(mine, seen, strict=True)
     ]
 

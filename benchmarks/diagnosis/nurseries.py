@@ -64,17 +64,17 @@ def nursery(season: str, count: int, first: int) -> Nursery:
 
 def calibration_logs(known: Nursery) -> list[tuple[Telemetry, Crop]]:
     """Simulate the weeks before, with nothing hidden: of every greenhouse the log, and the crop at its end."""
-    houses = known.greenhouses
-    start, count = known.start - np.timedelta64(REFERENCE_DAYS, "D"), len(houses)
+    greenhouses = known.greenhouses
+    start, count = known.start - np.timedelta64(REFERENCE_DAYS, "D"), len(greenhouses)
     seasons = simulate_many(
-        [one.plant for one in houses],
-        [one.weather(start, known.start, one.seed) for one in houses],
+        [one.plant for one in greenhouses],
+        [one.weather(start, known.start, one.seed) for one in greenhouses],
         recipe,
         start,
         known.start,
         count=count,
-        seed=houses[0].seed,
-        crop=_planted(houses),
+        seed=greenhouses[0].seed,
+        crop=_planted(greenhouses),
     )
     return [(one.measured, one.crop) for one in seasons]
 
@@ -126,8 +126,8 @@ def later(greenhouse: VirtualGreenhouse, case: Case) -> GreenhouseParameters:
     return replace(plant, cover_transmission=plant.cover_transmission * CLEANED)
 
 
-def _planted(houses: Sequence[VirtualGreenhouse]) -> Crop:
-    plants, like = stack([one.plant for one in houses]), np.zeros(len(houses))
-    young = np.arange(len(houses)) % 3 == 2
+def _planted(greenhouses: Sequence[VirtualGreenhouse]) -> Crop:
+    plants, like = stack([one.plant for one in greenhouses]), np.zeros(len(greenhouses))
+    young = np.arange(len(greenhouses)) % 3 == 2
     both = zip(young_crop(plants, like), mature_crop(plants, like), strict=True)
     return Crop(*(np.where(young, planted, grown) for planted, grown in both))

@@ -178,7 +178,7 @@ def compare_money(
     if not len(number):
         return {}
     expected, usual = (np.array([plans[day][key] for day in number]) for key in ("expected_profit", "recipe_profit"))
-    # Both houses were one until the first plan.
+    # Both greenhouses were one until the first plan.
     co2 = plans[number[0]]["co2_before"] - float(dosed(log)[number[0]])
     by_day = {day: seasons[since is not None and day >= since] for day in number.tolist()}
     plan, other = obtained(site, log, by_day, co2), obtained(site, recipe, by_day, co2)

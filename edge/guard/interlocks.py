@@ -201,7 +201,7 @@ DEFAULT_INTERLOCKS: tuple[Interlock, ...] = (
         },
         above=38.0,
         release=34.0,
-        why="lamps and pipes may not add to a house that is too hot",
+        why="lamps and pipes may not add to a greenhouse that is too hot",
     ),
     Interlock(
         "humidity",

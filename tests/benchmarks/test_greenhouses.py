@@ -7,7 +7,7 @@ import numpy as np
 from benchmarks.diagnosis.greenhouses import neighbours, of_seasons, others
 
 
-def test_houses_elsewhere_are_other_greenhouses_each_time_the_same() -> None:
+def test_greenhouses_elsewhere_are_other_greenhouses_each_time_the_same() -> None:
     greenhouses = others(4)
     assert list(greenhouses) == [greenhouse.site.name for greenhouse in greenhouses.values()]
     for first, second in zip(greenhouses.values(), others(4).values(), strict=True):
@@ -41,7 +41,7 @@ def test_the_seasons_share_one_greenhouse() -> None:
     assert len({winter.start, spring.start, autumn.start}) == 3
 
 
-def test_the_weather_of_a_house_has_the_sun_of_its_latitude() -> None:
+def test_the_weather_of_a_greenhouse_has_the_sun_of_its_latitude() -> None:
     start = np.datetime64("2020-12-01T00:00:00")
     end = start + np.timedelta64(7, "D")
     greenhouse = of_seasons()["winter"]

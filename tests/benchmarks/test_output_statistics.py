@@ -18,7 +18,7 @@ DAY = 288
 
 
 @pytest.fixture(scope="module")
-def house() -> tuple[Record, dict[str, np.ndarray]]:
+def greenhouse() -> tuple[Record, dict[str, np.ndarray]]:
     log = virtual_log(16, seed=11)
     record = site_record(log, SITE, 300.0)
     return record, setpoint_columns(log, record, SITE)[0]
@@ -39,8 +39,8 @@ def nothing_combined() -> dict[str, Combination]:
     return {"air_temperature": Combination(np.zeros(4), np.zeros(4), np.zeros(4))}
 
 
-def test_an_error_that_goes_with_the_weather_is_taken_off_on_days_not_seen(house) -> None:
-    record, setpoints = house
+def test_an_error_that_goes_with_the_weather_is_taken_off_on_days_not_seen(greenhouse) -> None:
+    record, setpoints = greenhouse
     predict = too_cold_in_the_sun(record)
     early = np.arange(DAY, 10 * DAY, 30)
     late = np.arange(11 * DAY, 14 * DAY, 30)
@@ -55,8 +55,8 @@ def test_an_error_that_goes_with_the_weather_is_taken_off_on_days_not_seen(house
     assert after < 0.5 * before
 
 
-def test_what_was_measured_after_the_start_does_not_change_a_forecast(house) -> None:
-    record, setpoints = house
+def test_what_was_measured_after_the_start_does_not_change_a_forecast(greenhouse) -> None:
+    record, setpoints = greenhouse
     predict = too_cold_in_the_sun(record)
     early = np.arange(DAY, 10 * DAY, 30)
     runs = all_runs(record, predict, predict, nothing_combined(), early, DAY)

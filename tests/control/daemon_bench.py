@@ -44,7 +44,7 @@ points:
 """
 
 SITE = """
-name: test-house
+name: test-greenhouse
 latitude: 52
 longitude: 4.5
 setpoints: [heating_setpoint, co2_setpoint]

@@ -146,7 +146,7 @@ async def test_an_override_reaches_the_plc_and_status_says_so(tmp_path, capsys):
     await plant.down()
     state = json.loads(capsys.readouterr().out)
     assert state["link_ok"] is True
-    assert next(iter(lines(state))).startswith("test-house: ")
+    assert next(iter(lines(state))).startswith("test-greenhouse: ")
 
 
 def test_status_without_a_daemon_says_so(tmp_path, capsys):
@@ -167,7 +167,7 @@ async def test_status_of_a_stopped_daemon_is_the_last_state_it_left(tmp_path, ca
     capsys.readouterr()
     code, out, err = call(capsys, "status", path)
     assert code == 0
-    assert out.startswith("test-house: ")
+    assert out.startswith("test-greenhouse: ")
     assert "the last state that it left" in err
 
 

@@ -552,7 +552,7 @@ def test_a_write_that_was_lost_behind_one_that_was_done_is_no_limit_of_the_devic
 
 
 async def test_what_stands_outside_the_limits_is_never_left_there_for_a_limit_of_the_device():
-    """Between what stood and what was written, as after a start of the PLC, and below what the house can bear."""
+    """Between what stood and what was written, as after a start of the PLC, and below what the greenhouse can bear."""
     bench = bench_of()
     await bench.run(3)
     bench.plc.values["heating_setpoint"] = 0.0

@@ -29,7 +29,7 @@ BUNDLE = ActiveBundle("b1", Path("/bundle"))
 
 @dataclass
 class FakePlanning:
-    site: Site = field(default_factory=lambda: Site(name="house", latitude=52.0, longitude=4.5))
+    site: Site = field(default_factory=lambda: Site(name="greenhouse", latitude=52.0, longitude=4.5))
     busy: bool = False
     health: str = ""
     requests: list[PlanRequest] = field(default_factory=list)

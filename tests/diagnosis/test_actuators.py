@@ -61,8 +61,8 @@ def test_nothing_is_looked_for_where_the_log_lacks_no_actuator(quiet_log: Log) -
 
 def test_a_log_lacks_only_what_the_site_has(quiet_log: Log) -> None:
     bare = quiet_log.without("grow_pipe_temperature", "lamp_power").telemetry
-    house = SITE.greenhouse
-    without = replace(SITE, greenhouse=replace(house, grow_pipe_heat_transfer=0.0, lamps=None))
+    greenhouse = SITE.greenhouse
+    without = replace(SITE, greenhouse=replace(greenhouse, grow_pipe_heat_transfer=0.0, lamps=None))
     assert {"grow_pipe_temperature", "lamp_power"} <= set(site_record(bare, SITE, 900.0).missing)
     assert not {"grow_pipe_temperature", "lamp_power"} & set(site_record(bare, without, 900.0).missing)
 

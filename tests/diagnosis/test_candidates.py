@@ -164,7 +164,7 @@ def test_a_model_that_runs_out_of_all_bounds_says_so(line: Linearisation) -> Non
         sensitivity.linearise(line.record, line.runs, line.parameters, absurd)
 
 
-def test_a_pipe_sensor_can_be_off_in_a_house_without_a_grow_pipe(record: Record) -> None:
+def test_a_pipe_sensor_can_be_off_in_a_greenhouse_without_a_grow_pipe(record: Record) -> None:
     offset = EFFECTS["pipe_temperature_offset"]
     one = replace(record, missing=(*record.missing, "grow_pipe_temperature"))
     none = replace(one, missing=(*one.missing, "rail_pipe_temperature"))

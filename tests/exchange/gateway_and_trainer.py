@@ -20,7 +20,7 @@ from igrow.trainer.service.collecting import Collected, collect
 DAY = 86_400
 START = 20_500 * DAY
 """2026-02-16, a midnight."""
-SITE = "house"
+SITE = "greenhouse"
 
 
 class World:

@@ -37,7 +37,7 @@ def store(tmp_path: Path):
 
 def service(tmp_path: Path, store: SqliteStore, **rules: float) -> ExchangeService:
     return ExchangeService(
-        str(tmp_path / "exchange"), tmp_path / "state", "house", store,
+        str(tmp_path / "exchange"), tmp_path / "state", "greenhouse", store,
         igrow_version="0.1.0", rules=TransferRules(**rules),  # type: ignore[arg-type]
     )  # fmt: skip
 
@@ -71,7 +71,7 @@ def test_a_day_that_is_over_is_sealed_and_sent_by_a_process_of_its_own(tmp_path:
     assert exchange.busy
     finish(exchange)
     assert exchange.health == ""
-    (path,) = (tmp_path / "exchange" / "house" / "segments").iterdir()
+    (path,) = (tmp_path / "exchange" / "greenhouse" / "segments").iterdir()
     name = SegmentName.parse(path.name)
     assert name is not None and name.number == 1
     tick(exchange, START + DAY + 310)
@@ -109,8 +109,8 @@ def test_what_a_clock_that_went_back_between_two_rounds_has_logged_arrives_too(
     assert exchange.health == ""
     assert exchange._seen is None
     archive = Archive(tmp_path / "archive")
-    collect(FolderPlace(tmp_path / "exchange"), "house", archive, datetime.fromtimestamp(START + 2 * DAY, UTC))
-    assert len(archive.read("house", date(2026, 2, 16), date(2026, 2, 17)).telemetry) == 24 + 10
+    collect(FolderPlace(tmp_path / "exchange"), "greenhouse", archive, datetime.fromtimestamp(START + 2 * DAY, UTC))
+    assert len(archive.read("greenhouse", date(2026, 2, 16), date(2026, 2, 17)).telemetry) == 24 + 10
     exchange.close()
 
 
@@ -119,8 +119,8 @@ def test_a_report_is_sent_with_the_log_that_belongs_to_it(tmp_path: Path, store:
     exchange.leave_report(START + DAY / 2, "a-adopted", {"verdict": "adopted"})
     tick(exchange, START + DAY / 2)
     finish(exchange)
-    assert len(list((tmp_path / "exchange" / "house" / "reports").iterdir())) == 1
-    assert len(list((tmp_path / "exchange" / "house" / "segments").iterdir())) == 1
+    assert len(list((tmp_path / "exchange" / "greenhouse" / "reports").iterdir())) == 1
+    assert len(list((tmp_path / "exchange" / "greenhouse" / "segments").iterdir())) == 1
     exchange.close()
 
 
@@ -129,7 +129,7 @@ def hang(tmp_path: Path) -> None:
     folder = tmp_path / "state" / "bundles" / "metadata"
     folder.mkdir(parents=True)
     os.mkfifo(folder / "timestamp.json")
-    source = tmp_path / "exchange" / "house" / "bundles" / "metadata"
+    source = tmp_path / "exchange" / "greenhouse" / "bundles" / "metadata"
     source.mkdir(parents=True)
     (source / "timestamp.json").write_text("{}")
 
@@ -139,7 +139,7 @@ def test_an_exchange_that_hangs_holds_neither_a_tick_nor_the_stop(tmp_path: Path
     exchange = service(tmp_path, store, deadline=PATIENCE)
     tick(exchange, START + DAY + 300)
     # What comes before the hang is done.
-    wait_until(lambda: list((tmp_path / "exchange" / "house").glob("segments/*.zip")))
+    wait_until(lambda: list((tmp_path / "exchange" / "greenhouse").glob("segments/*.zip")))
     for _ in range(20):
         tick(exchange, START + DAY + 300)
         assert exchange.busy
@@ -165,9 +165,9 @@ def test_a_stop_seals_what_there_is_of_the_day(
     exchange = service(tmp_path, store)
     tick(exchange, START + DAY / 2)
     finish(exchange)
-    assert not (tmp_path / "exchange" / "house").exists()
+    assert not (tmp_path / "exchange" / "greenhouse").exists()
     tick(exchange, START + DAY / 2 + 60)
     exchange.close()
     status = json.loads((tmp_path / "state" / "status.json").read_text())
     assert status["problem"] == ""
-    assert len(list((tmp_path / "exchange" / "house" / "segments").iterdir())) == 1
+    assert len(list((tmp_path / "exchange" / "greenhouse" / "segments").iterdir())) == 1

@@ -161,7 +161,7 @@ def run_sequence(folder: Path, seed: int, patch: pytest.MonkeyPatch) -> None:
                         second = Archive(folder / "second")
                         collect(place, world.site, second, datetime.fromtimestamp(now + 2 * DAY, UTC))
                     elif step == "renamed":
-                        world.site = f"house-{chance.random.randrange(100)}"
+                        world.site = f"greenhouse-{chance.random.randrange(100)}"
                     elif step in backups.sides:
                         backups.turn(step)
                     else:

@@ -36,7 +36,7 @@ def archive(tmp_path: Path) -> Archive:
     humidity = np.full(48, 80.5)
     humidity[3] = np.nan
     made.add_telemetry(
-        "house 1", Telemetry(time, {"air_temperature": np.linspace(18, 22, 48), "air_humidity": humidity})
+        "greenhouse 1", Telemetry(time, {"air_temperature": np.linspace(18, 22, 48), "air_humidity": humidity})
     )
     return made
 
@@ -70,14 +70,13 @@ def ask(server: str, query: str) -> dict:
 
 def test_influxdb_holds_each_value_once(archive: Archive, influx: str) -> None:
     target = f"{influx}/write?db=igrow"
-    assert forward(archive, "house 1", target, TODAY) == (2, 95)
-    assert forward(archive, "house 1", target, TODAY) == (0, 0), "unchanged days are left out"
+    assert forward(archive, "greenhouse 1", target, TODAY) == (2, 95)
+    assert forward(archive, "greenhouse 1", target, TODAY) == (0, 0), "unchanged days are left out"
     shutil.rmtree(archive.root / "ledger")
     (archive.root / "ledger").mkdir()
-    forward(archive, "house 1", target, TODAY)
-    query = (
-        "SELECT count(air_temperature), count(air_humidity), max(air_temperature) FROM greenhouse WHERE site='house 1'"
-    )
+    forward(archive, "greenhouse 1", target, TODAY)
+    counted = "count(air_temperature), count(air_humidity), max(air_temperature)"
+    query = f"SELECT {counted} FROM greenhouse WHERE site='greenhouse 1'"
     (row,) = ask(influx, query)["results"][0]["series"][0]["values"]
     assert row[1:3] == [48, 47]
     assert row[3] == pytest.approx(22.0)
@@ -85,19 +84,19 @@ def test_influxdb_holds_each_value_once(archive: Archive, influx: str) -> None:
 
 def test_a_day_that_changes_is_written_again(archive: Archive, influx: str) -> None:
     target = f"{influx}/write?db=igrow"
-    forward(archive, "house 1", target, TODAY)
+    forward(archive, "greenhouse 1", target, TODAY)
     late = Telemetry(np.array([START + 90], dtype="datetime64[s]"), {"air_temperature": np.array([30.0])})
-    archive.add_telemetry("house 1", late)
-    assert forward(archive, "house 1", target, TODAY)[0] == 1
+    archive.add_telemetry("greenhouse 1", late)
+    assert forward(archive, "greenhouse 1", target, TODAY)[0] == 1
 
 
 def test_a_database_that_is_not_there_or_refuses_is_one_sentence(archive: Archive, influx: str, tmp_path: Path) -> None:
     with pytest.raises(IgrowError, match="refused with 404"):
-        forward(archive, "house 1", f"{influx}/write?db=none", TODAY)
+        forward(archive, "greenhouse 1", f"{influx}/write?db=none", TODAY)
     with pytest.raises(IgrowError, match="refused"):
-        forward(archive, "house 1", f"http://127.0.0.1:{free_port()}/write?db=x", TODAY)
+        forward(archive, "greenhouse 1", f"http://127.0.0.1:{free_port()}/write?db=x", TODAY)
     with pytest.raises(IgrowError, match="is right"):
-        forward(archive, "house 1", str(tmp_path / "x.csv"), TODAY)
+        forward(archive, "greenhouse 1", str(tmp_path / "x.csv"), TODAY)
 
 
 def as_postgres() -> dict[str, object]:
@@ -152,12 +151,12 @@ def connected(target: str):
 
 def test_postgresql_holds_each_value_once(archive: Archive, postgresql: str, tmp_path: Path) -> None:
     connected(postgresql).close()
-    assert forward(archive, "house 1", postgresql, TODAY) == (2, 95)
+    assert forward(archive, "greenhouse 1", postgresql, TODAY) == (2, 95)
     shutil.rmtree(archive.root / "ledger")
     (archive.root / "ledger").mkdir()
-    forward(archive, "house 1", postgresql, TODAY)
+    forward(archive, "greenhouse 1", postgresql, TODAY)
     script = tmp_path / "log.sql"
-    forward(archive, "house 1", str(script), TODAY)
+    forward(archive, "greenhouse 1", str(script), TODAY)
     with connected(postgresql) as connection:
         connection.execute(script.read_text())
         rows = connection.execute(

@@ -138,7 +138,7 @@ def test_a_site_reads_no_segment_that_another_has_sealed(world: World, tmp_path:
     world.run_days(0, 1)
     shutil.copytree(tmp_path / "exchange" / SITE, tmp_path / "exchange" / "other")
     done = collect(world.place, "other", world.archive, datetime(2026, 6, 1, tzinfo=UTC))
-    assert "sealed by site house" in done.notes[0]
+    assert "sealed by site greenhouse" in done.notes[0]
     assert len(list((tmp_path / "archive" / "refused" / "other").iterdir())) == 1
 
 

@@ -130,7 +130,7 @@ def test_a_renamed_site_sends_its_whole_log_under_the_new_name(world: World, *, 
     if not waiting:
         world.collect(START + 2 * DAY)
         world.round(START + 2 * DAY + 900)
-    world.site = "house-north"
+    world.site = "greenhouse-north"
     assert go_on(world, 2) == []
     world.assert_complete()
     assert world.waiting() == []
@@ -143,7 +143,7 @@ def test_a_renaming_that_was_cut_off_in_the_middle_loses_nothing(
 
     world.run_days(0, 3)
     (tmp_path / "store" / "telemetry.db").rename(tmp_path / "worn.db")  # only the outbox has these days
-    world.site, seal, left = "house-north", Outbox.seal, [1]
+    world.site, seal, left = "greenhouse-north", Outbox.seal, [1]
 
     def seal_one(*arguments: object, **named: object) -> object:
         if not left:

@@ -20,7 +20,7 @@ from igrow.trainer.service import history
 from tests.fleet.fleet_of_sites import DAY, START, leave_day, make_fleet
 from tests.made_once import made_once
 
-NAMES = [f"house-{number:02}" for number in range(50)]
+NAMES = [f"greenhouse-{number:02}" for number in range(50)]
 OF_SECONDS = 4_000_000
 
 
@@ -89,26 +89,26 @@ def cut_history(fleet: Path, name: str) -> None:
 
 
 BROKEN: dict[str, tuple[Callable[[Path, str], None], str]] = {
-    "house-01": (silent, "nothing was ever collected: does its gateway run"),
-    "house-02": (
-        lambda fleet, name: write_site(fleet, name, b"name: house-02\nlatitude: 52.x\n"),
-        "house-02.yaml:2:11",
+    "greenhouse-01": (silent, "nothing was ever collected: does its gateway run"),
+    "greenhouse-02": (
+        lambda fleet, name: write_site(fleet, name, b"name: greenhouse-02\nlatitude: 52.x\n"),
+        "greenhouse-02.yaml:2:11",
     ),
-    "house-03": (
-        lambda fleet, name: write_site(fleet, name, b"name: house-03\nlatitud: 52\n"),
+    "greenhouse-03": (
+        lambda fleet, name: write_site(fleet, name, b"name: greenhouse-03\nlatitud: 52\n"),
         "did you mean latitude",
     ),
-    "house-04": (lambda fleet, name: write_site(fleet, name, b"[" * 5000), "nested too deeply"),
-    "house-05": (lambda fleet, name: write_site(fleet, name, b"name: \xff\n"), "is not UTF-8 text"),
-    "house-06": (no_room, "site=house-06/month=2026-02: Not a directory"),
-    "house-07": (no_history, "its files cannot be shown"),
-    "house-08": (
+    "greenhouse-04": (lambda fleet, name: write_site(fleet, name, b"[" * 5000), "nested too deeply"),
+    "greenhouse-05": (lambda fleet, name: write_site(fleet, name, b"name: \xff\n"), "is not UTF-8 text"),
+    "greenhouse-06": (no_room, "site=greenhouse-06/month=2026-02: Not a directory"),
+    "greenhouse-07": (no_history, "its files cannot be shown"),
+    "greenhouse-08": (
         too_large,
         "collect failed: it needs more memory than its limit of 1000 MB (tried again at the next run)",
     ),
-    "house-09": (odd_report, ""),
-    "house-10": (odd_diagnosis, "its files cannot be shown"),
-    "house-11": (cut_history, "recalibrate failed: as it was (tried again at the next run)"),
+    "greenhouse-09": (odd_report, ""),
+    "greenhouse-10": (odd_diagnosis, "its files cannot be shown"),
+    "greenhouse-11": (cut_history, "recalibrate failed: as it was (tried again at the next run)"),
 }
 
 
@@ -119,7 +119,7 @@ def collected_and_shown() -> dict[str, str]:
         folder = Path(temporary)
         fleet = make_fleet(
             folder, NAMES, limits="{memory: 1000, retries: 0}", known_hosts="nowhere",
-            sites="{house-12: {exchange: sftp://trainer@127.0.0.1:1/srv}, house-99: {paused: true}}",
+            sites="{greenhouse-12: {exchange: sftp://trainer@127.0.0.1:1/srv}, greenhouse-99: {paused: true}}",
         )  # fmt: skip
         for name in NAMES:
             leave_day(folder / "exchange", name, 1, step=3600)
@@ -137,7 +137,7 @@ def page() -> dict[str, str]:
 
 
 def test_every_site_has_its_row_and_those_that_are_well_have_their_data(page: dict[str, str]) -> None:
-    assert sorted(page) == [*NAMES, "house-99"]
+    assert sorted(page) == [*NAMES, "greenhouse-99"]
     for name in NAMES[13:]:
         assert "2026-02-16 23:00" in page[name]
 
@@ -148,12 +148,20 @@ def test_the_page_says_what_is_wrong_with_a_site(page: dict[str, str], name: str
 
 
 def test_an_exchange_whose_key_is_not_pinned_and_options_without_a_site_are_named(page: dict[str, str]) -> None:
-    assert "no such file; it must hold the key of 127.0.0.1" in page["house-12"]
-    assert "no site house-99" in page["house-99"]
+    assert "no such file; it must hold the key of 127.0.0.1" in page["greenhouse-12"]
+    assert "no site greenhouse-99" in page["greenhouse-99"]
 
 
 def test_who_needs_attention_most_comes_first(page: dict[str, str]) -> None:
     order = list(page)
-    assert set(order[:7]) == {"house-02", "house-03", "house-04", "house-05", "house-07", "house-10", "house-99"}
-    assert set(order[7:11]) == {"house-06", "house-08", "house-11", "house-12"}
-    assert order.index("house-01") > order.index("house-13"), "silent for long comes before never heard of"
+    assert set(order[:7]) == {
+        "greenhouse-02",
+        "greenhouse-03",
+        "greenhouse-04",
+        "greenhouse-05",
+        "greenhouse-07",
+        "greenhouse-10",
+        "greenhouse-99",
+    }
+    assert set(order[7:11]) == {"greenhouse-06", "greenhouse-08", "greenhouse-11", "greenhouse-12"}
+    assert order.index("greenhouse-01") > order.index("greenhouse-13"), "silent for long comes before never heard of"

@@ -14,13 +14,13 @@ from tests.fleet.fleet_of_sites import leave_day, make_fleet
 
 
 def test_fifty_sites_come_to_one_page_in_two_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    names = [f"house-{number:02}" for number in range(50)]
+    names = [f"greenhouse-{number:02}" for number in range(50)]
     fleet = make_fleet(tmp_path, names)
     for name in names[:-1]:
         previous = ""
         for number in (1, 2):
             previous = leave_day(tmp_path / "exchange", name, number, previous, step=3600)
-    (tmp_path / "exchange" / "house-07" / "segments").joinpath(f"{'d' * 12}-00000001-{'0' * 64}.zip").write_bytes(
+    (tmp_path / "exchange" / "greenhouse-07" / "segments").joinpath(f"{'d' * 12}-00000001-{'0' * 64}.zip").write_bytes(
         b"cut off"
     )
 
@@ -32,7 +32,7 @@ def test_fifty_sites_come_to_one_page_in_two_commands(tmp_path: Path, capsys: py
     assert "<h1>50 greenhouses</h1>" in page
     assert "http" not in page.replace("http-equiv", "")
     output = capsys.readouterr().out
-    assert "house-49  never" in output
+    assert "greenhouse-49  never" in output
     assert "the gateway sends it again" in page
 
 

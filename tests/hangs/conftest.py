@@ -83,5 +83,5 @@ class Bench:
 @pytest.fixture
 def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
     monkeypatch.setattr(daemon_module, "CLOSE_SECONDS", 8.0)
-    write_tiny_bundle(tmp_path / "first", site="test-house")
+    write_tiny_bundle(tmp_path / "first", site="test-greenhouse")
     return Bench(tmp_path)

@@ -167,7 +167,7 @@ async def test_a_bundle_on_a_disk_that_hangs(bench: Bench, disk) -> None:
 
 
 async def test_a_bundle_whose_self_test_never_ends(bench: Bench) -> None:
-    write_tiny_bundle(bench.folder / "endless", site="test-house", graph=endless_graph())
+    write_tiny_bundle(bench.folder / "endless", site="test-greenhouse", graph=endless_graph())
     bench.configuration.write_text(bench.configuration.read_text().replace("bundle: first", "bundle: endless"))
     async with bench.running() as daemon:
         await bench.controls()

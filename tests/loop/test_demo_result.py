@@ -25,7 +25,7 @@ def result():
 
 
 def log(co2: float = 0.002) -> Telemetry:
-    """Return a house that is all the same but grows more each day."""
+    """Return a greenhouse that is all the same but grows more each day."""
     rows = DAYS * 288
     steady = {
         "air_temperature": 20.0, "air_humidity": 75.0, "air_co2": 700.0, "leaf_area_index": 3.0, "lamp_power": 0.0,

@@ -17,7 +17,7 @@ from tests.patience import PATIENCE
 from tests.service.running_daemon import COMMAND, ROOT
 
 CONNECT, PUBLISH, SUBSCRIBE = 0x10, 0x30, 0x80
-AT = b"igrow/test-house/set/"
+AT = b"igrow/test-greenhouse/set/"
 
 
 def publish(topic: bytes, payload: bytes) -> bytes:

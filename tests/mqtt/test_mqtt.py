@@ -165,10 +165,10 @@ async def test_a_real_broker_gets_state_discovery_and_the_last_will(tmp_path):
             await client.subscribe("homeassistant/#")
             async with bridging(configuration, lambda: STATE):
                 assert "unique_id" in await first(
-                    client, "homeassistant/sensor/igrow_test-house/air_temperature/config"
+                    client, "homeassistant/sensor/igrow_test-greenhouse/air_temperature/config"
                 )
-                assert json.loads(await first(client, "igrow/test-house/state"))["source"] == "recipe"
-                assert await first(client, "igrow/test-house/available") == "online"
+                assert json.loads(await first(client, "igrow/test-greenhouse/state"))["source"] == "recipe"
+                assert await first(client, "igrow/test-greenhouse/available") == "online"
 
 
 async def test_a_daemon_that_does_not_answer_shows_as_offline(tmp_path):
@@ -178,18 +178,18 @@ async def test_a_daemon_that_does_not_answer_shows_as_offline(tmp_path):
     async with broker(tmp_path) as port, aiomqtt.Client("127.0.0.1", port) as client:
         await client.subscribe("igrow/#")
         async with bridging(configured(tmp_path, port), silent):
-            assert await first(client, "igrow/test-house/available") == "offline"
+            assert await first(client, "igrow/test-greenhouse/available") == "offline"
 
 
 async def test_an_override_by_message_takes_effect_and_one_that_was_retained_does_not(tmp_path):
     async with broker(tmp_path) as port:
         configuration = configured(tmp_path, port, permit=True)
         async with aiomqtt.Client("127.0.0.1", port) as client:
-            await client.publish("igrow/test-house/set/heating_setpoint", "25", retain=True)
+            await client.publish("igrow/test-greenhouse/set/heating_setpoint", "25", retain=True)
             await client.subscribe("igrow/#")
             async with bridging(configuration, lambda: STATE):
-                await first(client, "igrow/test-house/state")
-                await client.publish("igrow/test-house/set/co2_setpoint", "600")
+                await first(client, "igrow/test-greenhouse/state")
+                await client.publish("igrow/test-greenhouse/set/co2_setpoint", "600")
                 await until(lambda: leases(configuration))
         assert {name: lease.value for name, lease in leases(configuration).items()} == {"co2_setpoint": 600.0}
 
@@ -210,7 +210,7 @@ async def test_a_broker_that_comes_up_later_is_found(tmp_path, monkeypatch):
                     with contextlib.suppress(aiomqtt.MqttError):
                         async with aiomqtt.Client("127.0.0.1", port) as client:
                             await client.subscribe("igrow/#")
-                            assert await first(client, "igrow/test-house/available") == "online"
+                            assert await first(client, "igrow/test-greenhouse/available") == "online"
                             break
                     await asyncio.sleep(0.1)
         finally:

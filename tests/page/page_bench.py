@@ -57,8 +57,8 @@ def found_in(pattern: str, text: str) -> str:
     return found[1]
 
 
-def write_house(folder: Path, daemon: str = "", site: str = "") -> Path:
-    """Write the files of a house; returns the daemon's."""
+def write_greenhouse(folder: Path, daemon: str = "", site: str = "") -> Path:
+    """Write the files of a greenhouse; returns the daemon's."""
     (folder / "state").mkdir(parents=True, exist_ok=True)
     (folder / "site.yaml").write_text(SITE + site)
     path = folder / "daemon.yaml"
@@ -223,7 +223,7 @@ class Told:
 
 
 def pages_of(path: Path, told: Told) -> Pages:
-    """The pages of a house whose daemon is played; each look asks it."""
+    """The pages of a greenhouse whose daemon is played; each look asks it."""
     clock = iter(range(10**9))
     return Pages(path, Daemon(0, path.parent / "none", late_after=1e9, ask=told, monotonic=lambda: 10.0 * next(clock)))
 

@@ -39,8 +39,8 @@ class Browser:
 
 
 @pytest.fixture
-def house(tmp_path):
-    """The files of a house in New Zealand, 13 h ahead of UTC in its summer."""
+def greenhouse(tmp_path):
+    """The files of a greenhouse in New Zealand, 13 h ahead of UTC in its summer."""
     port = free_port()
     path = write_files(tmp_path, port)
     site = tmp_path / "site.yaml"
@@ -48,8 +48,8 @@ def house(tmp_path):
     return path, port
 
 
-async def test_the_growers_word_reaches_the_plc_and_the_ledger_with_his_name(house, tmp_path):
-    path, port = house
+async def test_the_growers_word_reaches_the_plc_and_the_ledger_with_his_name(greenhouse, tmp_path):
+    path, port = greenhouse
     plant = Plant(tmp_path, port, start="2026-03-01T00:00:00")
     await plant.up()
 
@@ -88,8 +88,8 @@ async def test_the_growers_word_reaches_the_plc_and_the_ledger_with_his_name(hou
     await plant.down()
 
 
-async def test_a_daemon_that_stops_is_not_taken_for_one_that_runs(house, tmp_path):
-    path, port = house
+async def test_a_daemon_that_stops_is_not_taken_for_one_that_runs(greenhouse, tmp_path):
+    path, port = greenhouse
     plant = Plant(tmp_path, port)
     await plant.up()
     async with running(path) as daemon:

@@ -30,7 +30,7 @@ from tests.page.page_bench import (
     pages_of,
     served,
     state,
-    write_house,
+    write_greenhouse,
 )
 
 LOOKS = [(width, scheme) for width in (390, 1280) for scheme in ("light", "dark")]
@@ -41,7 +41,7 @@ SECONDS = 20_000
 """Longest wait for anything, in milliseconds: this machine may be busy."""
 
 
-class House:
+class Greenhouse:
     """A served page with its daemon."""
 
     def __init__(self, folder: Path, told: Told, port: int) -> None:
@@ -53,13 +53,13 @@ class House:
 
 
 @pytest.fixture(scope="module")
-def house(tmp_path_factory) -> Iterator[House]:
-    folder, told = tmp_path_factory.mktemp("house"), Told()
-    path = write_house(folder, TESTS)
+def greenhouse(tmp_path_factory) -> Iterator[Greenhouse]:
+    folder, told = tmp_path_factory.mktemp("greenhouse"), Told()
+    path = write_greenhouse(folder, TESTS)
     fill_log(folder)
     write_password(folder / "state", hashed(PASSWORD))
     with served(pages_of(path, told)) as server:
-        yield House(folder, told, server.port)
+        yield Greenhouse(folder, told, server.port)
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +74,7 @@ def browser():
 
 
 @pytest.fixture
-def visit(browser, house):
+def visit(browser, greenhouse):
     """Opens pages in a context of the asked look; at the end nothing may have gone wrong in any of them."""
     contexts, wrong = [], []
 
@@ -85,17 +85,19 @@ def visit(browser, house):
         page = context.new_page()
         page.on("console", lambda said: wrong.append(said.text) if said.type == "error" else None)
         page.on("pageerror", lambda error: wrong.append(str(error)))
-        page.on("request", lambda request: None if request.url.startswith(house.url) else wrong.append(request.url))
-        page.goto(house.url)
+        page.on(
+            "request", lambda request: None if request.url.startswith(greenhouse.url) else wrong.append(request.url)
+        )
+        page.goto(greenhouse.url)
         return page
 
-    house.told.said, house.told.silent, house.refusing = state(), False, False
+    greenhouse.told.said, greenhouse.told.silent, greenhouse.refusing = state(), False, False
     for written in (override_file, approval_file):
-        written(house.folder / "state").unlink(missing_ok=True)
+        written(greenhouse.folder / "state").unlink(missing_ok=True)
     yield open_page
     for context in contexts:
         context.close()
-    assert [text for text in wrong if "status of 503" not in text or not house.refusing] == []
+    assert [text for text in wrong if "status of 503" not in text or not greenhouse.refusing] == []
 
 
 def sign_in(page, who: str = "Anna") -> None:
@@ -138,7 +140,9 @@ def top(page, height: int) -> bytes:
 
 
 @pytest.mark.parametrize(("width", "scheme"), LOOKS)
-def test_every_state_of_the_page_passes_the_rules_of_accessibility_and_fits_its_screen(visit, house, width, scheme):
+def test_every_state_of_the_page_passes_the_rules_of_accessibility_and_fits_its_screen(
+    visit, greenhouse, width, scheme
+):
     page = visit(width, scheme)
     unfold(page)
     assert violations(page) == []
@@ -150,7 +154,7 @@ def test_every_state_of_the_page_passes_the_rules_of_accessibility_and_fits_its_
     assert violations(page) == []
     page.go_back()
     sign_in(page)
-    house.told.said = state(
+    greenhouse.told.said = state(
         link_ok=False,
         alarms=[
             alarm("link", "no point of the PLC can be read: check cable, address and power", "critical"),
@@ -160,7 +164,7 @@ def test_every_state_of_the_page_passes_the_rules_of_accessibility_and_fits_its_
         problems=["the disk is full"],
         plan=None,
     )
-    page.goto(house.url)
+    page.goto(greenhouse.url)
     page.locator("#change-heating_setpoint summary").click()
     page.locator("#change-recipe summary").click()
     assert violations(page) == []
@@ -179,7 +183,7 @@ def test_a_telephone_shows_the_page_in_each_language(visit, code):
     assert page.locator("#money .scroll").evaluate("(one) => one.scrollWidth <= one.clientWidth")
 
 
-def test_a_setpoint_is_taken_and_given_back_by_keyboard_alone(visit, house):
+def test_a_setpoint_is_taken_and_given_back_by_keyboard_alone(visit, greenhouse):
     page = visit()
     page.keyboard.press("Tab")
     assert page.evaluate("document.activeElement.className") == "skip"
@@ -190,22 +194,22 @@ def test_a_setpoint_is_taken_and_given_back_by_keyboard_alone(visit, house):
     page.keyboard.type("18.5")
     page.keyboard.press("Enter")
     page.get_by_text("Heating setpoint: 18.5 °C by hand for 2 h").wait_for()
-    lease = read_leases(override_file(house.folder / "state"))["heating_setpoint"]
+    lease = read_leases(override_file(greenhouse.folder / "state"))["heating_setpoint"]
     assert (lease.value, lease.seconds, lease.by) == (18.5, 7200.0, "Anna (page)")
     page.get_by_role("button", name="Give back").focus()
     page.keyboard.press("Enter")
     page.get_by_text("Heating setpoint is given back").wait_for()
-    assert read_leases(override_file(house.folder / "state")) == {}
+    assert read_leases(override_file(greenhouse.folder / "state")) == {}
 
 
-def test_all_works_without_scripts(visit, house):
+def test_all_works_without_scripts(visit, greenhouse):
     page = visit(390, java_script_enabled=False)
     assert page.locator("#courses .narrow svg.chart").count() >= 6
     sign_in(page)
     page.locator("#change-recipe summary").click()
     page.get_by_role("button", name="My recipe decides").click()
     page.get_by_text("Your recipe decides for 2 h").wait_for()
-    assert read_leases(override_file(house.folder / "state"))["recipe"].by == "Anna (page)"
+    assert read_leases(override_file(greenhouse.folder / "state"))["recipe"].by == "Anna (page)"
     page.get_by_role("button", name="Let plans decide again").click()
     page.get_by_text("Plans decide again").wait_for()
     page.get_by_role("button", name="I know").click()
@@ -213,8 +217,8 @@ def test_all_works_without_scripts(visit, house):
 
 
 @pytest.mark.parametrize("width", [390, 1280])
-def test_a_separating_test_is_approved_and_withdrawn(visit, house, width):
-    house.told.said["bundle"]["confounded"] = [CONFOUNDED]
+def test_a_separating_test_is_approved_and_withdrawn(visit, greenhouse, width):
+    greenhouse.told.said["bundle"]["confounded"] = [CONFOUNDED]
     page = visit(width)
     sign_in(page)
     assert violations(page) == []
@@ -223,7 +227,7 @@ def test_a_separating_test_is_approved_and_withdrawn(visit, house, width):
     page.get_by_text("Approved by Anna (page).").wait_for()
     assert violations(page) == []
     assert fits(page)
-    path = approval_file(house.folder / "state")
+    path = approval_file(greenhouse.folder / "state")
     approval = read_approval(path)
     assert approval is not None
     assert (approval.test, approval.by, approval.is_over) == ("vent_square_wave", "Anna (page)", False)
@@ -234,7 +238,7 @@ def test_a_separating_test_is_approved_and_withdrawn(visit, house, width):
     assert ended.is_over
 
 
-def test_the_page_renews_itself_and_leaves_a_form_in_use_alone(visit, house):
+def test_the_page_renews_itself_and_leaves_a_form_in_use_alone(visit, greenhouse):
     page = visit()
     sign_in(page)
     page.clock.install()
@@ -244,18 +248,18 @@ def test_the_page_renews_itself_and_leaves_a_form_in_use_alone(visit, house):
     said = state()
     said["values"]["air_temperature"]["value"] = 23.7
     said["setpoints"]["co2_setpoint"]["shown"] = 555.0
-    house.told.said = said
+    greenhouse.told.said = said
     page.clock.fast_forward(16_000)
     page.get_by_text("23.7").first.wait_for()
     assert page.get_by_label("CO₂ setpoint, 400 to 1,000 ppm").input_value() == "640"
     assert not page.locator("#stale").is_visible()
 
 
-def test_a_page_that_cannot_be_renewed_says_so(visit, house):
+def test_a_page_that_cannot_be_renewed_says_so(visit, greenhouse):
     page = visit()
     page.clock.install()
     page.reload()
-    house.refusing = True
+    greenhouse.refusing = True
     page.route("**/*", lambda route: route.fulfill(status=503, body="no"))
     with page.expect_response(lambda response: response.status == 503):
         page.clock.fast_forward(16_000)
@@ -265,8 +269,8 @@ def test_a_page_that_cannot_be_renewed_says_so(visit, house):
     page.locator("#stale").wait_for(state="hidden")
 
 
-def test_a_daemon_that_is_gone_makes_the_headline_red(visit, house):
-    house.told.silent = True
+def test_a_daemon_that_is_gone_makes_the_headline_red(visit, greenhouse):
+    greenhouse.told.silent = True
     page = visit(390, "dark")
     assert "bad" in page.locator("#lead").get_attribute("class").split()
     assert "The controller is not heard" in page.title()

@@ -27,7 +27,7 @@ from igrow.edge.separating_tests import Approval
 from igrow.edge.sources.override import Lease, read_leases
 from igrow.edge.updates.worsening import Worsening, worsening_sentence
 from tests.language.catalogues import catalogue
-from tests.page.page_bench import CONFOUNDED, NOW, TESTS, alarm, clamp, plan, state, write_house
+from tests.page.page_bench import CONFOUNDED, NOW, TESTS, alarm, clamp, plan, state, write_greenhouse
 
 OTHERS = LANGUAGES[1:]
 ENGLISH_WORDS = re.compile(
@@ -95,7 +95,7 @@ def everything() -> dict[str, Any]:
 
 def shown(folder: Path, code: str, heard: Heard, site: str = "", ended: str = "") -> str:
     """What people read of the page, and what is read to them."""
-    configuration = load_configuration(write_house(folder, TESTS, site))
+    configuration = load_configuration(write_greenhouse(folder, TESTS, site))
     times = np.arange(NOW - 86_400.0, NOW, 300.0)
     names = (*CLIMATE, *SETPOINTS, *ACTUATORS, *WEATHER)
     courses = {name: Course(times, *[np.linspace(14.0, 30.0, len(times))] * 3) for name in names}
@@ -191,7 +191,7 @@ def test_an_american_site_is_told_in_its_units_and_asks_in_them(tmp_path: Path) 
 
 
 def test_what_is_typed_in_is_in_the_unit_that_is_shown(tmp_path: Path) -> None:
-    configuration = load_configuration(write_house(tmp_path, site=AMERICAN))
+    configuration = load_configuration(write_greenhouse(tmp_path, site=AMERICAN))
     actions = Actions(configuration, (), Words.of(configuration.site, "en"))
     form = {"do": "override", "setpoint": "heating_setpoint", "value": "68", "hours": "2"}
     assert (

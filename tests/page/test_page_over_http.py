@@ -20,7 +20,7 @@ from igrow.edge.page import server as page_server
 from igrow.edge.page.password import hashed, remove_password, write_password
 from igrow.edge.page.server import PageServer
 from igrow.edge.sources.override import read_leases
-from tests.page.page_bench import PASSWORD, Told, alarm, found_in, pages_of, state, write_house
+from tests.page.page_bench import PASSWORD, Told, alarm, found_in, pages_of, state, write_greenhouse
 from tests.patience import PATIENCE
 
 HASHED = hashed(PASSWORD)
@@ -88,7 +88,7 @@ class Visitor:
 @pytest.fixture
 async def visitor(tmp_path):
     told = Told()
-    path = write_house(tmp_path)
+    path = write_greenhouse(tmp_path)
     write_password(tmp_path / "state", HASHED)
     server = PageServer(pages_of(path, told))
     await server.start("127.0.0.1", 0)
@@ -192,7 +192,7 @@ async def test_what_the_daemon_says_cannot_become_markup(visitor: Visitor):
     ],
 )  # fmt: skip
 async def test_a_name_that_points_here_from_elsewhere_is_not_served(tmp_path, host: str, status: int):
-    server = PageServer(pages_of(write_house(tmp_path, "page: {names: [greenhouse.local]}"), Told()))
+    server = PageServer(pages_of(write_greenhouse(tmp_path, "page: {names: [greenhouse.local]}"), Told()))
     await server.start("127.0.0.1", 0)
     visitor = Visitor(tmp_path, Told(), server)
     assert (await visitor.send(f"GET /sign-in HTTP/1.1\r\n{host}\r\n\r\n".encode())).status == status
@@ -237,7 +237,7 @@ async def test_a_guessed_or_an_ended_session_is_none(visitor: Visitor):
 
 async def test_pages_of_two_compartments_on_one_machine_keep_their_visitors_apart(visitor: Visitor, tmp_path):
     await visitor.sign_in()
-    other = write_house(tmp_path / "other")
+    other = write_greenhouse(tmp_path / "other")
     (tmp_path / "other" / "site.yaml").write_text((tmp_path / "site.yaml").read_text().replace("name: ", "name: b-"))
     write_password(tmp_path / "other" / "state", HASHED)
     server = PageServer(pages_of(other, Told()))

@@ -16,7 +16,7 @@ from igrow.edge.cli import main
 from igrow.edge.configuration import load_configuration
 from igrow.edge.page.password import PASSWORD_FILE, hashed, read_password, remove_password, write_password
 from igrow.edge.page.sessions import ALL_TRIES, MOST_ADDRESSES, MOST_SESSIONS, TRIES, TRY_SECONDS, Sessions, Tries
-from tests.page.page_bench import PASSWORD, fill_log, write_house
+from tests.page.page_bench import PASSWORD, fill_log, write_greenhouse
 
 
 def test_only_a_hash_is_kept_and_only_its_owner_reads_it(tmp_path):
@@ -48,7 +48,7 @@ def test_a_file_that_makes_no_sense_is_no_password(tmp_path, content):
 
 
 def test_the_command_sets_and_removes_it(tmp_path, capsys, monkeypatch):
-    path = write_house(tmp_path)
+    path = write_greenhouse(tmp_path)
     monkeypatch.setattr("sys.stdin", io.StringIO(PASSWORD + "\n"))
     assert main(["password", str(path)]) == 0
     kept = read_password(tmp_path / "state")
@@ -62,7 +62,7 @@ def test_the_command_sets_and_removes_it(tmp_path, capsys, monkeypatch):
 
 
 def test_a_password_before_the_first_start_leaves_no_folder(tmp_path, capsys, monkeypatch):
-    path = write_house(tmp_path)
+    path = write_greenhouse(tmp_path)
     (tmp_path / "state").rmdir()
     monkeypatch.setattr("sys.stdin", io.StringIO(PASSWORD + "\n"))
     assert main(["password", str(path)]) == 2
@@ -71,7 +71,7 @@ def test_a_password_before_the_first_start_leaves_no_folder(tmp_path, capsys, mo
 
 
 def test_no_backup_holds_it(tmp_path):
-    configuration = load_configuration(write_house(tmp_path))
+    configuration = load_configuration(write_greenhouse(tmp_path))
     fill_log(tmp_path, days=0.1)
     write_password(tmp_path / "state", hashed(PASSWORD))
     (tmp_path / "state" / "override.json").write_text("{}")

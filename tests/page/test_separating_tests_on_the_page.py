@@ -16,7 +16,7 @@ from igrow.edge.page.server import PageServer
 from igrow.edge.separating_tests import Approval, approval_file, read_approval
 from igrow.edge.separating_tests.approval import to_plain
 from igrow.edge.state_file import write_state
-from tests.page.page_bench import CONFOUNDED, TESTS, Told, pages_of, state, write_house
+from tests.page.page_bench import CONFOUNDED, TESTS, Told, pages_of, state, write_greenhouse
 from tests.page.test_page_over_http import HASHED, Answer, Visitor
 
 TEST = "vent_square_wave"
@@ -51,7 +51,7 @@ class Grower(Visitor):
 
 async def started(folder: Path, daemon: str) -> Grower:
     told = Told(asking())
-    path = write_house(folder, daemon)
+    path = write_greenhouse(folder, daemon)
     write_password(folder / "state", HASHED)
     server = PageServer(pages_of(path, told))
     await server.start("127.0.0.1", 0)

@@ -25,7 +25,7 @@ from igrow.edge.page.view import Known, as_log, compose
 from igrow.edge.page.words import Words
 from igrow.edge.sources.override import Lease
 from igrow.edge.sources.recipe import Recipe, recipe_course
-from tests.page.page_bench import NOW, alarm, amount, change, clamp, plan, state, write_house
+from tests.page.page_bench import NOW, alarm, amount, change, clamp, plan, state, write_greenhouse
 
 ZONE = ZoneInfo("Europe/Amsterdam")
 SAY = Words(ENGLISH, ZONE)
@@ -33,7 +33,7 @@ SAY = Words(ENGLISH, ZONE)
 
 @pytest.fixture
 def site(tmp_path):
-    write_house(tmp_path)
+    write_greenhouse(tmp_path)
     return load_site(tmp_path / "site.yaml")
 
 
@@ -267,7 +267,7 @@ def test_a_change_that_is_not_among_the_told_ones_says_so(site):
 
 
 def test_a_page_is_composed_of_any_state(tmp_path):
-    configuration = load_configuration(write_house(tmp_path))
+    configuration = load_configuration(write_greenhouse(tmp_path))
     bare = state(plan=None, values={}, setpoints={}, clamps=[], bundle={}, time=None, clock_ok=False)
     for heard in (Heard(None, "silent"), Heard(bare), Heard(state()), Heard(state(), "silent", 90.0)):
         assert compose(Known(configuration, heard, NOW))["headline"].text
@@ -288,7 +288,7 @@ def rendered(configuration, said) -> str:
 
 
 def test_a_number_that_is_none_anywhere_in_the_state_keeps_no_page_from_being_made(tmp_path, caplog):
-    configuration = load_configuration(write_house(tmp_path))
+    configuration = load_configuration(write_greenhouse(tmp_path))
     certain = {("plan", "start"), ("plan", "step_seconds"), ("plan", "valid_until"), ("monotonic",)}
     places = [path for path in leaves(state()) if path not in certain]
     assert len(places) > 150
@@ -305,7 +305,7 @@ def test_a_number_that_is_none_anywhere_in_the_state_keeps_no_page_from_being_ma
 
 
 def test_a_fault_in_telling_the_plan_leaves_alarms_and_measurements_to_be_seen(tmp_path, monkeypatch):
-    configuration = load_configuration(write_house(tmp_path))
+    configuration = load_configuration(write_greenhouse(tmp_path))
     monkeypatch.setattr("igrow.edge.page.plan.blocks", lambda *_: 1 / 0)
     page = rendered(configuration, state())
     assert "cannot be shown" in page

@@ -121,9 +121,9 @@ def test_a_log_tells_what_was_used() -> None:
             "net_growth": 1.0 + 0.01 * np.arange(288) / 288,
         },
     )
-    house = Greenhouse()
-    used = used_in(log, house)
-    assert used["heat"] == pytest.approx(house.rail_pipe_heat_transfer * 20.0 * 86_400 / 1e6)
+    greenhouse = Greenhouse()
+    used = used_in(log, greenhouse)
+    assert used["heat"] == pytest.approx(greenhouse.rail_pipe_heat_transfer * 20.0 * 86_400 / 1e6)
     assert used["electricity"] == pytest.approx(1.2)
     assert used["co2"] == pytest.approx(0.048)
     assert used["net_growth"] == pytest.approx(0.01)

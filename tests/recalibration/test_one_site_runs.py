@@ -20,7 +20,7 @@ from igrow.trainer.service.recalibration import recalibrate, relative_gain
 from igrow.trainer.service.site_memory import bundle_in_force, forget_old
 from tests.tiny_bundle import write_tiny_bundle
 
-SITE = Site(name="house", latitude=52.0, longitude=4.5)
+SITE = Site(name="greenhouse", latitude=52.0, longitude=4.5)
 NOON = datetime(2020, 3, 1, 12, tzinfo=UTC)
 
 
@@ -33,7 +33,7 @@ def archive(tmp_path: Path) -> Archive:
     made = Archive(tmp_path / "archive")
     time = np.datetime64("2020-02-20T00:00:00") + np.arange(0, 9 * 86_400, 600).astype("timedelta64[s]")
     time = time[(time < np.datetime64("2020-02-24")) | (time >= np.datetime64("2020-02-26"))]
-    made.add_telemetry("house", Telemetry(time, {"air_temperature": np.full(len(time), 20.0)}))
+    made.add_telemetry("greenhouse", Telemetry(time, {"air_temperature": np.full(len(time), 20.0)}))
     return made
 
 
@@ -49,7 +49,7 @@ def diagnosed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         return SimpleNamespace(verdict="named", findings=causes, errors=errors, notes=(), corrected=10.0 + len(asked))
 
     def write(offset: float, now: datetime, folder: Path) -> tuple[str, ...]:
-        write_tiny_bundle(folder, site="house", offset=offset)
+        write_tiny_bundle(folder, site="greenhouse", offset=offset)
         return ()
 
     monkeypatch.setattr(recalibration, "_diagnose", diagnose)
@@ -58,8 +58,10 @@ def diagnosed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 def leave_report(archive: Archive, number: int, identity: str, verdict: str) -> None:
-    content = json.dumps({"site": "house", "identity": identity, "verdict": verdict})
-    archive.add_file("reports", "house", f"2020030{number}T000000Z-{identity[:8]}-{verdict}.json", content.encode())
+    content = json.dumps({"site": "greenhouse", "identity": identity, "verdict": verdict})
+    archive.add_file(
+        "reports", "greenhouse", f"2020030{number}T000000Z-{identity[:8]}-{verdict}.json", content.encode()
+    )
 
 
 def test_a_site_without_telemetry_is_an_error_in_its_history_and_publishes_nothing(tmp_path: Path) -> None:
@@ -67,7 +69,7 @@ def test_a_site_without_telemetry_is_an_error_in_its_history_and_publishes_nothi
     assert turn.verdict == "error"
     (line,) = history.read(tmp_path / "state")
     assert line["time"] == "2020-03-01T12:00:00Z"
-    assert "no telemetry of site house" in line["note"]
+    assert "no telemetry of site greenhouse" in line["note"]
 
 
 def test_an_error_is_tried_again_at_the_next_run_and_a_success_waits_for_the_sites_pace(
@@ -111,17 +113,17 @@ def test_a_bundle_that_the_gateway_took_back_is_not_built_upon(
 
 
 def test_a_bundle_that_is_pinned_again_after_it_was_taken_back_is_in_force(tmp_path: Path) -> None:
-    bundle = write_tiny_bundle(tmp_path / "bundles" / "20200301T000000Z", site="house")
+    bundle = write_tiny_bundle(tmp_path / "bundles" / "20200301T000000Z", site="greenhouse")
     reports = [{"identity": bundle.identity, "verdict": verdict} for verdict in ("adopted", "went_back", "adopted")]
     assert bundle_in_force(tmp_path, reports[:2])[0].identity != bundle.identity
     assert bundle_in_force(tmp_path, reports)[0].identity == bundle.identity
 
 
 def test_the_bundle_in_force_outlives_any_number_of_refused_ones(tmp_path: Path) -> None:
-    good = write_tiny_bundle(tmp_path / "bundles" / "20200301T000000Z", site="house")
+    good = write_tiny_bundle(tmp_path / "bundles" / "20200301T000000Z", site="greenhouse")
     reports = []
     for day in range(2, 12):
-        bad = write_tiny_bundle(tmp_path / "bundles" / f"202003{day:02}T000000Z", site="house", offset=100.0 + day)
+        bad = write_tiny_bundle(tmp_path / "bundles" / f"202003{day:02}T000000Z", site="greenhouse", offset=100.0 + day)
         reports.append({"identity": bad.identity, "verdict": "went_back"})
         forget_old(tmp_path / "bundles", bundle_in_force(tmp_path, reports)[0].folder)
     assert bundle_in_force(tmp_path, reports)[0].identity == good.identity
@@ -129,8 +131,8 @@ def test_the_bundle_in_force_outlives_any_number_of_refused_ones(tmp_path: Path)
 
 
 def test_a_damaged_published_bundle_is_named_and_its_predecessor_is_built_upon(tmp_path: Path) -> None:
-    good = write_tiny_bundle(tmp_path / "bundles" / "20200301T000000Z", site="house")
-    bad = write_tiny_bundle(tmp_path / "bundles" / "20200302T000000Z", site="house", offset=6.0)
+    good = write_tiny_bundle(tmp_path / "bundles" / "20200301T000000Z", site="greenhouse")
+    bad = write_tiny_bundle(tmp_path / "bundles" / "20200302T000000Z", site="greenhouse", offset=6.0)
     (bad.folder / "simulator.onnx").write_bytes(b"flash rot")
     bundle, notes = bundle_in_force(tmp_path, [])
     assert bundle.identity == good.identity
@@ -142,7 +144,7 @@ def test_a_damaged_published_bundle_is_named_and_its_predecessor_is_built_upon(t
 def test_a_report_that_is_none_is_named_and_changes_nothing(
     tmp_path: Path, archive: Archive, diagnosed: list[str], content: bytes
 ) -> None:
-    archive.add_file("reports", "house", "20200301T000000Z-x-adopted.json", content)
+    archive.add_file("reports", "greenhouse", "20200301T000000Z-x-adopted.json", content)
     turn = recalibrate(SITE, archive, tmp_path / "state", lambda _: None, now=NOON)
     assert turn.verdict == "named"
     assert (content == b'{"verdict": null}') or any("report 20200301T000000Z-x-adopted.json" in n for n in turn.notes)
@@ -162,7 +164,7 @@ def test_a_history_that_was_cut_short_is_read_and_gone_on_with(tmp_path: Path, a
 def test_a_damaged_day_of_the_archive_is_named_and_the_others_are_used(
     tmp_path: Path, archive: Archive, diagnosed: list[str]
 ) -> None:
-    path = archive.root / "telemetry" / "site=house" / "month=2020-02" / "2020-02-21.parquet"
+    path = archive.root / "telemetry" / "site=greenhouse" / "month=2020-02" / "2020-02-21.parquet"
     path.write_bytes(path.read_bytes()[:500])
     turn = recalibrate(SITE, archive, tmp_path / "state", lambda _: None, now=NOON)
     assert turn.verdict == "named"
@@ -186,7 +188,7 @@ def test_a_fault_of_ours_in_a_first_calibration_is_one_sites_error_too(tmp_path:
 
     weeks = Archive(tmp_path / "archive")
     time = np.datetime64("2020-01-20T00:00:00") + np.arange(0, 40 * 86_400, 3600).astype("timedelta64[s]")
-    weeks.add_telemetry("house", Telemetry(time, {"air_temperature": np.full(len(time), 20.0)}))
+    weeks.add_telemetry("greenhouse", Telemetry(time, {"air_temperature": np.full(len(time), 20.0)}))
     monkeypatch.setattr(first_calibration, "_calibrate", broken)
     turn = first_calibration.calibrate_first(SITE, weeks, tmp_path / "state", refuse, now=NOON, days=60)
     assert (turn.command, turn.verdict) == ("calibrate", "error")
@@ -219,8 +221,8 @@ def test_the_command_goes_on_after_a_bad_site_and_its_exit_code_tells(tmp_path: 
 def test_a_new_crop_is_calibrated_on_its_own_weeks(tmp_path: Path, monkeypatch) -> None:
     """Ten days before the planting, thirty since; the bundle of before was calibrated on the site itself."""
     default, seen = read_bundle(default_bundle_folder()), list[SiteLog]()
-    own = replace(default, manifest=replace(default.manifest, calibrated_on="house"))
-    end = history.Turn("calibrate", "house", NOON, "calibrated", False, "calibrated on the new crop")
+    own = replace(default, manifest=replace(default.manifest, calibrated_on="greenhouse"))
+    end = history.Turn("calibrate", "greenhouse", NOON, "calibrated", False, "calibrated on the new crop")
 
     def calibrate(_site: Site, log: SiteLog, *_: object) -> history.Turn:
         seen.append(log)
@@ -231,7 +233,7 @@ def test_a_new_crop_is_calibrated_on_its_own_weeks(tmp_path: Path, monkeypatch) 
     monkeypatch.setattr(first_calibration, "bundle_in_force", lambda *_: (own, ()))
     weeks = Archive(tmp_path / "archive")
     time = np.datetime64("2020-01-20T00:00:00") + np.arange(0, 40 * 86_400, 3600).astype("timedelta64[s]")
-    weeks.add_telemetry("house", Telemetry(time, {"air_temperature": np.full(len(time), 20.0)}))
+    weeks.add_telemetry("greenhouse", Telemetry(time, {"air_temperature": np.full(len(time), 20.0)}))
 
     def turn(day: date) -> str:
         site = replace(SITE, crop=replace(SITE.crop, planting_date=day))

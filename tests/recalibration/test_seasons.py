@@ -26,7 +26,7 @@ from igrow.trainer.service.recalibration import recalibrate
 from tests.made_once import made_once
 
 CROP = Crop(planting_date=datetime.date(2020, 2, 21), end_date=datetime.date(2020, 3, 31))
-SITE = Site(name="house", latitude=52.0, longitude=4.5, crop=CROP)
+SITE = Site(name="greenhouse", latitude=52.0, longitude=4.5, crop=CROP)
 NOON = datetime.datetime(2020, 3, 1, 12, tzinfo=datetime.UTC)
 
 
@@ -72,7 +72,7 @@ def test_a_season_that_cannot_be_planned_is_said_and_the_one_before_stays(planne
     same, notes = seasons.with_season(endless, NOON)
     assert same.season is planned.season
     assert notes == (
-        "no season is planned: house: crop.end_date is not set: a season that has no end cannot be planned",
+        "no season is planned: greenhouse: crop.end_date is not set: a season that has no end cannot be planned",
     )
 
 
@@ -104,7 +104,7 @@ def test_a_model_in_force_that_has_no_season_is_published_once_with_one(
     monkeypatch.setattr(seasons, "plan_season", lambda *_, **__: planned.season)
     archive = Archive(tmp_path / "archive")
     time = np.datetime64("2020-02-20T00:00:00") + np.arange(0, 9 * 86_400, 600).astype("timedelta64[s]")
-    archive.add_telemetry("house", Telemetry(time, {"air_temperature": np.full(len(time), 20.0)}))
+    archive.add_telemetry("greenhouse", Telemetry(time, {"air_temperature": np.full(len(time), 20.0)}))
 
     nothing_better = SimpleNamespace(verdict="nothing", findings=(), errors={}, notes=(), corrected=None)
     monkeypatch.setattr(recalibration, "_diagnose", lambda *_: nothing_better)

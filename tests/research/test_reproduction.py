@@ -183,7 +183,7 @@ def test_weeks_outside_those_named_are_not_seen() -> None:
 
 def test_the_second_pilot_is_read_per_square_metre(data_folder: Path) -> None:
     season = liaoyang2020.read(data_folder / "liaoyang2020")
-    grown = {house: values.sum() for house, values in season.production.items()}
+    grown = {greenhouse: values.sum() for greenhouse, values in season.production.items()}
     assert set(grown) == set(liaoyang2020.GREENHOUSES)
     assert all(1.0 < total < 30.0 for total in grown.values())
     assert season.costs["gh01"]["labour"] == pytest.approx(1543.96 / 667)

@@ -54,7 +54,7 @@ def weather() -> Telemetry:
     return Telemetry(time, {name: np.full(len(time), value) for name, value in values.items()})
 
 
-class House:
+class Greenhouse:
     """The folder of a site, and its greenhouse behind Modbus."""
 
     def __init__(self, folder: Path) -> None:
@@ -62,7 +62,7 @@ class House:
         self.port = free_port()
         template = (ROOT / "config/register-maps/virtual-plc.yaml").read_text()
         (folder / "map.yaml").write_text(template.replace("port: 5020", f"port: {self.port}"))
-        (folder / "site.yaml").write_text("name: test-house\nlatitude: 52\nlongitude: 4.5\n")
+        (folder / "site.yaml").write_text("name: test-greenhouse\nlatitude: 52\nlongitude: 4.5\n")
         self.path = folder / "daemon.yaml"
         self.path.write_text(DAEMON)
         self.plant = VirtualGreenhouse(GreenhouseParameters(), weather(), START, seed=3)
@@ -91,37 +91,37 @@ class House:
 
 
 @pytest.fixture
-def house(tmp_path: Path) -> House:
-    return House(tmp_path)
+def greenhouse(tmp_path: Path) -> Greenhouse:
+    return Greenhouse(tmp_path)
 
 
-async def test_an_approved_test_runs_once_within_the_limits_and_the_log_says_so(house: House) -> None:
-    await house.plc.start(port=house.port)
-    async with house.daemon() as daemon:
-        assert await house.command("--approve", TEST.name, "--by", "Anna") == 0
-        await until(lambda: house.events("separating_test_ended"), PATIENCE)
+async def test_an_approved_test_runs_once_within_the_limits_and_the_log_says_so(greenhouse: Greenhouse) -> None:
+    await greenhouse.plc.start(port=greenhouse.port)
+    async with greenhouse.daemon() as daemon:
+        assert await greenhouse.command("--approve", TEST.name, "--by", "Anna") == 0
+        await until(lambda: greenhouse.events("separating_test_ended"), PATIENCE)
         cycles = daemon.cycles
         await until(lambda: daemon.cycles > cycles + 8, PATIENCE)
         rules = control_of(daemon).configuration.guard_rules.points["vent_lee"]
         assert control_of(daemon).cycle.state.points["vent_lee"].taken is None, "the PLC has its vents back"
-    await house.plc.close()
+    await greenhouse.plc.close()
 
-    assert house.events("separating_test_approved")[0]["by"] == "Anna"
-    (began,) = house.events("separating_test_began")
+    assert greenhouse.events("separating_test_approved")[0]["by"] == "Anna"
+    (began,) = greenhouse.events("separating_test_began")
     assert began["test"] == TEST.name
-    (ended,) = house.events("separating_test_ended")
+    (ended,) = greenhouse.events("separating_test_ended")
     assert ended["why"] == COMPLETED
     assert ended["minutes"] == pytest.approx(TEST.minutes, abs=10.0)
 
-    writes = [row for row in house.rows("write") if row["point"] == "vent_lee" and row["outcome"] == "written"]
+    writes = [row for row in greenhouse.rows("write") if row["point"] == "vent_lee" and row["outcome"] == "written"]
     asked = [row for row in writes if row["source"] == SOURCE]
     assert {round(row["applied"]) for row in asked} >= {5, 15}
     assert all(rules.low <= row["applied"] <= rules.high for row in writes)
     for one, two in itertools.pairwise(writes):
         assert two["monotonic"] - one["monotonic"] >= rules.minimum_interval
-    assert not [row for row in house.rows("write") if row["source"] == SOURCE and row["point"] != "vent_lee"]
+    assert not [row for row in greenhouse.rows("write") if row["source"] == SOURCE and row["point"] != "vent_lee"]
 
-    log = house.log()
+    log = greenhouse.log()
     marked = log[SOURCE] > 0.5
     assert marked.sum() == pytest.approx(TEST.minutes / 5.0, abs=8)
     assert not marked[:2].any()
@@ -131,55 +131,55 @@ async def test_an_approved_test_runs_once_within_the_limits_and_the_log_says_so(
     assert log["vent_lee"][marked].std() > 3.0
 
 
-async def test_a_test_that_was_cut_short_by_a_restart_is_over_and_its_vents_go_back(house: House) -> None:
-    await house.plc.start(port=house.port)
-    async with house.daemon():
-        assert await house.command("--approve", TEST.name) == 0
-        await until(lambda: house.plc.memory.value("vent_lee") == pytest.approx(15.0, abs=0.3), PATIENCE)
-    assert not house.events("separating_test_ended")
-    async with house.daemon() as daemon:
-        await until(lambda: house.events("separating_test_ended"), PATIENCE)
+async def test_a_test_that_was_cut_short_by_a_restart_is_over_and_its_vents_go_back(greenhouse: Greenhouse) -> None:
+    await greenhouse.plc.start(port=greenhouse.port)
+    async with greenhouse.daemon():
+        assert await greenhouse.command("--approve", TEST.name) == 0
+        await until(lambda: greenhouse.plc.memory.value("vent_lee") == pytest.approx(15.0, abs=0.3), PATIENCE)
+    assert not greenhouse.events("separating_test_ended")
+    async with greenhouse.daemon() as daemon:
+        await until(lambda: greenhouse.events("separating_test_ended"), PATIENCE)
         await until(lambda: control_of(daemon).cycle.state.points["vent_lee"].taken is None, PATIENCE)
-    await house.plc.close()
-    assert house.events("separating_test_ended")[0]["why"] == BEGAN_ANEW
-    assert len(house.events("separating_test_began")) == 1
+    await greenhouse.plc.close()
+    assert greenhouse.events("separating_test_ended")[0]["why"] == BEGAN_ANEW
+    assert len(greenhouse.events("separating_test_began")) == 1
     # The stop, or else the start, put the vents where they stood before.
-    back = [row for row in house.rows("write") if row["source"] == SOURCE and row["reason"].startswith("back to")]
+    back = [row for row in greenhouse.rows("write") if row["source"] == SOURCE and row["reason"].startswith("back to")]
     assert back
     assert all(row["applied"] < 14.0 for row in back)
 
 
 async def test_a_withdrawn_test_ends_and_a_second_one_waits_for_the_first(
-    house: House, capsys: pytest.CaptureFixture[str]
+    greenhouse: Greenhouse, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    await house.plc.start(port=house.port)
-    async with house.daemon():
-        assert await house.command("--approve", TEST.name) == 0
-        assert await house.command("--approve", "dosing_pause") == 2
+    await greenhouse.plc.start(port=greenhouse.port)
+    async with greenhouse.daemon():
+        assert await greenhouse.command("--approve", TEST.name) == 0
+        assert await greenhouse.command("--approve", "dosing_pause") == 2
         assert "vent_square_wave is approved already" in capsys.readouterr().err
-        await until(lambda: house.events("separating_test_began"), PATIENCE)
-        assert await house.command("--withdraw", "--by", "Anna") == 0
-        await until(lambda: house.events("separating_test_ended"), PATIENCE)
-    await house.plc.close()
-    assert house.events("separating_test_ended")[0]["why"] == "withdrawn by Anna"
+        await until(lambda: greenhouse.events("separating_test_began"), PATIENCE)
+        assert await greenhouse.command("--withdraw", "--by", "Anna") == 0
+        await until(lambda: greenhouse.events("separating_test_ended"), PATIENCE)
+    await greenhouse.plc.close()
+    assert greenhouse.events("separating_test_ended")[0]["why"] == "withdrawn by Anna"
 
 
 async def test_what_is_not_permitted_or_not_possible_is_refused_in_a_line(
-    house: House, capsys: pytest.CaptureFixture[str]
+    greenhouse: Greenhouse, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert await house.command("--approve", "no_such_test") == 2
+    assert await greenhouse.command("--approve", "no_such_test") == 2
     assert "is no separating test" in capsys.readouterr().err
-    allowed = house.path.read_text()
+    allowed = greenhouse.path.read_text()
     for text, said in (
         (allowed.replace("permitted: true", "permitted: false"), "are not permitted here"),
         (allowed.replace("high: 60", "high: 10"), "the limits are 0 % to 10 %"),
         (allowed[: allowed.index("guard:")], "the gateway does not write vent_lee"),
     ):
-        house.path.write_text(text)
-        assert await house.command("--approve", TEST.name) == 2
+        greenhouse.path.write_text(text)
+        assert await greenhouse.command("--approve", TEST.name) == 2
         assert said in capsys.readouterr().err
-    house.path.write_text(allowed)
-    registers = house.folder / "map.yaml"
+    greenhouse.path.write_text(allowed)
+    registers = greenhouse.folder / "map.yaml"
     registers.write_text(registers.read_text().replace(", refresh: 15 min", ""))
-    assert await house.command("--approve", TEST.name) == 2
+    assert await greenhouse.command("--approve", TEST.name) == 2
     assert "has no refresh" in capsys.readouterr().err

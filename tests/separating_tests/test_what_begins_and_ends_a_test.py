@@ -30,7 +30,7 @@ from igrow.edge.state_file import StateFile, write_state
 from tests.control.control_fakes import image_of
 
 TEST = SEPARATING_TESTS["vent_square_wave"]
-SITE = Site(name="house", latitude=52.0, longitude=4.5)
+SITE = Site(name="greenhouse", latitude=52.0, longitude=4.5)
 NIGHT = 1_773_176_400.0
 """10 March 2026, 21:00 UTC."""
 CALM = {

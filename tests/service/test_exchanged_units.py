@@ -118,7 +118,7 @@ def test_a_map_that_says_where_the_units_are_now_ends_it(two: TwoUnits) -> None:
 
 
 def test_another_plc_of_the_same_make_at_the_address_gets_nothing(tmp_path: Path) -> None:
-    """A DHCP server gives the addresses of two houses' PLCs the other way round: each daemon meets the other's PLC."""
+    """A DHCP server gives two greenhouses' PLCs each the other's address: each daemon meets the other's PLC."""
     mine = ONE_PLC.replace("device_id: 1", "device_id: 1, identity: {{function: input, address: 8, content: [11]}}")
     daemon = AttackedDaemon(tmp_path, text=mine)
     try:

@@ -109,7 +109,7 @@ def the_chain(path: Path) -> None:
     store.append(NOW - 100_000.0, {"air_temperature": Value(20.0, Quality.GOOD, 0.0)})
     store.record_event(NOW, "x", {})
     store.close()
-    seal_due(Outbox(path.parent, "house", "0"), path.parent / "store", NOW, 86_400)
+    seal_due(Outbox(path.parent, "greenhouse", "0"), path.parent / "store", NOW, 86_400)
 
 
 FILES: dict[str, tuple[str, Any, Callable[[Path], object]]] = {

@@ -37,7 +37,7 @@ def targets(**changes: float) -> dict[str, float]:
     return {name: float(value) for name, value in found.items()}
 
 
-def test_a_cold_house_is_heated_and_a_warm_one_aired() -> None:
+def test_a_cold_greenhouse_is_heated_and_a_warm_one_aired() -> None:
     assert targets(air_temperature=18.0)["rail_pipe_temperature"] > targets()["rail_pipe_temperature"] + 5.0
     assert targets(air_temperature=28.0)["vent_lee"] > 20.0
     assert targets(air_temperature=18.0)["vent_lee"] == 0.0

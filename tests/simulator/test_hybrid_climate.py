@@ -64,7 +64,7 @@ def test_at_rest_every_balance_is_closed() -> None:
     assert abs(fluxes["co2_concentration"][0]) < 1e-10
 
 
-def test_co2_adds_up_in_a_tight_house_on_a_still_night() -> None:
+def test_co2_adds_up_in_a_tight_greenhouse_on_a_still_night() -> None:
     values = nominal(SITE) | {"leakage_still": 0.0, "respiration": 0.36}
     inputs = steady_inputs(wind_speed=0.0, global_radiation=0.0)
     state = climate.initial_state(
@@ -79,7 +79,7 @@ def test_co2_adds_up_in_a_tight_house_on_a_still_night() -> None:
 def test_thin_air_takes_fewer_grams_for_as_many_ppm() -> None:
     """At 3000 m a dose, the crop's uptake and respiration moved ppm by less than two thirds of what they do there.
 
-    A diagnosis by the built-in bundle named CO2 from the soil, or a valve that leaks, in a house in which all was well.
+    A diagnosis by the built-in bundle named CO2 from the soil, or a leaking valve, in a greenhouse where all was well.
     """
     high = Site(name="high", latitude=0.5, longitude=-78.2, elevation=3000.0)
     sea, there = nominal(Site(name="sea", latitude=0.5, longitude=-78.2)), nominal(high)

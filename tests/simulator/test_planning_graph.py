@@ -28,10 +28,10 @@ def heat(bundle: Bundle, greenhouse: Greenhouse) -> np.ndarray:
 
 
 def test_all_that_leaves_the_pipes_is_paid_and_not_only_what_reaches_the_air(bundle: Bundle) -> None:
-    house = Greenhouse()
+    greenhouse = Greenhouse()
     parameters = bundle.manifest.simulator["parameters"]
     fitted = replace(
-        house,
+        greenhouse,
         rail_pipe_heat_transfer=parameters["parameter:rail_pipe_heat_transfer"],
         grow_pipe_heat_transfer=parameters["parameter:grow_pipe_heat_transfer"],
     )

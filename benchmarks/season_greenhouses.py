@@ -1,7 +1,8 @@
 """Greenhouses that no simulator was fitted to, led through whole seasons, all ways and prices in one batch.
 
 The plant's minutes cost as much for hundreds of greenhouses as for twenty, so that every way leads copies of the same
-houses at once. A way asks for the setpoints of a day at local midnight; limits of site and crop hold for all alike.
+greenhouses at once. A way asks for the setpoints of a day at local midnight; limits of site and crop hold alike for
+all.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ HOUR = np.timedelta64(3600, "s")
 BEFORE = 28
 """Days under the recipe before it: soil and a grown crop need them to fit each other."""
 JUDGED = 14
-"""The last of them, by which a simulator learns what a house uses."""
+"""The last of them, by which a simulator learns what a greenhouse uses."""
 FIRST = -BEFORE - 3
 """First day of weather, from which the first day under the recipe can be forecast."""
 SEED = 700
@@ -55,7 +56,7 @@ USED = ("heat", "electricity", "co2", "net_growth")
 
 @dataclass(frozen=True)
 class Morning:
-    """What a way knows at a local midnight of its N houses."""
+    """What a way knows at a local midnight of its N greenhouses."""
 
     day: int
     begin: np.datetime64
@@ -76,7 +77,7 @@ class Morning:
 
 
 class Way(Protocol):
-    """Leads houses."""
+    """Leads greenhouses."""
 
     def ask(self, morning: Morning) -> Floats:
         """Return the setpoints of a day, (N, 24, S)."""
@@ -89,7 +90,7 @@ class Recipe:
     """The grower's day."""
 
     def ask(self, morning: Morning) -> Floats:
-        """Return it for each house."""
+        """Return it for each greenhouse."""
         return np.repeat(morning.recipe[None], len(morning.weather), axis=0)
 
     def learn(self, morning: Morning, outcome: Outcome, weather: Floats) -> None:
@@ -98,14 +99,14 @@ class Recipe:
 
 @dataclass(frozen=True)
 class Led(Recipe):
-    """A strategy of the season, one for all houses, or one for each."""
+    """A strategy of the season, one for all greenhouses, or one for each."""
 
     strategy: Strategy
     genes: Genes
     """(1, G) or (N, G)."""
 
     def ask(self, morning: Morning) -> Floats:
-        """Return what it says under each house's weather."""
+        """Return what it says under each greenhouse's weather."""
         many = np.broadcast_to(self.genes, (len(morning.weather), self.genes.shape[1]))
         days = [
             asked(self.strategy, many[[row]], morning.day, morning.template, one, morning.recipe)
@@ -114,18 +115,18 @@ class Led(Recipe):
         return np.concatenate(days)
 
 
-class Houses:
+class Greenhouses:
     """Greenhouses by number, each with parameters, weather and two undeclared effects of its own; one for each row."""
 
     def __init__(self, days: int, numbers: Sequence[int]) -> None:
-        made = {number: _house(days, number) for number in sorted(set(numbers))}
+        made = {number: _greenhouse(days, number) for number in sorted(set(numbers))}
         each = [made[number] for number in numbers]
         self.hourly = np.stack([one.hourly for one in each])
         """From `FIRST` on, (rows, days, 24, 6)."""
         self.plant = self.stand(each)
 
-    def stand(self, each: Sequence[House]) -> Plant:
-        """Return the plant that these houses are."""
+    def stand(self, each: Sequence[Greenhouse]) -> Plant:
+        """Return the plant that these greenhouses are."""
         return Plant(
             stack([one.parameters for one in each]),
             WeatherTable([one.weather for one in each]),
@@ -149,13 +150,13 @@ class Houses:
         return np.asarray(self.hourly[:, day - FIRST - 3 : day - FIRST].mean(axis=1))
 
     def measured(self) -> dict[str, Floats]:
-        """Return what the houses' sensors show, by quantity, (rows,)."""
+        """Return what the greenhouses' sensors show, by quantity, (rows,)."""
         total = self.plant.count or 1
         return {name: np.broadcast_to(value, total) for name, value in self.plant.truth({}).items()}
 
 
 @dataclass(frozen=True)
-class House:
+class Greenhouse:
     """What one of them is."""
 
     parameters: GreenhouseParameters
@@ -164,18 +165,20 @@ class House:
     effects: Sequence[HiddenEffect]
 
 
-def _house(days: int, number: int) -> House:
+def _greenhouse(days: int, number: int) -> Greenhouse:
     rng = np.random.default_rng((SEED, number))
     begin, count = START + FIRST * DAY, days - FIRST
     weather = generate_weather(begin, START + (days + 1) * DAY, seed=int(rng.integers(2**31)))
     hourly = hourly_weather(weather, begin, 24 * count).reshape(count, 24, 6)
     varied = GreenhouseParameters().varied(rng, relative=0.08)
-    return House(varied, weather, hourly, [HiddenEffect(str(name)) for name in rng.choice(EFFECTS, 2, replace=False)])
+    return Greenhouse(
+        varied, weather, hourly, [HiddenEffect(str(name)) for name in rng.choice(EFFECTS, 2, replace=False)]
+    )
 
 
 @dataclass(frozen=True)
 class Past:
-    """What houses did under the recipe before a season; a row for each."""
+    """What greenhouses did under the recipe before a season; a row for each."""
 
     start: np.datetime64
     initial: Mapping[str, Floats]
@@ -188,7 +191,7 @@ class Past:
     """Heat, electricity and CO2 by day, (rows, days)."""
 
     def factor(self, simulator: Simulator, row: int) -> dict[str, float]:
-        """Return what a house used over what a simulator says of it, by what is used."""
+        """Return what a greenhouse used over what a simulator says of it, by what is used."""
         initial = {name: float(value[row]) for name, value in self.initial.items()}
         said = simulator.simulate(initial, self.weather[row], self.setpoints[[row]], self.start)
         expected = {name: getattr(said, name)[0, 0].reshape(-1, 24).sum(axis=1) for name in SCALED}
@@ -202,19 +205,20 @@ def lead(
     site: Site,
     days: int,
     ways: Mapping[str, Way],
-    houses: Mapping[str, Sequence[int]],
-    stood: Callable[[int, Sequence[int]], Houses] = Houses,
+    greenhouses: Mapping[str, Sequence[int]],
+    stood: Callable[[int, Sequence[int]], Greenhouses] = Greenhouses,
 ) -> tuple[dict[str, dict[str, Floats]], Past]:
-    """Lead houses by each way; return what each used and picked by day, and what all did before.
+    """Lead greenhouses by each way; return what each used and picked by day, and what all did before.
 
-    By way and name, (its houses, days): `heat` MJ m-2, `electricity` kWh m-2 (and `peak` of it), `co2`, `net_growth`
-    and `kg` (fresh fruit picked) kg m-2. The past's rows are all houses, way after way; `stood` makes them.
+    By way and name, (its greenhouses, days): `heat` MJ m-2, `electricity` kWh m-2 (and `peak` of it), `co2`,
+    `net_growth` and `kg` (fresh fruit picked) kg m-2. The past's rows are all greenhouses, way after way; `stood`
+    makes them.
     """
     numbers: list[int] = []
     rows: dict[str, slice] = {}
     for name in ways:
-        rows[name] = slice(len(numbers), len(numbers) + len(houses[name]))
-        numbers += houses[name]
+        rows[name] = slice(len(numbers), len(numbers) + len(greenhouses[name]))
+        numbers += greenhouses[name]
     led = stood(days, numbers)
     past, applied, memory = settle(site, led)
     co2 = np.zeros(len(numbers))
@@ -251,8 +255,8 @@ def lead(
     return found, past
 
 
-def settle(site: Site, led: Houses) -> tuple[Past, Floats, Memory]:
-    """Lead all houses by the recipe until the season; return the past, the last setpoints and what crops have had."""
+def settle(site: Site, led: Greenhouses) -> tuple[Past, Floats, Memory]:
+    """Lead all by the recipe until the season; return the past, the last setpoints and what crops have had."""
     applied, memory = np.full((len(led.hourly), len(SETPOINTS)), np.nan), None
     initial: dict[str, Floats] = {}
     setpoints, used = [], []
@@ -280,7 +284,7 @@ def settle(site: Site, led: Houses) -> tuple[Past, Floats, Memory]:
 
 
 def money(site: Site, book: Mapping[str, Floats]) -> dict[str, Floats]:
-    """Return what a season brought, EUR m-2: income of fruit that was picked, costs by `PARTS`, and net, (houses,)."""
+    """Return what a season brought, EUR m-2, (greenhouses,): income of picked fruit, costs by `PARTS`, and net."""
     prices, days = site.prices, book["kg"].shape[1]
     local = local_days(START + np.arange(days) * DAY + DAY // 2, site.time_zone)
     tariff = prices.electricity

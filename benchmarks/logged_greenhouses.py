@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.season_houses import BEFORE, DAY, SEED, START, House, Houses
+from benchmarks.season_greenhouses import BEFORE, DAY, SEED, START, Greenhouse, Greenhouses
 from igrow.core.arrays import Array
 from igrow.core.greenhouse.disturbances import Disturbances
 from igrow.core.greenhouse.parameters import stack
@@ -17,17 +17,17 @@ from igrow.core.sun import unix_seconds
 from igrow.core.telemetry import Telemetry
 
 LATER = 7
-"""Day of the season, counted from 0, with which each house's second undeclared effect begins."""
+"""Day of the season, counted from 0, with which each greenhouse's second undeclared effect begins."""
 STEP = 300
 """Seconds between two rows."""
 
 
 @dataclass(frozen=True)
 class SharedDisturbances(Disturbances):
-    """What disturbs a house, the same in each of its copies: ways are compared, not their luck."""
+    """What disturbs a greenhouse, the same in each of its copies: ways are compared, not their luck."""
 
     copies: int = 1
-    """Of all houses, one set after the other."""
+    """Of all greenhouses, one set after the other."""
 
     def innovate(self, rng: np.random.Generator, count: int | None) -> list[Array]:
         """Draw one set of innovations; see `Disturbances`."""
@@ -48,15 +48,15 @@ class LoggedPlant(Plant):
             self.rows.append(self.measured(self.truth(setpoints)))
 
 
-class LoggedHouses(Houses):
-    """The season's houses with disturbances and sensor noise; of two undeclared effects the second begins later."""
+class LoggedGreenhouses(Greenhouses):
+    """The season's greenhouses, disturbed, with noisy sensors; of two undeclared effects the second begins later."""
 
     plant: LoggedPlant
     hidden: list[tuple[str, str]]
     """Names of what stands and of what begins, by row."""
 
-    def stand(self, each: Sequence[House]) -> LoggedPlant:
-        """Return the plant that these houses are."""
+    def stand(self, each: Sequence[Greenhouse]) -> LoggedPlant:
+        """Return the plant that these greenhouses are."""
         self.hidden = [(one.effects[0].name, one.effects[1].name) for one in each]
         plant = LoggedPlant(
             stack([one.parameters for one in each]),
@@ -71,7 +71,7 @@ class LoggedHouses(Houses):
         return plant
 
     def telemetry(self, row: int, first: int, last: int) -> Telemetry:
-        """Return the log of a row's house, from one day of the season to another."""
+        """Return the log of a row's greenhouse, from one day of the season to another."""
         per_day = 86_400 // STEP
         rows = self.plant.rows[(first + BEFORE) * per_day : (last + BEFORE) * per_day]
         begin = START + first * DAY

@@ -1,4 +1,4 @@
-"""The season's houses as a bundle's simulator has them: their weather, the simulator's climate, the season's crop."""
+"""The season's greenhouses in a bundle's simulator: their weather, the simulator's climate, the season's crop."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.season_houses import BEFORE, START, Houses
+from benchmarks.season_greenhouses import BEFORE, START, Greenhouses
 from benchmarks.strategies import beside
 from igrow.core.arrays import Floats
 from igrow.core.greenhouse import tomato
@@ -19,8 +19,8 @@ from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Site
 
 
-class SimulatedHouses(Houses):
-    """Houses that differ by their weather alone; each day begins where the simulator says that the one before ended."""
+class SimulatedGreenhouses(Greenhouses):
+    """Greenhouses that differ by weather alone; each day begins where the simulator says that the one before ended."""
 
     def __init__(self, site: Site, simulator: BundleSimulator, days: int, numbers: Sequence[int]) -> None:
         super().__init__(days, numbers)
@@ -39,7 +39,7 @@ class SimulatedHouses(Houses):
         return climate | grown
 
     def advance(self, setpoints: Floats, begin: np.datetime64) -> Outcome:
-        """Live a day; see `Houses`. As in `season.run_season` the simulator knows one leaf area, the crop its own."""
+        """Live a day; see `Greenhouses`. As in `season.run_season`, simulator and crop have a leaf area each."""
         weather = self.weather(int((begin - START) // DAY))
         parts = [
             self._simulator.simulate(state, weather[row], setpoints[[row]], begin)
