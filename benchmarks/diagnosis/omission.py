@@ -19,6 +19,7 @@ import numpy as np
 
 from benchmarks.diagnosis import real
 from benchmarks.diagnosis.cases import SEASONS
+from benchmarks.diagnosis.naming import is_same
 from benchmarks.diagnosis.nurseries import calibration_logs, nursery
 from benchmarks.diagnosis.rules import RULES, write_rules
 from benchmarks.jobs import Jobs
@@ -53,7 +54,6 @@ ON_REAL_LOGS = ("lamp_heat_share", "leakage_wind", "transpiration_night_share")
 """Parameters that are taken out on the public logs."""
 MATTERS = 1.05
 """Times by which the 24 h error of held-out weeks must rise for a term to count as one that the greenhouse has."""
-CONFOUNDED = ({"co2_valve_leak", "soil_respiration"},)
 FALSE_CLAIMS = 0.02
 """Of calibrations in which nothing was taken out."""
 ANY = replace(DEFAULT, least_omission_fall=0.0, most_causes=1)
@@ -130,19 +130,14 @@ def season(job: tuple[str, str, int, tuple[str, ...]]) -> list[Told]:
     return told
 
 
-def stands_for(name: str, taken_out: str) -> bool:
-    """Tell whether a name is that of what was taken out, or of what no log tells apart from it."""
-    return name == taken_out or any({name, taken_out} <= pair for pair in CONFOUNDED)
-
-
 def is_right(one: Told) -> bool:
     """Tell whether what was taken out is among the names."""
-    return any(stands_for(name, one.taken_out) for name in one.named)
+    return any(is_same(name, one.taken_out) for name in one.named)
 
 
 def is_wrong(one: Told) -> bool:
     """Tell whether something else is."""
-    return any(not stands_for(name, one.taken_out) for name in one.named)
+    return any(not is_same(name, one.taken_out) for name in one.named)
 
 
 def show(told: Sequence[Told]) -> None:

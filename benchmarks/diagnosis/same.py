@@ -21,7 +21,7 @@ import numpy as np
 from benchmarks.diagnosis.cases import CHANGES, FORMS, SEASONS, Case, Turn
 from benchmarks.diagnosis.logs import Reference
 from benchmarks.diagnosis.nurseries import calibrated, calibration_logs, later, later_logs, nursery
-from benchmarks.diagnosis.scoring import Outcome, judge
+from benchmarks.diagnosis.scoring import Outcome, has_all, is_first, judge
 from benchmarks.jobs import Jobs
 from igrow.core.effects import EFFECTS
 from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
@@ -41,8 +41,6 @@ GROUPS = (
 )  # fmt: skip
 """Group, ENR and share of the cases."""
 RULES = {"history": replace(DEFAULT, history=True), "in general": replace(DEFAULT, history=False)}
-CONFOUNDED = ({"co2_valve_leak", "soil_respiration"},)
-"""Effects that no log tells apart."""
 
 
 def draw(kind: str, first: int, count: int, units: Mapping[str, Mapping[str, float]]) -> list[Case]:
@@ -114,7 +112,7 @@ def table(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int, str]]:
     )
     known = [one for one in alone if one.known_gain is not None]
     share("oracle: the same, parameters known", known, lambda one: (one.known_gain or 0.0) >= enough, "-")
-    share("both of a pair", of("pair"), lambda one: set(one.case.causes) <= set(one.found), ">= .45")
+    share("both of a pair", of("pair"), has_all, ">= .45")
     sizes = [abs(one.relative_size - 1.0) for one in outcomes if one.relative_size is not None]
     rows.append(("size, median relative error", float(np.median(sizes)) if sizes else np.nan, len(sizes), "<= .10"))
     covered = [one for one in outcomes if one.covered is not None]
@@ -129,20 +127,6 @@ def table(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int, str]]:
     rows.append(("recoverable error recovered", gained / possible if possible else np.nan, len(caused), ">= .85"))
     rows.append(("seconds a log, median", float(np.median([one.seconds for one in outcomes])), len(outcomes), "-"))
     return rows
-
-
-def is_first(one: Outcome) -> bool:
-    """Tell whether the first name is a true cause, one that no log tells apart from it, or its twin in the model."""
-    if not one.found:
-        return False
-    if one.case.changed:
-        return one.found[0] in CHANGES[one.case.changed][1]
-    return any(
-        one.found[0] == cause
-        or any({one.found[0], cause} <= pair for pair in CONFOUNDED)
-        or (cause in EFFECTS and one.found[0] in EFFECTS[cause].resembles)
-        for cause in one.case.causes
-    )
 
 
 def prepared(job: tuple[str, str, int, int, int]) -> list[tuple[Case, Telemetry, Reference]]:
