@@ -111,7 +111,7 @@ def test_a_result_draws_its_figures(leak: Diagnosis) -> None:
     assert np.asarray(gained)[-1] > 20.0
     assert [axes.get_lines()[1].get_marker() for axes in leak.plot_days().axes] == ["o"] * 3
     # What is missing falls with the wind: the air is colder than a model without the leak has it.
-    binned = np.asarray(leak.plot_residual("wind_speed").axes[0].lines[0].get_ydata())
+    binned = np.asarray(leak.plot_residual("wind_speed").axes[0].lines[1].get_ydata())
     assert binned[-1] < binned[0]
     assert len(leak.plot_regimes(leak.findings[0]).axes[0].get_yticks()) == len(leak.findings[0].regimes)
     with pytest.raises(IgrowError, match="no unseen day with pressure"):
