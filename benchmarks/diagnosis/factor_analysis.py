@@ -78,7 +78,7 @@ def evidence(found: Sequence[Direction], logs: Sequence[LogLikelihood]) -> float
     return total
 
 
-def usual_amplitudes(design: Design) -> dict[str, float]:
+def null_amplitudes(design: Design) -> dict[str, float]:
     """Return the squared amplitude, less its variance, of every effect that a log shows alone, by effect.
 
     Args:
@@ -95,7 +95,7 @@ def usual_amplitudes(design: Design) -> dict[str, float]:
 
 
 def root_mean_squares(logs: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    """Return the usual amplitude of every effect, from `usual_amplitudes` of several logs."""
+    """Return the usual amplitude of every effect, from `null_amplitudes` of several logs."""
     names = sorted({name for one in logs for name in one})
     return {name: float(f"{np.sqrt(np.mean([one.get(name, 0.0) for one in logs])):.3g}") for name in names}
 

@@ -138,7 +138,7 @@ def transferred(place: VirtualGreenhouse) -> list[LogLikelihood]:
 
 
 def _amplitudes(directions: Sequence[Direction], family: Family) -> list[dict[str, float]]:
-    return [factor_analysis.usual_amplitudes(design_of(family, log, directions)) for log in simulate(family, SEASON)]
+    return [factor_analysis.null_amplitudes(design_of(family, log, directions)) for log in simulate(family, SEASON)]
 
 
 def _directions(

@@ -101,7 +101,7 @@ def make_design(
         candidates=tuple(candidates),
         patterns=tuple(patterns),
         untestable=(),
-        usual_size={},
+        null_amplitude={},
     )
 
 

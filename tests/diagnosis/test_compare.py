@@ -65,18 +65,20 @@ def test_a_gain_below_the_bound_is_no_cause_and_above_it_is() -> None:
 def test_what_such_logs_usually_show_is_no_cause() -> None:
     design = make_design(Truth({"lamp_heat": 0.3}, {}))
     assert judged(design).cause is not None
-    assert judged(replace(design, usual_size={"lamp_heat": 0.6})).cause is None
+    assert judged(replace(design, null_amplitude={"lamp_heat": 0.6})).cause is None
 
 
 def test_what_is_left_beyond_the_usual_size_is_the_gain_under_a_normal_prior() -> None:
     design = in_fitted_noise(make_design(Truth({"lamp_heat": 0.3}, {})))
     found = compare.compare(design, 0.0, np.random.default_rng(0)).cause
     assert found is not None
-    assert found.beyond_usual == pytest.approx(found.hypothesis.gain)
+    assert found.beyond_null == pytest.approx(found.hypothesis.gain)
     deviation = found.profile.deviations[-1]
-    usual = compare.compare(replace(design, usual_size={"lamp_heat": deviation}), 0.0, np.random.default_rng(0)).cause
+    usual = compare.compare(
+        replace(design, null_amplitude={"lamp_heat": deviation}), 0.0, np.random.default_rng(0)
+    ).cause
     assert usual is not None
-    assert usual.beyond_usual == pytest.approx(0.5 * found.hypothesis.gain)
+    assert usual.beyond_null == pytest.approx(0.5 * found.hypothesis.gain)
 
 
 def test_a_size_far_beyond_its_bounds_is_no_cause() -> None:

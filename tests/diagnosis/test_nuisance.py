@@ -110,7 +110,7 @@ def test_the_discrepancy_of_a_calibration_is_a_ridge_regression_on_all_candidate
 
 def test_the_usual_amplitude_of_what_is_there_is_its_square_less_its_variance() -> None:
     design = make_design(Truth({"lamp_heat": 0.3}, {}))
-    found = factor_analysis.usual_amplitudes(design)
+    found = factor_analysis.null_amplitudes(design)
     (column,) = design.columns("effect:lamp_heat")
     joint = linear.fit(design.grams, design.null_model().with_term(linear.Term(column)))
     assert found["lamp_heat"] == pytest.approx(joint.amplitudes[0] ** 2 - joint.deviations[0] ** 2, rel=0.05)
@@ -133,6 +133,6 @@ def test_the_stored_subspace_says_where_it_comes_from() -> None:
 
 def test_only_a_long_log_is_asked_for_more_than_seasons_usually_show() -> None:
     known = read_nuisance()
-    assert known.usual_size(29, DEFAULT) == {}
-    assert set(known.usual_size(85, DEFAULT)) <= set(EFFECTS)
-    assert known.usual_size(85, DEFAULT)["structure_shade"] > 0.0
+    assert known.null_amplitude(29, DEFAULT) == {}
+    assert set(known.null_amplitude(85, DEFAULT)) <= set(EFFECTS)
+    assert known.null_amplitude(85, DEFAULT)["structure_shade"] > 0.0

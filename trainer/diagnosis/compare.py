@@ -46,7 +46,7 @@ class Contender:
 
     hypothesis: Hypothesis
     """Its gain is that of the profile likelihood."""
-    beyond_usual: float
+    beyond_null: float
     """The gain that is left when its usual size in logs with nothing missing is allowed for, less an onset's price."""
     profile: Profile
     bootstrap_p: float
@@ -149,7 +149,7 @@ def contest(design: Design, null: Profile, ranked: Sequence[Hypothesis], rng: np
         gained = gain(design, own, null)
         price = 0.0 if one.term.onset is None else rules.onset_price
         # With a normal prior of the usual size on the amplitude, so much of the gain is beyond the usual.
-        beyond = 1.0 / (1.0 + (design.usual_size.get(one.effect, 0.0) / own.deviations[-1]) ** 2)
+        beyond = 1.0 / (1.0 + (design.null_amplitude.get(one.effect, 0.0) / own.deviations[-1]) ** 2)
         unseen = bootstrap_p(design, own, null, rng)
         contenders.append(Contender(replace(one, gain=gained - price), gained * beyond - price, own, unseen))
     return sorted(contenders, key=lambda one: -one.hypothesis.gain)
@@ -168,7 +168,7 @@ def _suffices(design: Design, contender: Contender) -> bool:
     """Tell whether a cause gains more than chance does and, where errors count by hours, than a wrong structure."""
     rules = design.rules
     needed = rules.gain_of_cause(time_steps=design.time_steps, transferred=design.transferred)
-    usual = not design.time_steps and contender.beyond_usual < rules.least_gain_beyond_usual
+    usual = not design.time_steps and contender.beyond_null < rules.least_gain_beyond_null
     return contender.hypothesis.gain >= needed and not usual
 
 
@@ -190,12 +190,12 @@ def _round(design: Design, null: Profile, cause: Contender | None, patterns: tup
 
 
 def _growth(design: Design) -> float:
-    """Return how many times as much as in `usual_days` patterns gain from a wrong structure: the same every day.
+    """Return how many times as much as in `fitted_days` patterns gain from a wrong structure: the same every day.
 
     Where the structure is right (errors count time step by time step), nothing grows.
     """
     # The first local day is seldom a whole one.
-    return 1.0 if design.time_steps else max(1.0, (design.split.days - 1) / design.rules.usual_days)
+    return 1.0 if design.time_steps else max(1.0, (design.split.days - 1) / design.rules.fitted_days)
 
 
 def pattern_onsets(design: Design) -> list[int | None]:

@@ -104,7 +104,7 @@ class Design:
     patterns: tuple[Pattern, ...]
     """Of the block of patterns."""
     untestable: tuple[str, ...]
-    usual_size: Mapping[str, float] = field(default_factory=dict)
+    null_amplitude: Mapping[str, float] = field(default_factory=dict)
     """Amplitude, by effect, that a log with nothing missing usually shows."""
     history: History | None = None
     """What is known of this very greenhouse from its calibration; None: greenhouses in general stand in."""
@@ -197,7 +197,7 @@ def prepare(
     *,
     discrepancy: Mapping[str, float],
     directions: Sequence[Mapping[str, float]] = (),
-    usual_size: Mapping[str, float] | None = None,
+    null_amplitude: Mapping[str, float] | None = None,
     without: Collection[str] = (),
     interval: float = HOUR,
 ) -> Design:
@@ -212,7 +212,7 @@ def prepare(
         rules: thresholds.
         discrepancy: of the calibration, amplitude by key of an effect or a pattern (empty: not known).
         directions: the nuisance subspace, each direction in amplitudes by key.
-        usual_size: amplitude, by effect, that a log with nothing missing usually shows.
+        null_amplitude: amplitude, by effect, that a log with nothing missing usually shows.
         without: effects that are no candidates.
         interval: seconds over which errors are averaged.
     """
@@ -241,7 +241,7 @@ def prepare(
         ("drift", prior.names[: len(drifting)], drifting, np.zeros(len(drifting)), np.eye(len(drifting))),
     ]
     plain = of_parts(line, split, prior, rules, average, parts, found, patterns)
-    return replace(plain, usual_size=usual_size or {}).whitened(whitening)
+    return replace(plain, null_amplitude=null_amplitude or {}).whitened(whitening)
 
 
 def of_parts(

@@ -47,7 +47,7 @@ class NuisanceSubspace:
         """Return the directions for a model that was calibrated here or transferred."""
         return self.transferred if transferred else self.home
 
-    def usual_size(self, days: int, rules: DecisionRules) -> Mapping[str, float]:
+    def null_amplitude(self, days: int, rules: DecisionRules) -> Mapping[str, float]:
         """Return the usual amplitudes by effect in a log of so many days.
 
         In one that is not long the gain that is asked of every cause covers them; allowed for beside it, they hid

@@ -77,7 +77,7 @@ class Search:
             record, split, known.short_prior, activate(record, terms), self.site.longitude, self.rules,
             discrepancy=known.discrepancy,
             directions=self.nuisance.directions(transferred=known.transferred) if hours else (),
-            usual_size=self.nuisance.usual_size(split.days, self.rules) if hours else {},
+            null_amplitude=self.nuisance.null_amplitude(split.days, self.rules) if hours else {},
             without=self.without,
             interval=interval,
         )  # fmt: skip

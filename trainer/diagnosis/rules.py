@@ -113,19 +113,19 @@ class DecisionRules:
     least_gain_steps: float = _fitted("gain of a cause where time steps count: more than chance and searching bring")
     least_gain: float = _fitted("the same where hours count: more than a wrong structure brings in four weeks")
     least_gain_transferred: float = _fitted("the same of a model that was calibrated on another greenhouse")
-    least_gain_beyond_usual: float = _chosen(9.0, "what must be left of it when an effect's usual size is allowed for")
+    least_gain_beyond_null: float = _chosen(9.0, "what must be left of it when an effect's usual size is allowed for")
     bootstrap_draws: int = _chosen(2000, "of unseen days")
 
     # What a pattern must gain to stand for an unexplained discrepancy.
-    pattern_gain: float = _fitted("gain below which a pattern is none in a log of `usual_days`")
+    pattern_gain: float = _fitted("gain below which a pattern is none in a log of `fitted_days`")
     pattern_gain_transferred: float = _fitted("the same of a model that was calibrated on another greenhouse")
     clock_factor: float = _chosen(2.0, "times as much is asked of a pattern of the clock alone")
     pattern_over_cause: float = _chosen(2.2, "times a cause's gain at which a pattern replaces it")
     pattern_over_found: float = _chosen(1.0, "share of the gain of causes found before that a pattern must add")
-    pattern_further_gain: float = _chosen(8.0, "gain that each further pattern must add in a log of `usual_days`")
+    pattern_further_gain: float = _chosen(8.0, "gain that each further pattern must add in a log of `fitted_days`")
     further_clock_factor: float = _chosen(4.0, "times as much is asked of a further pattern of the clock alone")
     most_patterns: int = _chosen(3, "patterns of one unexplained discrepancy")
-    usual_days: float = _chosen(28.0, "length of the logs that gains were fitted on")
+    fitted_days: float = _chosen(28.0, "length of the logs that gains were fitted on")
     largest_bootstrap_p: float = _chosen(0.5, "bootstrap p-value of unseen days being no likelier")
 
     # Sizes and confounded causes.
@@ -183,7 +183,7 @@ class DecisionRules:
         return self.least_gain_transferred if transferred else self.least_gain
 
     def gain_of_pattern(self, *, transferred: bool) -> float:
-        """Return what a pattern must gain in a log of `usual_days`."""
+        """Return what a pattern must gain in a log of `fitted_days`."""
         return self.pattern_gain_transferred if transferred else self.pattern_gain
 
 
