@@ -36,9 +36,9 @@ def heat_to_hold(
     xp: Any,
     heating_setpoint: Array,
     air_temperature: Array,
-    balance: tuple[Array, Array, Array],
+    flux: Array,
+    answer: Array,
     parameters: Values,
-    seconds: Array,
 ) -> Array:
     """Return the heat of the pipes in W m-2 that ends the step at the setpoint, between minimum and capacity.
 
@@ -46,12 +46,12 @@ def heat_to_hold(
         xp: the array namespace.
         heating_setpoint: degC.
         air_temperature: degC as the PLC's sensor shows it.
-        balance: (flux, conductance, capacity) of the air's heat without the pipes (`hybrid.climate.balances`).
+        flux: what moves the temperature without the pipes, W m-2.
+        answer: of the temperature to a flux over the step, K per W m-2 (`hybrid.climate.heat_and_vapour`).
         parameters: `PARAMETERS` by name.
-        seconds: length of the step.
     """
     target = heating_setpoint + parameters["heating_offset"]
-    needed = _flux_to_reach(xp, target - air_temperature, balance, seconds)
+    needed = (target - air_temperature) / answer - flux
     return xp.minimum(xp.maximum(needed, parameters["heating_minimum"]), parameters["heating_capacity"])
 
 
@@ -77,11 +77,6 @@ def co2_to_hold(
     share = 1.25 * (stop - vents) / stop
     zero = 0.0 * share
     allowed = parameters["co2_capacity"] * xp.minimum(xp.maximum(share, zero), zero + 1.0)
-    needed = 3600.0 * _flux_to_reach(xp, missing, balance, seconds)
-    return xp.minimum(xp.maximum(needed, 0.0 * needed), allowed)
-
-
-def _flux_to_reach(xp: Any, difference: Array, balance: tuple[Array, Array, Array], seconds: Array) -> Array:
-    """Return the further flux that changes a state by `difference` over the step (see `climate.relax`)."""
     flux, conductance, capacity = balance
-    return difference * conductance / (1.0 - xp.exp(-seconds * conductance / capacity)) - flux
+    needed = 3600.0 * (missing * conductance / (1.0 - xp.exp(-seconds * conductance / capacity)) - flux)
+    return xp.minimum(xp.maximum(needed, 0.0 * needed), allowed)

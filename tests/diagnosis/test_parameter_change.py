@@ -80,7 +80,7 @@ def test_parameters_that_one_thing_changes_together_are_named_as_one() -> None:
 
 
 def test_a_torn_screen_saves_less_and_lets_more_air_through() -> None:
-    names = ("energy_screen_saving", "screen_air_blocking", "mass_heat_capacity")
+    names = ("energy_screen_saving", "screen_air_resistance", "mass_heat_capacity")
     found = find(with_parameters(Truth({}, {}, (-6.0, -6.0, 0.0)), 1, names=names), np.random.default_rng(0))
     assert found is not None and (found.parameter, found.leads) == ("screens", True)
     assert found.share.low < -0.6 < found.share.high

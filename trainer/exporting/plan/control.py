@@ -77,22 +77,25 @@ def _control(xp: Any, arrays: Mapping[str, Any]) -> Mapping[str, Any]:
     temperature = state["air_temperature"]
     zero = 0.0 * temperature
     idle = drivers | {"rail_pipe_excess": zero, "grow_pipe_excess": zero, "co2_dosing": zero}
-    parts = climate.balances(xp, state, idle, parameters, named.get("added", {}))
+    added = named.get("added", {})
+    parts = climate.balances(xp, state, idle, parameters, added)
+    answers = climate.heat_and_vapour(xp, state, idle, parameters, added, parts, SECONDS)
     if "minimum_pipe_setpoint" in setpoints:
         excess = xp.maximum(setpoints["minimum_pipe_setpoint"] - arrays["shown_temperature"], zero)
         held = named["actuation"]["rail_minimum"] * parameters["rail_pipe_heat_transfer"] * excess
         settings = settings | {"heating_minimum": xp.maximum(settings["heating_minimum"] + zero, held)}
-    heat = holding.heat_to_hold(
-        xp, setpoints["heating_setpoint"], arrays["shown_temperature"], parts["air_temperature"], settings, SECONDS
-    )
+    # Vapour that comes in meanwhile moves the temperature too.
+    to_heat, to_vapour = answers[0]
+    flux = parts["air_temperature"][0] + to_vapour / to_heat * parts["vapour_concentration"][0]
+    heat = holding.heat_to_hold(xp, setpoints["heating_setpoint"], arrays["shown_temperature"], flux, to_heat, settings)
     wanted = setpoints["co2_setpoint"] + settings["co2_offset"]
     missing = air.co2_concentration(temperature, wanted) - air.co2_concentration(temperature, arrays["shown_co2"])
     vents = 0.005 * (drivers["vent_lee"] + drivers["vent_wind"])
     dose = holding.co2_to_hold(xp, missing, parts["co2_concentration"], vents, settings, SECONDS)
     given = {"air_temperature": heat, "co2_concentration": parameters["dosing_share"] * dose / 3600.0}
-    following = {}
-    for name, (flux, conductance, capacity) in parts.items():
-        decay = xp.exp(-SECONDS * conductance / capacity)
-        following[name] = state[name] + (flux + given.get(name, 0.0)) / conductance * (1.0 - decay)
+    for name, more in given.items():
+        flux, pull, capacity = parts[name]
+        parts[name] = (flux + more, pull, capacity)
+    following = climate.moved(xp, state, parts, answers, SECONDS)
     pipes = parameters["rail_pipe_heat_transfer"] + settings["grow_share"] * parameters["grow_pipe_heat_transfer"]
     return following | {"heat": heat, "co2": dose, "rail_pipe_excess": heat / pipes}
