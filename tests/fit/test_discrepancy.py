@@ -66,3 +66,13 @@ def test_a_bundle_carries_it_as_a_file_that_its_manifest_lists(tmp_path: Path) -
     read = read_model(bundle, SITE).history
     assert read is not None and read.own_gains == known().own_gains
     assert read_model(export(replace(model, history=None), tmp_path / "plain"), SITE).history is None
+
+
+def test_what_was_fitted_to_other_balances_is_a_calibration_of_no_greenhouse(tmp_path: Path) -> None:
+    model = replace(FittedModel.described(SITE), calibrated_on=SITE.name, history=known(), discrepancy={"sky": 0.1})
+    bundle = export(model, tmp_path / "bundle")
+    fitted = bundle.manifest.parameters
+    other = replace(bundle, manifest=replace(bundle.manifest, parameters={**fitted, "blocked": fitted["leakage_wind"]}))
+    assert read_model(bundle, SITE).calibrated_on == SITE.name
+    read = read_model(other, SITE)
+    assert (read.calibrated_on, read.history, read.discrepancy) == ("", None, {})

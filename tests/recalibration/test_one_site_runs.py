@@ -243,3 +243,14 @@ def test_a_new_crop_is_calibrated_on_its_own_weeks(tmp_path: Path, monkeypatch) 
     assert turn(date(2020, 2, 10)).endswith("days of log are there, 28 are needed")
     assert turn(date(2020, 1, 30)) == end.note
     assert seen[0].telemetry.time[0] == np.datetime64("2020-01-30T00:00:00")
+
+
+def test_what_was_calibrated_with_other_balances_is_calibrated_anew(tmp_path: Path, monkeypatch) -> None:
+    default = read_bundle(default_bundle_folder())
+    fitted = default.manifest.parameters
+    parameters = {**fitted, "air_blocked": fitted["leakage_wind"]}
+    earlier = replace(default, manifest=replace(default.manifest, calibrated_on="greenhouse", parameters=parameters))
+    monkeypatch.setattr(first_calibration, "bundle_in_force", lambda *_: (earlier, ()))
+    weeks = Archive(tmp_path / "archive")
+    turn = first_calibration.calibrate_first(SITE, weeks, tmp_path / "state", refuse, now=NOON, days=60)
+    assert turn.note.endswith("days of log are there, 28 are needed")

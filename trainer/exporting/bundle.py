@@ -24,7 +24,7 @@ from igrow.core.planner.evolution import EvolutionSettings
 from igrow.core.planner.season import SEASON_FILE, SeasonPlan
 from igrow.core.simulator import actuation, holding
 from igrow.core.simulator.hybrid.nominal import as_described
-from igrow.core.simulator.hybrid.parameters import PARAMETERS
+from igrow.core.simulator.hybrid.parameters import PARAMETERS, fitted_to_these_balances
 from igrow.core.site import Site
 from igrow.trainer.exporting.blocks import OPSET, open_model
 from igrow.trainer.exporting.climate import climate_blocks, effect_parameter
@@ -123,6 +123,8 @@ def export(model: FittedModel, folder: Path | str, *, created: datetime | None =
 def read_model(bundle: Bundle | Path | str, site: Site) -> FittedModel:
     """Return the model that a bundle was made from, as the model of a site.
 
+    What was fitted to other balances, by an earlier version, is a calibration of no greenhouse: it is to be made anew.
+
     Raises:
         BundleError: the bundle is of another variant, or lacks what a model needs.
     """
@@ -131,13 +133,14 @@ def read_model(bundle: Bundle | Path | str, site: Site) -> FittedModel:
     if manifest.variant != "hybrid":
         raise BundleError(f"{bundle.folder}: is a {manifest.variant} bundle; a hybrid one is needed")
     given = manifest.simulator.get("parameters", {})
+    of_these = fitted_to_these_balances(manifest.parameters)
     return FittedModel(
         site=site,
         posterior=_posterior(bundle, site),
-        calibrated_on=manifest.calibrated_on,
+        calibrated_on=manifest.calibrated_on if of_these else "",
         alignment=manifest.alignment,
-        discrepancy=manifest.discrepancy,
-        history=_history_of(bundle),
+        discrepancy=manifest.discrepancy if of_these else {},
+        history=_history_of(bundle) if of_these else None,
         effects=manifest.effects,
         actuation={name: float(given.get(f"actuation:{name}", rule.value)) for name, rule in actuation.RULES.items()},
         holding={name: float(given.get(f"holding:{name}", one.value)) for name, one in holding.PARAMETERS.items()},

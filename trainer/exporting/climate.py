@@ -145,8 +145,9 @@ def _effect_blocks(effect: Effect, drivers: Sequence[str]) -> EffectBlocks:
 
 def _derive_formula(xp: Any, arrays: Mapping[str, Any]) -> Mapping[str, Any]:
     named = grouped(arrays)
-    derived = climate.derive(xp, named["state"], named["input"], named["parameter"], arrays["lamp_efficacy"])
-    return {name: value for name, value in derived.items() if name not in named["input"]}
+    inputs = named["input"] | {"mean_height": arrays["mean_height"]}
+    derived = climate.derive(xp, named["state"], inputs, named["parameter"], arrays["lamp_efficacy"])
+    return {name: value for name, value in derived.items() if name not in inputs}
 
 
 def _relax_formula(xp: Any, arrays: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from igrow.core.bundle import Bundle
+from igrow.core.simulator.hybrid.parameters import fitted_to_these_balances
 from igrow.core.site import Site
 from igrow.trainer.service import history, seasons
 from igrow.trainer.service.archive import Archive, SiteLog
@@ -56,7 +57,7 @@ def calibrate_first(
     """
     log = archive.read(site.name, (now - timedelta(days=days)).date(), now.date() + timedelta(days=2))
     bundle, notes = bundle_in_force(folder, log.reports)
-    if bundle.manifest.calibrated_on == site.name:
+    if bundle.manifest.calibrated_on == site.name and fitted_to_these_balances(bundle.manifest.parameters):
         if not _has_new_crop(site, log, bundle):
             note = f"{bundle.label} was calibrated on it already; recalibrate corrects it"
             return Turn(COMMAND, site.name, now, "waiting", False, note, notes=notes)

@@ -6,7 +6,7 @@ value. Calibration starts from it; a bundle carries the posterior, which is the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -303,3 +303,8 @@ _ROWS = (
 
 PARAMETERS: Mapping[str, PhysicalParameter] = MappingProxyType({row[0]: PhysicalParameter(*row) for row in _ROWS})
 """Every physical parameter by its name."""
+
+
+def fitted_to_these_balances(names: Collection[str]) -> bool:
+    """Tell whether parameters were fitted to the balances as they are: a model that knows others had other balances."""
+    return all(name in PARAMETERS for name in names)
