@@ -12,15 +12,15 @@ from benchmarks.forecasts.disturbance import (
     helpful_channels,
     missing_fluxes,
 )
-from igrow.core.simulator.hybrid.nominal import nominal, site_record
-from tests.virtual_log import SITE, virtual_log
+from igrow.core.simulator.hybrid.nominal import site_record
+from tests.virtual_log import GREENHOUSE, SITE, virtual_log
 
 DAY = 288
 
 
 @pytest.fixture(scope="module")
 def parameters() -> dict[str, float]:
-    return nominal(SITE)
+    return GREENHOUSE
 
 
 def test_a_flux_that_the_balances_lack_is_seen_in_its_size_and_channel(parameters: dict[str, float]) -> None:

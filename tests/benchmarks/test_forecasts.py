@@ -7,9 +7,9 @@ import numpy as np
 from benchmarks.forecasts.combination import fit_combination
 from benchmarks.forecasts.disturbance import missing_fluxes, observed_runs
 from benchmarks.forecasts.residual_model import fit_residual_model
-from igrow.core.simulator.hybrid.nominal import nominal, site_record
+from igrow.core.simulator.hybrid.nominal import site_record
 from igrow.trainer.fit.evaluation import errors_of, evaluate, summarise
-from tests.virtual_log import SITE, virtual_log
+from tests.virtual_log import GREENHOUSE, SITE, virtual_log
 
 
 def test_the_remainder_finds_a_flux_that_follows_the_weather_and_stays_bounded() -> None:
@@ -18,7 +18,7 @@ def test_the_remainder_finds_a_flux_that_follows_the_weather_and_stays_bounded()
     lost = -0.15 * plain.inputs["global_radiation"]
     record = site_record(virtual_log(10, seed=6, added={"heat": lost}), SITE, 300.0)
     fit, later = np.arange(count) < 6 * 288, np.arange(count) >= 7 * 288
-    values = nominal(SITE)
+    values = GREENHOUSE
     residual_model = fit_residual_model([(record, fit, missing_fluxes(record, values, {}))], 0.03)
     bare = evaluate(record, values, {}, ("24_h",), later)
     added = residual_model.fluxes(record)

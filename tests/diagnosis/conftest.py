@@ -9,12 +9,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from igrow.core.simulator.hybrid.nominal import nominal
 from igrow.trainer.data import Log, prepare_log
 from igrow.trainer.diagnosis import Diagnosis, diagnose
 from igrow.trainer.fit import FittedModel, Gaussian
 from tests.made_once import made_once
-from tests.virtual_log import SITE, virtual_log, weather
+from tests.virtual_log import GREENHOUSE, SITE, virtual_log, weather
 
 Floats = NDArray[np.float64]
 DAYS = 20
@@ -50,7 +49,7 @@ def greenhouse_log(
 
 def model_in_force() -> FittedModel:
     """A model that knows the greenhouse's parameters within five per cent, and not what it misses there."""
-    values = nominal(SITE)
+    values = GREENHOUSE
     deviation = {name: 0.05 * abs(value) + 1e-6 for name, value in values.items()}
     return FittedModel(SITE, Gaussian.independent(values, deviation), SITE.name, alignment=0.0)
 

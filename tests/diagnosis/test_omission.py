@@ -20,7 +20,7 @@ from igrow.trainer.fit.climate import bounds, fit_climate, site_prior
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.omission import Omission
 from igrow.trainer.report import sentences
-from tests.virtual_log import SITE, virtual_log
+from tests.virtual_log import GREENHOUSE, SITE, virtual_log
 
 
 @pytest.fixture(scope="module")
@@ -28,9 +28,15 @@ def record() -> Record:
     return site_record(virtual_log(10, seed=3), SITE, 900.0)
 
 
-def held(*parameters: str) -> Gaussian:
-    """Return the description's prior with parameters held at their lowest values."""
+def prior_of_it() -> Gaussian:
+    """Return a prior about the greenhouse that the logs are of."""
     prior = site_prior(SITE)
+    return prior.moved(np.array([GREENHOUSE[name] for name in prior.names]))
+
+
+def held(*parameters: str) -> Gaussian:
+    """Return the same with parameters held at their lowest values."""
+    prior = prior_of_it()
     mean, deviation = prior.mean.copy(), prior.standard_deviation.copy()
     for parameter in parameters:
         place = prior.names.index(parameter)
@@ -46,7 +52,7 @@ def test_a_parameter_that_was_held_is_not_free_again_when_the_log_is_asked() -> 
 
 
 def test_a_term_that_was_taken_out_gains_and_one_that_is_there_does_not(record: Record) -> None:
-    whole = omission.gains_of(record, SITE, site_prior(SITE), DEFAULT)
+    whole = omission.gains_of(record, SITE, prior_of_it(), DEFAULT)
     lacking = omission.gains_of(record, SITE, held("transpiration_night_share"), DEFAULT)
     assert set(whole) <= set(TERMS)
     assert whole["night_transpiration"] < 5.0

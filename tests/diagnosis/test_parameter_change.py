@@ -10,7 +10,6 @@ import pytest
 
 from igrow.core.language import speak
 from igrow.core.simulator.hybrid import climate
-from igrow.core.simulator.hybrid.nominal import nominal
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.core.simulator.hybrid.record import observe
 from igrow.core.telemetry import Telemetry, concatenate
@@ -27,7 +26,7 @@ from igrow.trainer.report import sentences
 from igrow.trainer.report.worth import worth
 from tests.diagnosis.synthetic_design import BALANCES, PLAIN, Truth, make_design
 from tests.made_once import made_once
-from tests.virtual_log import SITE, disturbances, virtual_log
+from tests.virtual_log import GREENHOUSE, SITE, disturbances, virtual_log
 
 NAMES = ("transmissivity", "mass_heat_capacity", "leakage_wind")
 STEP, DAYS, KNOWN = 900.0, 44, 24
@@ -135,7 +134,7 @@ def test_air_that_leaks_may_come_in_by_a_vent_that_does_not_close() -> None:
 @pytest.fixture(scope="module")
 def log() -> tuple[Telemetry, Telemetry]:
     """The same weeks twice: with the cover as it was, and with a third of its light taken."""
-    painted = nominal(SITE) | {"transmissivity": 0.67 * nominal(SITE)["transmissivity"]}
+    painted = GREENHOUSE | {"transmissivity": 0.67 * GREENHOUSE["transmissivity"]}
     added = disturbances(DAYS, STEP, seed=5)
     plain = virtual_log(DAYS, seed=5, step=STEP, added=added)
     return plain, virtual_log(DAYS, seed=5, step=STEP, added=added, parameters=painted)
@@ -221,7 +220,7 @@ def test_a_cover_that_is_painted_within_the_log_has_a_date(
 def test_leaves_that_wilt_within_the_log_have_a_date_and_are_no_sensor(
     log: tuple[Telemetry, Telemetry], model: FittedModel
 ) -> None:
-    plain, values = log[0], nominal(SITE)
+    plain, values = log[0], GREENHOUSE
     wilted = values | {name: 0.4 * values[name] for name in members("transpiration")}
     after = virtual_log(DAYS, seed=5, step=STEP, added=disturbances(DAYS, STEP, seed=5), parameters=wilted)
     told = diagnose(later((plain, after), 9), model)

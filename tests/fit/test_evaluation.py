@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from igrow.core.errors import IgrowError
-from igrow.core.simulator.hybrid.nominal import nominal, site_record
+from igrow.core.simulator.hybrid.nominal import site_record
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.fit.evaluation import evaluate, starts_within
-from tests.virtual_log import SITE, virtual_log
+from tests.virtual_log import GREENHOUSE, SITE, virtual_log
 
 
 @pytest.fixture(scope="module")
@@ -18,7 +18,7 @@ def record() -> Record:
 
 
 def test_the_true_model_has_no_error_but_noise(record: Record) -> None:
-    values = nominal(SITE)
+    values = GREENHOUSE
     errors = evaluate(record, values, {}, ("1_h", "24_h"), np.arange(len(record)) > 2 * 288)
     assert errors["air_temperature"]["24_h"].mae < 0.2
     assert errors["air_temperature"]["24_h"].mae_low <= errors["air_temperature"]["24_h"].mae
@@ -36,4 +36,4 @@ def test_a_run_counts_only_if_all_its_rows_are_allowed(record: Record) -> None:
 
 def test_an_unknown_horizon_is_refused_in_one_line(record: Record) -> None:
     with pytest.raises(IgrowError, match="'2_h' is not known: 1_step, 1_h"):
-        evaluate(record, nominal(SITE), {}, ("2_h",))
+        evaluate(record, GREENHOUSE, {}, ("2_h",))

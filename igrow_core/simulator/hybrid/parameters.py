@@ -270,7 +270,7 @@ _ROWS = (
     (
         "assimilation_maximum",
         "g m-2 h-1",
-        7.0,
+        10.0,
         0.3,
         0.5,
         30.0,
