@@ -70,8 +70,8 @@ def quiet_diagnosis() -> Diagnosis:
 @pytest.fixture(scope="session")
 def leaky_log() -> Log:
     """Wind presses 0.12 air changes per hour and m/s more through the envelope than the model knows."""
-    wind = weather(DAYS, STEP, 2)["wind_speed"]
-    return greenhouse_log(2, {"air_exchange": 0.12 * wind * SITE.greenhouse.mean_height / 3600.0})
+    wind = weather(DAYS, STEP, 15)["wind_speed"]
+    return greenhouse_log(15, {"air_exchange": 0.12 * wind * SITE.greenhouse.mean_height / 3600.0})
 
 
 @pytest.fixture(scope="session")

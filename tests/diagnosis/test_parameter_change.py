@@ -15,7 +15,16 @@ from igrow.core.simulator.hybrid.record import observe
 from igrow.core.telemetry import Telemetry, concatenate
 from igrow.trainer.calibration import calibrate
 from igrow.trainer.data import Log, prepare_log
-from igrow.trainer.diagnosis import DEFAULT, Diagnosis, Finding, amplitudes, diagnose, history, wording
+from igrow.trainer.diagnosis import (
+    DEFAULT,
+    Diagnosis,
+    Finding,
+    amplitudes,
+    diagnose,
+    history,
+    parameter_change,
+    wording,
+)
 from igrow.trainer.diagnosis.design import Design, History
 from igrow.trainer.diagnosis.drift import Drift
 from igrow.trainer.diagnosis.parameter_change import find
@@ -30,6 +39,12 @@ from tests.virtual_log import GREENHOUSE, SITE, disturbances, virtual_log
 
 NAMES = ("transmissivity", "mass_heat_capacity", "leakage_wind")
 STEP, DAYS, KNOWN = 900.0, 44, 24
+
+
+@pytest.fixture
+def linear(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No greenhouse stands behind a design of `with_parameters`: its columns are what the changes are at any size."""
+    monkeypatch.setattr(parameter_change, "at_its_size", lambda design, one, *_: (design, one))
 
 
 def with_parameters(truth: Truth, seed: int, *, names: Sequence[str] = NAMES, **null_gains: float) -> Design:
@@ -60,6 +75,7 @@ def with_parameters(truth: Truth, seed: int, *, names: Sequence[str] = NAMES, **
     return solved
 
 
+@pytest.mark.usefixtures("linear")
 def test_the_parameter_that_has_changed_is_named_with_its_size() -> None:
     found = find(with_parameters(Truth({}, {}, (-3.0, 0.0, 0.0)), 1), np.random.default_rng(0))
     assert found is not None and found.leads
@@ -68,6 +84,7 @@ def test_the_parameter_that_has_changed_is_named_with_its_size() -> None:
     assert abs(found.share.value + 0.3) < 0.03
 
 
+@pytest.mark.usefixtures("linear")
 def test_parameters_that_one_thing_changes_together_are_named_as_one() -> None:
     names = ("vent_stack", "vent_wind", "mass_heat_capacity")
     found = find(with_parameters(Truth({}, {}, (-6.0, -6.0, 0.0)), 1, names=names), np.random.default_rng(0))
@@ -78,6 +95,7 @@ def test_parameters_that_one_thing_changes_together_are_named_as_one() -> None:
     assert alone is not None and alone.parameter == "vent_stack"
 
 
+@pytest.mark.usefixtures("linear")
 def test_a_torn_screen_saves_less_and_lets_more_air_through() -> None:
     names = ("energy_screen_saving", "screen_air_resistance", "mass_heat_capacity")
     found = find(with_parameters(Truth({}, {}, (-6.0, -6.0, 0.0)), 1, names=names), np.random.default_rng(0))
@@ -85,6 +103,7 @@ def test_a_torn_screen_saves_less_and_lets_more_air_through() -> None:
     assert found.share.low < -0.6 < found.share.high
 
 
+@pytest.mark.usefixtures("linear")
 def test_a_small_change_is_named_only_where_it_leads() -> None:
     """A washed cover: 15 % more light. Named an effect in its place it would be a sensor in the sun."""
     washed, cleaned = (with_parameters(Truth({}, {}, (tenths, 0.0, 0.0)), 1) for tenths in (1.5, 0.6))
@@ -95,24 +114,29 @@ def test_a_small_change_is_named_only_where_it_leads() -> None:
     assert find(beside, np.random.default_rng(0)) is None
 
 
+@pytest.mark.usefixtures("linear")
 def test_nothing_is_named_where_nothing_has_changed() -> None:
     for seed in range(5):
         assert find(with_parameters(Truth({}, {}), 10 + seed), np.random.default_rng(0)) is None
 
 
+@pytest.mark.usefixtures("linear")
 def test_a_parameter_that_nobody_can_look_at_is_not_named() -> None:
     assert find(with_parameters(Truth({}, {}, (0.0, 3.0, 0.0)), 2), np.random.default_rng(0)) is None
 
 
+@pytest.mark.usefixtures("linear")
 def test_a_parameter_must_gain_far_more_than_where_nothing_had_changed() -> None:
     truth = Truth({}, {}, (-3.0, 0.0, 0.0))
     assert find(with_parameters(truth, 3, transmissivity=1e6), np.random.default_rng(0)) is None
 
 
+@pytest.mark.usefixtures("linear")
 def test_a_change_to_less_than_nothing_is_none() -> None:
     assert find(with_parameters(Truth({}, {}, (-11.0, 0.0, 0.0)), 6), np.random.default_rng(0)) is None
 
 
+@pytest.mark.usefixtures("linear")
 def test_an_effect_that_explains_more_goes_before_a_parameter() -> None:
     found = find(with_parameters(Truth({"lamp_heat": 4.0}, {}, (-3.0, 0.0, 0.0)), 4), np.random.default_rng(0))
     assert found is not None and not found.leads

@@ -21,7 +21,7 @@ from tests.virtual_log import SITE, virtual_log
 
 DAYS, STEP = 84, 3600.0
 PARAMETERS = FittedModel.described(SITE).posterior.values
-SLOW, HUNGRY = 0.8, 3.0
+SLOW, HUNGRY = 0.8, 2.0
 """Conversion and maintenance of the crop that grew, over those of the built-in one."""
 
 

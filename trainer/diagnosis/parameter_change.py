@@ -14,13 +14,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from igrow.core.bundle import Estimate
-from igrow.trainer.diagnosis import change, linear, search
+from igrow.trainer.diagnosis import change, linear, search, sensitivity
 from igrow.trainer.diagnosis.design import Block, Design
 from igrow.trainer.diagnosis.estimate import OnsetInterval, onset_interval, reach
 from igrow.trainer.diagnosis.linear import Fit
+from igrow.trainer.diagnosis.recalibration import averaging
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.diagnosis.visible_parameters import TOGETHER, VISIBLE, members
 from igrow.trainer.fit.climate import bounds
+
+SECANTS = 2
+"""Turns in which the size of a change is found by the change of before: the first is that of the slope."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +71,8 @@ def find(design: Design, rng: np.random.Generator) -> ParameterChange | None:
         return None
     effects = search.score_candidates(design, null, onsets, rng)
     largest = max((change.net_gain(design, one) for one in effects), default=0.0)
+    design, best = at_its_size(design, best, onsets, rng)
+    null = linear.fit(design.grams, design.null_model())
     leads = best.gain >= rules.parameter_over_effect * largest
     named = linear.fit(design.grams, null.model.with_term(best.term))
     value, low, high = _range(design, best.parameter)
@@ -92,6 +98,39 @@ def find(design: Design, rng: np.random.Generator) -> ParameterChange | None:
         (best.parameter, *as_good),
         leads,
     )
+
+
+def at_its_size(
+    design: Design, one: Hypothesis, onsets: Sequence[int | None], rng: np.random.Generator
+) -> tuple[Design, Hypothesis]:
+    """Return a parameter's change as what it is at its size, and not as what a slope makes of it; and a design with it.
+
+    Effects are nearly linear in their amplitude; a third of the light, or half of what a crop transpires, is not in a
+    parameter, and explains less along its slope than it does.
+    """
+    place = design.values.shape[0]
+    average, none = averaging(design.line, design.interval, design.rules), np.zeros(1)
+    value, low, high = _range(design, one.parameter)
+    told = design, one
+    for _ in range(SECANTS):
+        column = sensitivity.parameter_secant(
+            design.line, members(one.parameter), one.amplitude, one.parameter in TOGETHER
+        )
+        block = Block((one.parameter,), range(place, place + 1), none, None)
+        wider = replace(
+            design,
+            blocks={**design.blocks, "changed": block},
+            values=np.concatenate([design.values, average(column[None])]),
+        ).whitened(design.whitening)
+        null = linear.fit(wider.grams, wider.null_model())
+        limits = np.array([[low - value, high - value]])
+        scanned = search.scan(wider.grams, null, [place], [None], onsets, limits, rng, design.rules.flips)
+        found = search.best_of_each(scanned, [one.parameter], [None], [one.parameter], design.onset_price)
+        if not found or found[0].gain < one.gain:
+            break
+        one = found[0]
+        told = wider, one
+    return told
 
 
 def joined(design: Design) -> Design:

@@ -145,6 +145,25 @@ def parameter_sensitivities(line: Linearisation, names: Sequence[str], spread: F
     return -(_batched(shown, len(names), line) - line.shown) / step[:, None, None, None]
 
 
+def parameter_secant(line: Linearisation, names: Sequence[str], amount: float, share: bool) -> Floats:
+    """Return the change of the errors with a change of parameters, over its amount, (3, r, steps).
+
+    Args:
+        line: where the parameters are what they were.
+        names: of the parameters.
+        amount: of the change, of each parameter; within its bounds.
+        share: the amount is a share of each.
+    """
+    varied = dict(line.parameters)
+    for name in names:
+        now = line.parameters[name]
+        moved = now + amount * (now if share else 1.0)
+        varied[name] = float(np.clip(moved, PARAMETERS[name].low, PARAMETERS[name].high))
+    states = observe(line.record, varied, line.effects)
+    shown = free_run(line.record, states, line.runs.starts, line.runs.steps, varied, line.effects, line.added)
+    return np.asarray(-(_stacked(shown) - line.shown) / amount)
+
+
 def sensor_sensitivity(line: Linearisation, effect: Effect, shape: Mapping[str, float]) -> Floats:
     """Return d(error)/d(amplitude), (3, r, steps), of a sensor effect that is not active."""
     small = EFFECT_DIFFERENCE * effect.amplitude.typical
