@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from igrow.core.simulator.hybrid.nominal import nominal
 from igrow.trainer.data import prepare_log
 from igrow.trainer.data.splits import split_days
 from igrow.trainer.diagnosis import sensitivity
@@ -13,13 +12,13 @@ from igrow.trainer.diagnosis.recalibration import averaging, recalibrate
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.fit import Gaussian
 from tests.diagnosis.conftest import disturbances
-from tests.virtual_log import SITE, virtual_log
+from tests.virtual_log import GREENHOUSE, SITE, virtual_log
 
 DAYS = 16
 
 
 def test_a_parameter_that_moved_is_found_beside_coloured_disturbances() -> None:
-    known = nominal(SITE)
+    known = GREENHOUSE
     truth = known | {"transmissivity": 0.85 * known["transmissivity"]}
     added = disturbances(DAYS, 900.0, 9)
     record = prepare_log(virtual_log(DAYS, seed=9, step=900.0, parameters=truth, added=added), SITE).record(0.0)
@@ -38,7 +37,7 @@ def test_a_parameter_that_moved_is_found_beside_coloured_disturbances() -> None:
 
 
 def test_what_is_expected_to_be_missing_moves_no_parameter() -> None:
-    known = nominal(SITE)
+    known = GREENHOUSE
     hours = np.arange(DAYS * 96) % 96
     flux = np.where(hours < 24, 15.0, 0.0)
     record = prepare_log(virtual_log(DAYS, seed=10, step=900.0, added={"heat": flux}), SITE).record(0.0)
