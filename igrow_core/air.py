@@ -21,6 +21,8 @@ MOLAR_MASS_CO2 = 0.04401
 """kg mol-1."""
 SPECIFIC_HEAT_AIR = 1006.0
 """Specific heat of dry air at constant pressure, J kg-1 K-1."""
+VOLUMETRIC_HEAT = 1.2 * SPECIFIC_HEAT_AIR
+"""Heat capacity of air at 20 degC, J m-3 K-1."""
 LATENT_HEAT = 2.45e6
 """Heat of evaporation of water at 20 degC, J kg-1."""
 STEFAN_BOLTZMANN = 5.670374419e-8

@@ -19,6 +19,7 @@ from igrow.core.arrays import Floats, Integers, Mask
 from igrow.core.effects.definition import Values
 from igrow.core.simulator.hybrid import climate
 from igrow.core.simulator.hybrid import record as records
+from igrow.core.simulator.hybrid.balances import balances
 from igrow.core.simulator.hybrid.climate import ActiveEffects
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.fit.evaluation import Predictor, starts_within
@@ -78,7 +79,7 @@ def missing_fluxes(
     substeps = max(1, round(record.step / records.SUBSTEP))
     drivers = climate.derive(np, ahead, inputs, parameters, record.lamp_efficacy)
     added_by_effects = climate.contributions(np, drivers, ahead, effects, record.step)
-    fluxes = climate.balances(np, ahead, drivers, parameters, added_by_effects)
+    fluxes = balances(np, ahead, drivers, parameters, added_by_effects)
     for _ in range(substeps):
         ahead = climate.advance(
             np,

@@ -72,7 +72,7 @@ def make_plan(site: Site, request: PlanRequest) -> Plan:
     forecast = np.mean(courses, axis=0)
     state = PlanningState(
         time=np.datetime64(start, "s"),
-        initial=present(request.telemetry, start),
+        initial=beginning(request.telemetry, start),
         applied=present(request.telemetry.only(name for name in SETPOINTS if name in request.telemetry), start),
         co2_before=co2_since_planting(site, request.telemetry, start, request.co2_counted),
         memory=remember(Place.of(site), request.telemetry, start),
@@ -205,6 +205,11 @@ def present(log: Telemetry, start: int) -> dict[str, float]:
     return values
 
 
+def beginning(log: Telemetry, start: int) -> dict[str, float]:
+    """Return what a simulated plan begins from: what is present, and the air's mean of the day before for the floor."""
+    return present(log, start) | {"mean_air_temperature": warmth(log, start)}
+
+
 def recently(simulator: Simulator, balance: GrowthBalance | None, site: Site, log: Telemetry, start: int) -> Corrected:
     """Return the simulator corrected by how the last whole days of the log departed from what it says of them."""
     begin = np.datetime64(start, "s")
@@ -228,7 +233,7 @@ def recently(simulator: Simulator, balance: GrowthBalance | None, site: Site, lo
             weather = without_gaps(hourly(log, morning, 24))
         except IgrowError:
             continue
-        outcome = simulator.simulate(present(log, morning), weather, setpoints[None], np.datetime64(morning, "s"))
+        outcome = simulator.simulate(beginning(log, morning), weather, setpoints[None], np.datetime64(morning, "s"))
         measured = used_in(day, site.greenhouse)
         for column, values in ((expected, totals(outcome)), (used, measured)):
             for name in SCALED:

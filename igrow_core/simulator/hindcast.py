@@ -17,7 +17,7 @@ from igrow.core.simulator.hybrid.record import Record
 from igrow.core.telemetry import Telemetry
 
 SETTLING = 86_400.0
-"""Seconds before the origin in which floor and memories follow the measured climate."""
+"""Seconds before the origin in which floor and memories follow the measured climate; it begins at their mean."""
 _STAND_INS = {"air_temperature": 20.0, "air_humidity": 75.0, "air_co2": 500.0}
 """What a climate counts as that the log does not measure."""
 _TOGETHER = 64
@@ -85,6 +85,7 @@ class Hindcast:
         self._session = open_session(bundle.graph("hindcast"))
         tensors = {tensor.name: tensor.quantities for tensor in bundle.manifest.graphs["hindcast"].inputs}
         self._inputs = tensors["inputs"]
+        self._beginning = tensors["climate"]
         self._parameters = np.array(
             [[self.settings.parameters[name]] for name in tensors["parameters"]], dtype=np.float32
         )
@@ -122,8 +123,10 @@ class Hindcast:
         rows = np.clip(origins[None, :] + np.arange(-settling, steps)[:, None], 0, None)
         inputs = np.stack([record.inputs[name][rows] for name in self._inputs], axis=1)
         shown = np.stack([filled[name] for name in PREDICTED])
+        settled = shown[0][rows[: settling + 1]].mean(axis=0)
+        beginning = dict(zip(PREDICTED, shown[:, rows[0]], strict=True)) | {"mean_air_temperature": settled}
         feed = {
-            "climate": shown[:, rows[0]],
+            "climate": np.stack([beginning[name] for name in self._beginning]),
             "inputs": inputs,
             "measured": np.swapaxes(shown[:, np.minimum(rows + 1, len(record) - 1)], 0, 1),
             "follow": (np.arange(-settling, steps) < 0)[:, None],

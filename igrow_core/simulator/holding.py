@@ -47,7 +47,7 @@ def heat_to_hold(
         heating_setpoint: degC.
         air_temperature: degC as the PLC's sensor shows it.
         flux: what moves the temperature without the pipes, W m-2.
-        answer: of the temperature to a flux over the step, K per W m-2 (`hybrid.climate.heat_and_vapour`).
+        answer: of the temperature to a flux over the step, K per W m-2 (`hybrid.exponential.heat_and_vapour`).
         parameters: `PARAMETERS` by name.
     """
     target = heating_setpoint + parameters["heating_offset"]

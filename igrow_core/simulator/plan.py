@@ -62,6 +62,7 @@ class BundleSimulator:
         self._session = open_session(bundle.graph("simulator"))
         try:
             tensors = {one.name: one.quantities for one in bundle.manifest.graphs["simulator"].inputs}
+            self._beginning = tensors["climate"]
             self._weather = tensors["weather"]
             self.setpoints = tensors["setpoints"]
             """That the graph takes; a bundle of before one was known goes on without it."""
@@ -92,6 +93,9 @@ class BundleSimulator:
         batch = members * candidates
         time = start.astype("datetime64[s]") + np.arange(hours) * np.timedelta64(3600, "s")
         given = {name: _known(initial, name) for name in (*PREDICTED, *GROWTH, "fruit_fresh_weight")}
+        given["mean_air_temperature"] = initial.get("mean_air_temperature", np.nan)
+        if not np.isfinite(given["mean_air_temperature"]):
+            given["mean_air_temperature"] = given["air_temperature"]
         excess = max(initial.get("rail_pipe_temperature", 0.0) - given["air_temperature"], 0.0)
         standing = dict(initial) | {"rail_pipe_excess": excess}
 
@@ -99,7 +103,7 @@ class BundleSimulator:
             return np.tile(np.nan_to_num(np.array(values))[:, None], (1, batch))
 
         feed = {
-            "climate": spread([given[name] for name in PREDICTED]),
+            "climate": spread([given[name] for name in self._beginning]),
             "growth": spread([given[name] for name in GROWTH]),
             "harvest": spread([given["fruit_fresh_weight"]]),
             "equipment": spread([standing.get(name, 0.0) for name in EQUIPMENT]),

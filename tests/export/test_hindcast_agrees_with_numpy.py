@@ -60,6 +60,8 @@ def values_of(blocks: ClimateBlocks, amplitude: float) -> dict[str, float]:
 
 
 NOWHERE = np.zeros(ROWS, dtype=bool)
+MEAN = np.array([19.0, 19.5, 20.0])
+"""Air temperature of the day before, degC."""
 
 
 def run_graph(
@@ -72,7 +74,7 @@ def run_graph(
     """Run the graph for a day; where `followed`, the measured climate is `start` again."""
     session = open_model(hindcast_model(blocks))
     feed = {
-        "climate": start,
+        "climate": np.vstack([start, MEAN]),
         "inputs": inputs,
         "measured": np.broadcast_to(start, (ROWS, *start.shape)),
         "follow": followed[:, None],
@@ -102,14 +104,15 @@ def run_numpy(
         named = dict(zip(blocks.inputs, inputs[k], strict=True))
         return named | {"mean_height": HEIGHT, "elapsed_days": elapsed}
 
-    state = climate.initial_state(np, dict(zip(PREDICTED, start, strict=True)), row(0), parameters, effects, EFFICACY)
+    given = dict(zip(PREDICTED, start, strict=True)) | {"mass_temperature": MEAN, "soil_temperature": MEAN}
+    state = climate.initial_state(np, given, row(0), parameters, effects, EFFICACY)
     shown = []
     for k in range(ROWS):
         state = climate.advance(np, state, row(k), parameters, effects, seconds=SECONDS, lamp_efficacy=EFFICACY)
         drivers = climate.derive(np, state, row(k), parameters, EFFICACY)
         shown.append(np.stack([measured(np, drivers, state, effects)[name] for name in PREDICTED]))
         if followed[k]:
-            given = dict(zip(PREDICTED, start, strict=True)) | {"mass_temperature": state["mass_temperature"]}
+            given |= {name: state[name] for name in ("mass_temperature", "soil_temperature")}
             state = climate.initial_state(np, given, row(k), parameters, effects, EFFICACY)
     return np.stack(shown)
 

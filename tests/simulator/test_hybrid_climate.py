@@ -11,6 +11,7 @@ from igrow.core.air import STANDARD_PRESSURE
 from igrow.core.effects import EFFECTS
 from igrow.core.simulator.hybrid import climate
 from igrow.core.simulator.hybrid import record as records
+from igrow.core.simulator.hybrid.balances import balances
 from igrow.core.simulator.hybrid.nominal import leaf_area_curve, nominal, site_record
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.core.site import Crop, Greenhouse, Site
@@ -58,7 +59,7 @@ def test_at_rest_every_balance_is_closed() -> None:
     for _ in range(24 * 12 * 20):
         state = climate.advance(np, state, inputs, values, {}, seconds=300.0, lamp_efficacy=1.2)
     drivers = climate.derive(np, state, inputs, values, 1.2)
-    fluxes = climate.balances(np, state, drivers, values, {})
+    fluxes = balances(np, state, drivers, values, {})
     assert abs(fluxes["air_temperature"][0]) < 0.01
     assert abs(fluxes["vapour_concentration"][0]) < 1e-9
     assert abs(fluxes["co2_concentration"][0]) < 1e-10
@@ -121,7 +122,7 @@ def test_a_closed_screen_stops_vents_and_leaks() -> None:
     for screen in (0.0, 100.0):
         inputs = steady_inputs(energy_screen=screen, vent_lee=20.0)
         drivers = climate.derive(np, state, inputs, values, 1.2)
-        exchange.append(climate.balances(np, state, drivers, values, {})["co2_concentration"][1])
+        exchange.append(balances(np, state, drivers, values, {})["co2_concentration"][1])
     assert exchange[1] < 0.7 * exchange[0]
 
 

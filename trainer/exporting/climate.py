@@ -13,7 +13,9 @@ from typing import Any
 from igrow.core import air
 from igrow.core.effects import EFFECTS, Effect
 from igrow.core.simulator.hybrid import climate
+from igrow.core.simulator.hybrid.balances import STATES
 from igrow.core.simulator.hybrid.climate import memory_name
+from igrow.core.simulator.hybrid.exponential import relax
 from igrow.core.simulator.hybrid.measurement import PREDICTED
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.trainer.exporting.blocks import Block, grouped, tags, trace
@@ -43,7 +45,7 @@ class ClimateBlocks:
     inputs: tuple[str, ...]
     """Inputs that the stage or an active effect reads, in the order of the graph's input."""
     states: tuple[str, ...]
-    """`climate.STATES` and the memories of the active effects."""
+    """`STATES` and the memories of the active effects."""
     parameters: tuple[str, ...]
     """Constants, physical parameters, and parameters of the effects as ``effect:name:parameter``; then onsets."""
     channels: tuple[str, ...]
@@ -51,7 +53,7 @@ class ClimateBlocks:
     derive: Block
     relax: Block
     from_measured: Block
-    """`PREDICTED` to the first three of `climate.STATES`."""
+    """`PREDICTED` to the first three of `STATES`."""
     effects: tuple[EffectBlocks, ...]
 
     @property
@@ -69,7 +71,7 @@ def climate_blocks(effects: Sequence[str]) -> ClimateBlocks:
     read = {driver for effect in chosen for driver in effect.drivers}
     inputs = (*climate.INPUTS, *(name for name in _EXOGENOUS if name in read))
     anything = [*CONSTANTS, *tags("parameter", PARAMETERS)]
-    derive = trace("climate", _derive_formula, [*tags("state", climate.STATES), *tags("input", inputs), *anything])
+    derive = trace("climate", _derive_formula, [*tags("state", STATES), *tags("input", inputs), *anything])
     drivers = (*inputs, *derive.outputs, "mean_height")
     blocks = tuple(_effect_blocks(effect, drivers) for effect in chosen)
     channels = sorted({key for one in blocks if one.effect.kind == "process" for key in one.contribution.outputs})
@@ -77,7 +79,7 @@ def climate_blocks(effects: Sequence[str]) -> ClimateBlocks:
         "balances",
         _relax_formula,
         [
-            *tags("state", climate.STATES),
+            *tags("state", STATES),
             *tags("driver", drivers),
             *tags("added", channels),
             *tags("parameter", PARAMETERS),
@@ -92,7 +94,7 @@ def climate_blocks(effects: Sequence[str]) -> ClimateBlocks:
     from_measured = trace("climate_state", _state_formula, PREDICTED)
     return ClimateBlocks(
         inputs,
-        (*climate.STATES, *memories),
+        (*STATES, *memories),
         tuple(names),
         tuple(tags("added", channels)),
         derive,
@@ -152,9 +154,7 @@ def _derive_formula(xp: Any, arrays: Mapping[str, Any]) -> Mapping[str, Any]:
 
 def _relax_formula(xp: Any, arrays: Mapping[str, Any]) -> Mapping[str, Any]:
     named = grouped(arrays)
-    return climate.relax(
-        xp, named["state"], named["driver"], named["parameter"], named.get("added", {}), arrays["seconds"]
-    )
+    return relax(xp, named["state"], named["driver"], named["parameter"], named.get("added", {}), arrays["seconds"])
 
 
 def _state_formula(xp: Any, arrays: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from igrow.core.simulator.hybrid import climate
+from igrow.core.simulator.hybrid.balances import STATES
 from igrow.core.simulator.hybrid.climate import memory_name
 from igrow.core.simulator.hybrid.measurement import PREDICTED
 from igrow.trainer.exporting.blocks import tagged
@@ -31,9 +31,9 @@ class ClimateWiring:
     """Tensor (1,), days since the bundle's reference time, for effects that age."""
 
     def rest(self, measured: Tensors, inputs: Tensors) -> dict[str, str]:
-        """Return the state that agrees with a measured climate: floor as warm as the air, memories at rest."""
-        state = self.wiring.call(self.blocks.from_measured, measured)
-        state["mass_temperature"] = state["air_temperature"]
+        """Return the state that agrees with a measured climate (`BEGINNING`), memories at rest."""
+        state = self.wiring.call(self.blocks.from_measured, {name: measured[name] for name in PREDICTED})
+        state["mass_temperature"] = state["soil_temperature"] = measured["mean_air_temperature"]
         drivers = self.derived(state, inputs)
         for one in self.blocks.effects:
             if one.start:
@@ -48,7 +48,7 @@ class ClimateWiring:
         drivers = self.drivers(state, inputs)
         added, memories = self.effects(drivers, state, seconds)
         tensors = (
-            {f"state:{name}": state[name] for name in climate.STATES}
+            {f"state:{name}": state[name] for name in STATES}
             | tagged("driver", drivers)
             | added
             | dict(self.parameters)
@@ -59,7 +59,7 @@ class ClimateWiring:
     def derived(self, state: Tensors, inputs: Tensors) -> dict[str, str]:
         """Return the drivers that follow from a state and its inputs."""
         tensors = (
-            {f"state:{name}": state[name] for name in climate.STATES}
+            {f"state:{name}": state[name] for name in STATES}
             | {f"input:{name}": inputs[name] for name in self.blocks.inputs}
             | dict(self.parameters)
         )

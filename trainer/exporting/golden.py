@@ -53,6 +53,7 @@ def golden_inputs(
         return np.array([[values[name]] for name in names])
 
     climate = np.array([[18.0, 21.0], [75.0, 82.0], [450.0, 800.0]])
+    beginning = np.vstack([climate, [[19.0, 20.0]]])
     asked = {
         "heating_setpoint": 18.0 + 3 * sun,
         "co2_setpoint": 400.0 + 400 * sun,
@@ -66,7 +67,7 @@ def golden_inputs(
     setpoints = np.stack([asked[name] for name in blocks.setpoints], axis=1)[:, :, None]
     inputs: dict[str, dict[str, NDArray[Any]]] = {
         "simulator": {
-            "climate": climate,
+            "climate": beginning,
             "growth": np.array([[2.5, 3.0], [80.0, 120.0], [0.5, 1.0]]),
             "harvest": np.array([[0.0, 3.0]]),
             "equipment": np.zeros((len(EQUIPMENT), batch)),
@@ -77,7 +78,7 @@ def golden_inputs(
             "parameters": parameters(blocks.parameters),
         },
         "hindcast": {
-            "climate": climate,
+            "climate": beginning,
             "inputs": np.tile(columns(blocks.climate.inputs), (1, 1, batch)),
             "measured": np.tile(climate, (hours, 1, 1)),
             "follow": (hour < 4).astype(np.float64)[:, None],

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 
 from onnx import GraphProto, ModelProto
 
-from igrow.core.simulator.hybrid.measurement import PREDICTED
+from igrow.core.simulator.hybrid.measurement import BEGINNING, PREDICTED
 from igrow.trainer.exporting.blocks import Ports, shapes
 from igrow.trainer.exporting.climate import ClimateBlocks
 from igrow.trainer.exporting.climate_wiring import ClimateWiring
@@ -25,7 +25,7 @@ def ports(blocks: ClimateBlocks) -> tuple[Ports, Ports]:
     """
     climate = (PREDICTED, ("rows", len(PREDICTED), "batch"))
     inputs: Ports = {
-        "climate": (PREDICTED, (len(PREDICTED), "batch")),
+        "climate": (BEGINNING, (len(BEGINNING), "batch")),
         "inputs": (blocks.inputs, ("rows", "inputs", "batch")),
         "measured": climate,
         "follow": (("follow",), ("rows", 1)),
@@ -41,7 +41,7 @@ def hindcast_model(blocks: ClimateBlocks) -> ModelProto:
     outer = Wiring("hindcast")
     parameters = outer.rows("parameters", blocks.parameters)
     first_inputs, first_day = outer.first("inputs"), outer.first("day")
-    measured, inputs = outer.rows("climate", PREDICTED), outer.rows(first_inputs, blocks.inputs)
+    measured, inputs = outer.rows("climate", BEGINNING), outer.rows(first_inputs, blocks.inputs)
     state = ClimateWiring(outer, blocks, parameters, first_day).rest(measured, inputs)
     packed = outer.matrix([state[name] for name in blocks.states], like=state["air_temperature"])
     body = _row_graph(blocks, parameters)

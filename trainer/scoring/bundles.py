@@ -131,6 +131,8 @@ def planned_runs(bundle: Bundle, site: Site, record: Record, setpoints: Mapping[
         for column, start in enumerate(starts.tolist()):
             if (start, whole) not in known:
                 state = {name: float(values[start]) for name, values in {**record.inputs, **record.measured}.items()}
+                day_before = record.measured["air_temperature"][max(0, start - _DAY * hour) : start + 1]
+                state["mean_air_temperature"] = float(np.nanmean(day_before))
                 ahead = hourly(weather, start, whole), hourly(asked, start, whole)[None]
                 known[start, whole] = simulator.simulate(state, *ahead, record.time[start])
             for name, values in shown.items():

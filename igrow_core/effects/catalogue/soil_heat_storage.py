@@ -29,5 +29,5 @@ EFFECT = Effect(
     sentence="the soil stores heat for days: about {value} W/m2 for each kelvin between soil and air",
     source="Katzin et al. (2020), GreenLight: soil layers under the floor",
     memory=lagged(lambda _xp, drivers: drivers["air_temperature"], "time_constant", 86_400.0),
-    resembles=("mass_heat_transfer",),
+    resembles=("soil_heat_transfer",),
 )

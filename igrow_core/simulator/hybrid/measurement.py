@@ -11,6 +11,9 @@ from igrow.core.simulator.hybrid.climate import ActiveEffects, memory_name
 
 PREDICTED = ("air_temperature", "air_humidity", "air_co2")
 """What the climate stage predicts and a log measures."""
+BEGINNING = (*PREDICTED, "mean_air_temperature")
+"""What a graph begins from: the measured climate, and the air's mean temperature of the day before, degC, which floor
+and soil are taken to have."""
 
 
 def sensor_errors(xp: Any, drivers: Drivers, state: Values, effects: ActiveEffects) -> dict[str, Array]:

@@ -143,6 +143,16 @@ _ROWS = (
         "heat capacity of the floor that follows within a day",
         "De Zwart (1996)",
     ),
+    (
+        "soil_heat_transfer",
+        "W m-2 K-1",
+        3.0,
+        0.5,
+        0.0,
+        12.0,
+        "heat transfer between floor and the soil that follows within days",
+        "De Zwart (1996)",
+    ),
     # air exchange
     (
         "leakage_still",
@@ -306,5 +316,8 @@ PARAMETERS: Mapping[str, PhysicalParameter] = MappingProxyType({row[0]: Physical
 
 
 def fitted_to_these_balances(names: Collection[str]) -> bool:
-    """Tell whether parameters were fitted to the balances as they are: a model that knows others had other balances."""
-    return all(name in PARAMETERS for name in names)
+    """Tell whether parameters were fitted to the balances as they are: a model of others had others, or fewer.
+
+    Without any, nothing is said: a network has none.
+    """
+    return not names or set(names) == set(PARAMETERS)

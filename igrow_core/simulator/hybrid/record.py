@@ -16,6 +16,7 @@ from igrow.core.arrays import Array, Floats, Integers, Mask, Times
 from igrow.core.effects import EFFECTS
 from igrow.core.effects.definition import Values
 from igrow.core.simulator.hybrid import climate, measurement
+from igrow.core.simulator.hybrid.balances import balances
 from igrow.core.simulator.hybrid.climate import ActiveEffects, memory_name
 
 SUBSTEP = 900.0
@@ -76,9 +77,9 @@ class Record:
 def observe(record: Record, parameters: Values, effects: ActiveEffects) -> dict[str, Floats]:
     """Return the states that the log implies, by name, (n,): the measured ones without sensor faults, the rest run.
 
-    The temperature of the floor and the memories of effects follow the measured air; over a gap in the
+    The temperatures of floor and soil and the memories of effects follow the measured air; over a gap in the
     measurements the last value stands. Parameters are floats or arrays of shape (n,); or of shape (m, 1) for m
-    variants at once, and then the floor's temperature has shape (m, n).
+    variants at once, and then both temperatures have shape (m, n).
     """
     clean = {name: bridge(values, len(record), smooth=True)[0] for name, values in record.measured.items()}
     for name, stand_in in (("air_humidity", 75.0), ("air_co2", 500.0)):
@@ -91,7 +92,7 @@ def observe(record: Record, parameters: Values, effects: ActiveEffects) -> dict[
         clean = {name: values - errors.get(name, 0.0) for name, values in clean.items()}
     state = climate.initial_state(np, clean, record.inputs, parameters, effects, record.lamp_efficacy)
     drivers = climate.derive(np, state, record.inputs, parameters, record.lamp_efficacy)
-    state["mass_temperature"] = _run_mass(record, state, drivers, parameters)
+    state["mass_temperature"], state["soil_temperature"] = _run_below(record, state, drivers, parameters)
     _run_memories(record, state, drivers, effects)
     shape = (len(record),)
     return {name: np.broadcast_to(v, np.broadcast_shapes(np.shape(v), shape)) for name, v in state.items()}
@@ -189,29 +190,41 @@ def bridge(values: Floats, longest: int, *, smooth: bool) -> tuple[Floats, Mask]
     return (gaps.interpolated if smooth else gaps.held)(values), gaps.short_gaps(values, longest)
 
 
-def _run_mass(record: Record, state: Values, drivers: Values, parameters: Values) -> Floats:
-    """Run the floor's balance under the measured air."""
+def _run_below(record: Record, state: Values, drivers: Values, parameters: Values) -> tuple[Floats, Floats]:
+    """Run the balances of floor and soil under the measured air; return both temperatures."""
     added: dict[str, Array] = {}
-    flux, conductance, capacity = climate.balances(np, state, drivers, parameters, added)["mass_temperature"]
-    target = state["mass_temperature"] + flux / conductance
+    parts = balances(np, state, drivers, parameters, added)
+    flux, conductance, capacity = parts["mass_temperature"]
+    _, soil_conductance, soil_capacity = parts["soil_temperature"]
+    # The floor is drawn to `aim`, less by so much as the soil is colder than where both stand now.
+    pulled = parameters["soil_heat_transfer"] / conductance
+    aim = state["mass_temperature"] + flux / conductance - pulled * state["soil_temperature"]
     share = 1.0 - np.exp(-record.step * conductance / capacity)
-    shape = np.broadcast_shapes(np.shape(target), np.shape(share), (len(record),))
-    targets, shares = np.broadcast_to(target, shape).T, np.broadcast_to(share, shape).T
-    # Start where a floor would be that has long been under this air.
-    first = targets[: max(1, round(86_400.0 / record.step))].mean(axis=0)
-    mass = np.empty(shape).T
+    soil_share = 1.0 - np.exp(-record.step * soil_conductance / soil_capacity)
+    shape = np.broadcast_shapes(np.shape(aim), np.shape(share), (len(record),))
+    aims, shares, pulls, soil_shares = (np.broadcast_to(one, shape).T for one in (aim, share, pulled, soil_share))
+    # Start where both would be that have long been under this air.
+    rows = max(1, round(86_400.0 / record.step))
+    soil = aims[:rows].mean(axis=0) / (1.0 - pulls[0])
+    mass = soil
     if len(shape) > 1:
-        value = first
+        course, soil_course = np.empty(shape).T, np.empty(shape).T
         for k in range(len(record)):
-            mass[k] = value
-            value = value + (targets[k] - value) * shares[k]
-        return mass.T
+            course[k], soil_course[k] = mass, soil
+            mass, soil = (
+                mass + (aims[k] + pulls[k] * soil - mass) * shares[k],
+                soil + (mass - soil) * soil_shares[k],
+            )
+        return course.T, soil_course.T
     # Floats are several times as fast as arrays of one element.
-    course, number = [], float(first)
-    for aim, part in zip(targets.tolist(), shares.tolist(), strict=True):
-        course.append(number)
-        number += (aim - number) * part
-    return np.array(course)
+    floors, soils, warm, below = [], [], float(mass), float(soil)
+    for towards, part, pull, soil_part in zip(
+        aims.tolist(), shares.tolist(), pulls.tolist(), soil_shares.tolist(), strict=True
+    ):
+        floors.append(warm)
+        soils.append(below)
+        warm, below = warm + (towards + pull * below - warm) * part, below + (warm - below) * soil_part
+    return np.array(floors), np.array(soils)
 
 
 def _run_memories(record: Record, state: dict[str, Array], drivers: Values, effects: ActiveEffects) -> None:

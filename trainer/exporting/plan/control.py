@@ -7,7 +7,8 @@ from typing import Any
 
 from igrow.core import air
 from igrow.core.simulator import actuation, holding
-from igrow.core.simulator.hybrid import climate
+from igrow.core.simulator.hybrid.balances import STATES, balances
+from igrow.core.simulator.hybrid.exponential import heat_and_vapour, moved
 from igrow.core.simulator.hybrid.measurement import PREDICTED
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.core.simulator.plan import STEPS_PER_HOUR
@@ -46,7 +47,7 @@ def control_block(stage: ClimateBlocks, setpoints: Sequence[str]) -> Block:
         "control",
         _control,
         [
-            *tags("state", climate.STATES),
+            *tags("state", STATES),
             *tags("driver", (*stage.inputs, *stage.derive.outputs, "mean_height")),
             *stage.channels,
             *tags("parameter", PARAMETERS),
@@ -78,8 +79,8 @@ def _control(xp: Any, arrays: Mapping[str, Any]) -> Mapping[str, Any]:
     zero = 0.0 * temperature
     idle = drivers | {"rail_pipe_excess": zero, "grow_pipe_excess": zero, "co2_dosing": zero}
     added = named.get("added", {})
-    parts = climate.balances(xp, state, idle, parameters, added)
-    answers = climate.heat_and_vapour(xp, state, idle, parameters, added, parts, SECONDS)
+    parts = balances(xp, state, idle, parameters, added)
+    answers = heat_and_vapour(xp, state, idle, parameters, added, parts, SECONDS)
     if "minimum_pipe_setpoint" in setpoints:
         excess = xp.maximum(setpoints["minimum_pipe_setpoint"] - arrays["shown_temperature"], zero)
         held = named["actuation"]["rail_minimum"] * parameters["rail_pipe_heat_transfer"] * excess
@@ -96,6 +97,6 @@ def _control(xp: Any, arrays: Mapping[str, Any]) -> Mapping[str, Any]:
     for name, more in given.items():
         flux, pull, capacity = parts[name]
         parts[name] = (flux + more, pull, capacity)
-    following = climate.moved(xp, state, parts, answers, SECONDS)
+    following = moved(xp, state, parts, answers, SECONDS)
     pipes = parameters["rail_pipe_heat_transfer"] + settings["grow_share"] * parameters["grow_pipe_heat_transfer"]
     return following | {"heat": heat, "co2": dose, "rail_pipe_excess": heat / pipes}

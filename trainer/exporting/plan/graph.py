@@ -5,7 +5,7 @@ from __future__ import annotations
 from onnx import ModelProto
 
 from igrow.core.quantities import GROWTH, YIELD
-from igrow.core.simulator.hybrid.measurement import PREDICTED
+from igrow.core.simulator.hybrid.measurement import BEGINNING
 from igrow.core.simulator.plan import CLIMATE_OUT, CLOCK, EQUIPMENT, RESOURCES
 from igrow.trainer.exporting.blocks import Ports, shapes
 from igrow.trainer.exporting.climate_wiring import ClimateWiring
@@ -18,7 +18,7 @@ from igrow.trainer.exporting.wiring import Wiring, finished_model
 def ports(blocks: PlanBlocks) -> tuple[Ports, Ports]:
     """Return the graph's inputs and outputs; `w` and `members` are 1 or batch."""
     inputs: Ports = {
-        "climate": (PREDICTED, (len(PREDICTED), "batch")),
+        "climate": (BEGINNING, (len(BEGINNING), "batch")),
         "growth": (GROWTH, (len(GROWTH), "batch")),
         "harvest": (YIELD, (len(YIELD), "batch")),
         "equipment": (EQUIPMENT, (len(EQUIPMENT), "batch")),
@@ -48,7 +48,7 @@ def plan_model(blocks: PlanBlocks) -> ModelProto:
     clock = outer.rows(outer.first("clock"), CLOCK)
     zero = outer.constant("zero", [0.0])
     inputs = climate_inputs(blocks, weather, clock, growth["leaf_area_index"], zero) | equipment
-    measured = outer.rows("climate", PREDICTED)
+    measured = outer.rows("climate", BEGINNING)
     state = ClimateWiring(outer, blocks.climate, parameters, outer.first("day")).rest(measured, inputs)
     carried = state | growth | equipment
     packed = outer.matrix([carried[name] for name in carried_names(blocks)], like=state["air_temperature"])

@@ -8,7 +8,7 @@ from onnx import GraphProto
 
 from igrow.core.quantities import GROWTH
 from igrow.core.simulator.crop import GROWTH_DRIVERS
-from igrow.core.simulator.hybrid import climate
+from igrow.core.simulator.hybrid.balances import STATES
 from igrow.core.simulator.hybrid.measurement import PREDICTED
 from igrow.core.simulator.plan import CLOCK, EQUIPMENT, RESOURCES, STEPS_PER_HOUR
 from igrow.trainer.exporting.blocks import tagged
@@ -69,14 +69,14 @@ def hour_graph(blocks: PlanBlocks, parameters: Mapping[str, str]) -> GraphProto:
         added, memories = stage.effects(drivers, state, seconds)
         step = wiring.call(
             blocks.control,
-            {f"state:{name}": state[name] for name in climate.STATES}
+            {f"state:{name}": state[name] for name in STATES}
             | tagged("driver", drivers)
             | added
             | dict(parameters)
             | setpoints
             | {"shown_temperature": shown["air_temperature"], "shown_co2": shown["air_co2"]},
         )
-        state = memories | {name: step[name] for name in climate.STATES}
+        state = memories | {name: step[name] for name in STATES}
         equipment = {name: set_[name] for name in CARRIED} | {
             "rail_pipe_excess": step["rail_pipe_excess"],
             "co2_dosing": step["co2"],

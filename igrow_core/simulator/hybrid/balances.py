@@ -1,0 +1,112 @@
+"""The balances of heat, vapour and CO2 of a greenhouse's air, and of the heat of floor and soil."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from igrow.core import air
+from igrow.core.arrays import Array
+from igrow.core.effects.definition import Drivers, Values
+from igrow.core.simulator.hybrid.above_screens import condensing, exchanged
+from igrow.core.simulator.hybrid.canopy import PASCAL_PER_CONTENT, drying
+
+STATES = ("air_temperature", "vapour_concentration", "co2_concentration", "mass_temperature", "soil_temperature")
+"""The states without the memories of effects: degC, kg m-3, kg m-3, and degC of floor and soil."""
+
+_SOIL_HEAT_CAPACITY = 5e5
+"""J m-2 K-1, of a quarter of a metre of moist soil, which follows within days (De Zwart 1996)."""
+_LEAST_CO2 = 1e-6
+"""kg m-3, half a part per million: less is a sensor that reads nothing, and must not divide."""
+_SLOWEST = 1e-7
+"""Rate at which a state is pulled back at least, s-1; in single precision a smaller one would be lost."""
+
+
+def balances(
+    xp: Any, state: Values, drivers: Drivers, parameters: Values, added: Mapping[str, Array]
+) -> dict[str, tuple[Array, Array, Array]]:
+    """Return (net flux, restoring conductance, capacity) of each of `STATES`.
+
+    Heat in W m-2, W m-2 K-1 and J m-2 K-1; vapour and CO2 in kg m-2 s-1, m s-1 and m.
+
+    Args:
+        xp: the array namespace.
+        state: `STATES` by name.
+        drivers: from `climate.derive`.
+        parameters: by name.
+        added: what effects, a learned residual model or a disturbance add, by channel.
+    """
+    temperature, vapour, co2, mass, soil = (state[name] for name in STATES)
+    height = drivers["mean_height"]
+    outdoor = drivers["outdoor_temperature"]
+    low, top = exchanged(xp, drivers, added)
+    past = drivers["past_screens"]
+    light = 1.0 - added.get("light_loss", 0.0)
+
+    # Heat: through the cover and with the air that leaves above the screens, and with that which leaves below.
+    temperature_above, cover = drivers["temperature_above"], drivers["cover_conductance"]
+    rail = parameters["rail_pipe_heat_transfer"] * drivers["rail_pipe_excess"]
+    grow = parameters["grow_pipe_heat_transfer"] * drivers["grow_pipe_excess"]
+    sun = drivers["radiation_inside"] * light
+    transpiration = drivers["transpiration"] - (1.0 - light) * drivers["sun_transpiration"]
+    to_mass = parameters["mass_heat_transfer"] * (temperature - mass)
+    heat = (
+        rail
+        + grow
+        + (parameters["lamp_heat_share"] + parameters["lamp_radiation_share"]) * drivers["lamp_power"]
+        + parameters["solar_heat_share"] * sun
+        - air.LATENT_HEAT * transpiration
+        - cover * (temperature_above - drivers["surroundings"])
+        - top * air.VOLUMETRIC_HEAT * (temperature_above - outdoor)
+        - low * air.VOLUMETRIC_HEAT * (temperature - outdoor)
+        - to_mass
+        + added.get("heat", 0.0)
+    )
+    heat_conductance = (
+        (cover + top * air.VOLUMETRIC_HEAT) * drivers["share_above"]
+        + low * air.VOLUMETRIC_HEAT
+        + parameters["mass_heat_transfer"]
+        + parameters["rail_pipe_heat_transfer"] * xp.tanh(drivers["rail_pipe_excess"])
+        + drying(xp, state, drivers)
+    )
+
+    # Vapour: what passes the screens leaves with the air, or condenses on the cover.
+    outdoor_vapour = drivers["outdoor_vapour_concentration"]
+    dew, wet, _ = condensing(xp, state, drivers, parameters, top)
+    condensation = wet * xp.maximum(dew, 0.0 * dew) * (past + top) / (past + top + wet)
+    above = (past * vapour + top * outdoor_vapour - condensation) / (past + top)
+    vapour_flux = transpiration - low * (vapour - outdoor_vapour) - past * (vapour - above) + added.get("vapour", 0.0)
+    leaves = drivers["transpiration_response"] * (PASCAL_PER_CONTENT / air.LATENT_HEAT)
+    vapour_conductance = low + past * (top + wet) / (past + top + wet) + leaves
+
+    outdoor_co2 = air.co2_concentration(outdoor, drivers["outdoor_co2"])
+    respiration = parameters["respiration"] / 3.6e6 * xp.exp(0.0693147 * (temperature - 20.0))
+    lit = 1.0 - (1.0 - light) * drivers["sun_share_of_par"]
+    assimilation = drivers["assimilation"] * lit + added.get("assimilation", 0.0)
+    exchange = low + past * top / (past + top)
+    co2_flux = (
+        parameters["dosing_share"] * drivers["co2_dosing"] / 3600.0
+        - exchange * (co2 - outdoor_co2)
+        - assimilation
+        + respiration
+        + added.get("co2", 0.0)
+    )
+    co2_conductance = exchange + 0.5 * drivers["assimilation"] / xp.maximum(co2, 0.0 * co2 + _LEAST_CO2)
+
+    to_soil = parameters["soil_heat_transfer"] * (mass - soil)
+    mass_flux = to_mass + parameters["mass_solar_share"] * sun - to_soil
+    mass_conductance = parameters["mass_heat_transfer"] + parameters["soil_heat_transfer"]
+    mass_capacity = 1000.0 * parameters["mass_heat_capacity"]
+    air_capacity = parameters["heat_capacity_factor"] * air.VOLUMETRIC_HEAT * height
+    found = {
+        "air_temperature": (heat, heat_conductance, air_capacity),
+        "vapour_concentration": (vapour_flux, vapour_conductance, height),
+        "co2_concentration": (co2_flux, co2_conductance, height),
+        "mass_temperature": (mass_flux, mass_conductance, mass_capacity),
+        "soil_temperature": (to_soil, parameters["soil_heat_transfer"], _SOIL_HEAT_CAPACITY + 0.0 * mass),
+    }
+    # Without wind, vents, leaks and light nothing pulls CO2 back: its balance is then a plain sum.
+    return {
+        name: (flux, xp.maximum(conductance, _SLOWEST * capacity), capacity)
+        for name, (flux, conductance, capacity) in found.items()
+    }

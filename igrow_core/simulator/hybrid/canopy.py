@@ -1,0 +1,61 @@
+"""The crop in the climate stage: how much it evaporates and takes up."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from igrow.core import air
+from igrow.core.arrays import Array
+from igrow.core.effects.definition import Drivers, Values
+
+PASCAL_PER_CONTENT = 1.36e5
+"""Vapour pressure of a vapour content, Pa per kg m-3, at 20 degC."""
+_STOMATA_HALF_OPEN = 6.0
+"""Short-wave radiation at which the stomata of a canopy are half open, W m-2 (Stanghellini 1987: 3 for one leaf)."""
+_EXTINCTION = 0.7
+"""Extinction of radiation in a tomato canopy (Stanghellini 1987)."""
+
+
+def canopy_drivers(xp: Any, climate: Values, inputs: Drivers, parameters: Values) -> dict[str, Array]:
+    """Return transpiration (kg m-2 s-1) and assimilation (kg m-2 s-1), and how they answer to the air.
+
+    Args:
+        xp: the array namespace.
+        climate: air temperature, its deficit, CO2 and light inside, and ``screens`` and ``surroundings``, as
+            `climate.derive` returns them.
+        inputs: as `climate.derive`'s.
+        parameters: by name.
+    """
+    temperature, deficit = climate["air_temperature"], climate["vapour_deficit"]
+    radiation_inside, par, ppm = climate["radiation_inside"], climate["par"], climate["air_co2"]
+    canopy = 1.0 - xp.exp(-_EXTINCTION * inputs["leaf_area_index"])
+    of_radiation = parameters["transpiration_radiation"] * canopy
+    radiation = radiation_inside + parameters["lamp_radiation_share"] * inputs["lamp_power"]
+    night = parameters["transpiration_night_share"]
+    day_share = night + (1.0 - night) * radiation / (radiation + _STOMATA_HALF_OPEN)
+    response = 0.001 * parameters["transpiration_deficit"] * inputs["leaf_area_index"] * day_share
+    # A crop that radiates to a cold cover is colder than the air, and evaporates less than the air's deficit says.
+    long_wave = parameters["crop_long_wave_loss"] * climate["screens"]
+    lost = long_wave * (temperature - climate["surroundings"])
+    evaporation = of_radiation * (radiation - lost) + response * deficit
+    evaporation = xp.maximum(evaporation, 0.0 * temperature)
+    return {
+        "transpiration": evaporation / air.LATENT_HEAT,
+        "sun_transpiration": of_radiation * radiation_inside / air.LATENT_HEAT,
+        "transpiration_response": response * deficit / (deficit + 1.0),
+        "long_wave_response": of_radiation * long_wave,
+        "assimilation": parameters["assimilation_maximum"]
+        / 3.6e6
+        * canopy
+        * (par / (par + parameters["assimilation_light"]))
+        * (ppm / (ppm + parameters["assimilation_co2"])),
+    }
+
+
+def drying(xp: Any, state: Values, drivers: Drivers) -> Array:
+    """Return by how much more heat a crop evaporates for each kelvin of warmer, and so drier, air, W m-2 K-1."""
+    temperature = state["air_temperature"]
+    saturated = state["vapour_concentration"] * PASCAL_PER_CONTENT + drivers["vapour_deficit"]
+    slope = saturated * 4283.6 / ((temperature + 243.04) * (temperature + 243.04))
+    more = drivers["transpiration_response"] * slope - drivers["long_wave_response"]
+    return xp.maximum(more, 0.0 * more)
