@@ -102,18 +102,24 @@ def virtual_log(
         "air_co2": np.full(count, 450.0),
     }
     leaves = {"leaf_area_index": leaf_area(time)} if measures_leaves else {}
-    blank = Telemetry(time, outside | empty | begin | leaves)
-    record = site_record(blank, SITE, step)
     values = dict(parameters or GREENHOUSE)
-    states = records.observe(record, values, {})
-    out = closed_run(
-        record, states, {**asked, **(followed or {})}, [0], count - 1, values, {}, actuation.default_rules(), added
-    )
-    columns = dict(outside) | asked | leaves
-    for name in ("air_temperature", "air_humidity", "air_co2"):
-        columns[name] = np.concatenate([begin[name][:1], out[name][:, 0]])
-    for name in actuation.OUTPUTS:
-        columns[name] = np.concatenate([out[name][:, 0], out[name][-1:, 0]])
+
+    def lived(before: Mapping[str, Floats], rows: int) -> dict[str, Floats]:
+        """Return the climate and the actuators of so many rows, floor and soil as `before` would have left them."""
+        record = site_record(Telemetry(time[: len(before["air_co2"])], {**before}), SITE, step)
+        states = records.observe(record, values, {})
+        blank = site_record(Telemetry(time, outside | empty | begin | leaves), SITE, step)
+        states = {name: np.broadcast_to(course[:1], count) for name, course in states.items()}
+        asks = {**asked, **(followed or {})}
+        out = closed_run(blank, states, asks, [0], rows - 1, values, {}, actuation.default_rules(), added)
+        climate = {name: np.concatenate([begin[name][:1], out[name][:, 0]]) for name in begin}
+        return climate | {name: np.concatenate([out[name][:, 0], out[name][-1:, 0]]) for name in actuation.OUTPUTS}
+
+    columns = outside | asked | leaves
+    day = round(86_400.0 / step)
+    first = lived(outside | empty | begin | leaves, day + 1)
+    known = {name: values[: day + 1] for name, values in (outside | leaves).items()}
+    columns = columns | lived(known | first, count)
     if noise:
         for name, size in (("air_temperature", 0.05), ("air_humidity", 0.4), ("air_co2", 5.0)):
             columns[name] = columns[name] + size * generator.standard_normal(count)

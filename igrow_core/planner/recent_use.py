@@ -17,7 +17,7 @@ import numpy as np
 
 from igrow.core.arrays import Floats
 from igrow.core.simulator.growth import Count, GrowthBalance, GrowthDays, GrowthFit, regress, warmth
-from igrow.core.simulator.outcome import Outcome, Simulator
+from igrow.core.simulator.outcome import Initial, Outcome, Simulator
 from igrow.core.site import Crop, Greenhouse
 from igrow.core.telemetry import Telemetry
 
@@ -142,7 +142,7 @@ class Corrected:
         """Those of the simulator."""
         return self.simulator.setpoints
 
-    def simulate(self, initial: dict[str, float], weather: Floats, setpoints: Floats, start: np.datetime64) -> Outcome:
+    def simulate(self, initial: Initial, weather: Floats, setpoints: Floats, start: np.datetime64) -> Outcome:
         """Return what candidates do; see `igrow.core.simulator.outcome.Simulator`."""
         outcome = self.simulator.simulate(initial, weather, setpoints, start)
         changes = {name: self.factor[name] * getattr(outcome, name) for name in SCALED}

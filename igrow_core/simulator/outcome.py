@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Protocol
 
@@ -47,6 +48,11 @@ class Outcome:
         return Outcome(**{one.name: getattr(self, one.name)[..., -hours:] for one in fields(self)})
 
 
+Initial = Mapping[str, float | Floats]
+"""Present value of quantities (climate, growth, yield, actuators) in the registry's units, and ``mean_air_temperature``
+of the day before; one number for all candidates, or one for each of them, (B,)."""
+
+
 class Simulator(Protocol):
     """Anything that says what setpoints do: a bundle's graph, a model in numpy, the mechanistic greenhouse."""
 
@@ -54,11 +60,11 @@ class Simulator(Protocol):
     def setpoints(self) -> tuple[str, ...]:
         """Setpoints that do anything in it, in the registry's order; plans choose no other."""
 
-    def simulate(self, initial: dict[str, float], weather: Floats, setpoints: Floats, start: np.datetime64) -> Outcome:
+    def simulate(self, initial: Initial, weather: Floats, setpoints: Floats, start: np.datetime64) -> Outcome:
         """Return what candidates do.
 
         Args:
-            initial: present value of quantities (climate, growth, yield, actuators), in the registry's units.
+            initial: what is known of the present; what is not is as usual.
             weather: (H, 6), the hours' means of `quantities.WEATHER`'s first six, in its order.
             setpoints: (B, H, S), in the order of `quantities.SETPOINTS`.
             start: UTC time at which the first hour begins.

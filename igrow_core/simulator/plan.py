@@ -14,7 +14,7 @@ from igrow.core.quantities import GROWTH, SETPOINTS, WEATHER
 from igrow.core.simulator.growth import GrowthBalance
 from igrow.core.simulator.hindcast import SimulatorSettings
 from igrow.core.simulator.hybrid.measurement import PREDICTED
-from igrow.core.simulator.outcome import Outcome
+from igrow.core.simulator.outcome import Initial, Outcome
 from igrow.core.site import Greenhouse
 
 STEPS_PER_HOUR = 2
@@ -80,7 +80,7 @@ class BundleSimulator:
         self._parameters = self._parameters[: members or len(self._parameters)]
         self._heat_paid = _heat_paid(greenhouse, dict(zip(names, self._parameters.T, strict=True)))
 
-    def simulate(self, initial: dict[str, float], weather: Floats, setpoints: Floats, start: np.datetime64) -> Outcome:
+    def simulate(self, initial: Initial, weather: Floats, setpoints: Floats, start: np.datetime64) -> Outcome:
         """Return what candidates do; see `igrow.core.simulator.outcome.Simulator`.
 
         Raises:
@@ -90,17 +90,15 @@ class BundleSimulator:
         if hours == 0 or hours % 24:
             raise IgrowError(f"a plan needs whole days, not {hours} hours")
         members = len(self._parameters)
-        batch = members * candidates
         time = start.astype("datetime64[s]") + np.arange(hours) * np.timedelta64(3600, "s")
-        given = {name: _known(initial, name) for name in (*PREDICTED, *GROWTH, "fruit_fresh_weight")}
-        given["mean_air_temperature"] = initial.get("mean_air_temperature", np.nan)
-        if not np.isfinite(given["mean_air_temperature"]):
-            given["mean_air_temperature"] = given["air_temperature"]
-        excess = max(initial.get("rail_pipe_temperature", 0.0) - given["air_temperature"], 0.0)
+        given = {name: _known(initial, name, _USUAL[name]) for name in _USUAL}
+        given["mean_air_temperature"] = _known(initial, "mean_air_temperature", given["air_temperature"])
+        excess = np.maximum(np.asarray(initial.get("rail_pipe_temperature", 0.0)) - given["air_temperature"], 0.0)
         standing = dict(initial) | {"rail_pipe_excess": excess}
 
-        def spread(values: list[float]) -> Floats:
-            return np.tile(np.nan_to_num(np.array(values))[:, None], (1, batch))
+        def spread(values: list[float | Floats]) -> Floats:
+            of_each = [np.broadcast_to(np.nan_to_num(np.asarray(value)), candidates) for value in values]
+            return np.tile(np.stack(of_each), (1, members))
 
         feed = {
             "climate": spread([given[name] for name in self._beginning]),
@@ -123,8 +121,8 @@ class BundleSimulator:
             return array.reshape(members, candidates, hours)
 
         net_growth = out["growth_out"][GROWTH.index("net_growth")]
-        before = np.full((batch, 1), given["net_growth"])
-        picked = np.diff(out["harvest_out"][0], axis=-1, prepend=given["fruit_fresh_weight"])
+        before = spread([given["net_growth"]])[0][:, None]
+        picked = np.diff(out["harvest_out"][0], axis=-1, prepend=spread([given["fruit_fresh_weight"]])[0][:, None])
         return Outcome(
             air_temperature=member(out["climate_out"][0]),
             air_humidity=member(out["climate_out"][1]),
@@ -165,6 +163,6 @@ def _heat_paid(greenhouse: Greenhouse, parameters: Mapping[str, Floats]) -> Floa
     return np.where((given > 0.0) & (received > 0.0), given / np.maximum(received, 1e-9), 1.0)
 
 
-def _known(initial: Mapping[str, float], name: str) -> float:
-    value = initial.get(name, np.nan)
-    return value if np.isfinite(value) else _USUAL[name]
+def _known(initial: Initial, name: str, usual: float | Floats) -> Floats:
+    value = np.asarray(initial.get(name, np.nan), dtype=np.float64)
+    return np.where(np.isfinite(value), value, usual)

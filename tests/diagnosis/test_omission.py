@@ -25,7 +25,7 @@ from tests.virtual_log import GREENHOUSE, SITE, virtual_log
 
 @pytest.fixture(scope="module")
 def record() -> Record:
-    return site_record(virtual_log(10, seed=3), SITE, 900.0)
+    return site_record(virtual_log(10, seed=3, step=900.0), SITE, 900.0)
 
 
 def prior_of_it() -> Gaussian:

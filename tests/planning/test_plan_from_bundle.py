@@ -17,7 +17,7 @@ from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.co2_count import CO2Count, co2_since_planting
 from igrow.core.planner import Budget, PlanResult, optimise
 from igrow.core.quantities import SETPOINTS, USUAL_SETPOINTS
-from igrow.core.simulator.outcome import Outcome
+from igrow.core.simulator.outcome import Initial, Outcome
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 from igrow.edge.cli.plan import reasons
@@ -119,7 +119,7 @@ class OneUnitAnHour:
     setpoints = USUAL_SETPOINTS
 
     def simulate(
-        self, initial: dict[str, float], weather: np.ndarray, setpoints: np.ndarray, start: np.datetime64
+        self, initial: Initial, weather: np.ndarray, setpoints: np.ndarray, start: np.datetime64
     ) -> Outcome:
         ones = np.ones((1, *setpoints.shape[:2]))
         return Outcome(**{one.name: ones for one in fields(Outcome)})

@@ -85,6 +85,7 @@ def run_season(season: Season, strategy: Strategy, genes: NDArray[np.float32], c
     used = {name: np.zeros(count) for name in ("heat", "electricity", "co2", "net_growth")}
     penalty = np.zeros(count)
     damp, crops = [], []
+    warmth: Floats | None = None
     for typical, weather in enumerate(season.weather):
         first = typical * season.every
         repeats = min(season.every, season.days - first)
@@ -92,7 +93,8 @@ def run_season(season: Season, strategy: Strategy, genes: NDArray[np.float32], c
             break
         crops.append(plants)
         start = season.start + first * DAY
-        outcome = _typical_day(season, strategy, genes, first + repeats // 2, start, weather)
+        outcome = _typical_day(season, strategy, genes, first + repeats // 2, start, weather, warmth)
+        warmth = outcome.air_temperature[0].mean(axis=-1)
         gross = supplied(p, believed(outcome), outcome.air_temperature[0])
         supply, warm, leaves = (
             np.broadcast_to(one, (count, 24)) for one in (gross, outcome.air_temperature[0], outcome.leaf_area_index[0])
@@ -129,11 +131,13 @@ def run_season(season: Season, strategy: Strategy, genes: NDArray[np.float32], c
 
 def bearable_damp(season: Season) -> Floats:
     """Return how many hours of each typical day may be damp, (T,): as many as the crop bears, or the recipe has."""
-    damp = []
+    damp, warmth = [], None
     for first in range(0, season.days, season.every):
         start, weather = season.start + first * DAY, season.weather[first // season.every]
         template = _two_days(season, start, weather)
-        damp.append(float(damp_hours(_lived(season, season.recipe[None], template, start, weather), season.site)[0]))
+        outcome = _lived(season, season.recipe[None], template, start, weather, warmth)
+        warmth = outcome.air_temperature[0].mean(axis=-1)
+        damp.append(float(damp_hours(outcome, season.site)[0]))
     return np.maximum(damp, season.site.crop.agronomy.damp_hours)
 
 
@@ -163,26 +167,43 @@ def believed(outcome: Outcome) -> Floats:
 
 
 def _typical_day(
-    season: Season, strategy: Strategy, genes: NDArray[np.float32], day: int, start: np.datetime64, weather: Floats
+    season: Season,
+    strategy: Strategy,
+    genes: NDArray[np.float32],
+    day: int,
+    start: np.datetime64,
+    weather: Floats,
+    warmth: Floats | None,
 ) -> Outcome:
     template = _two_days(season, start, weather)
     wanted = asked(strategy, genes, season.first_day + day, template, weather, season.recipe)
-    return _lived(season, wanted, template, start, weather)
+    return _lived(season, wanted, template, start, weather, warmth)
 
 
 def _two_days(season: Season, start: np.datetime64, weather: Floats) -> Template:
     return for_site(season.site, start, 48, radiation=np.tile(weather[:, RADIATION], 2))
 
 
-def _lived(season: Season, wanted: Setpoints, template: Template, start: np.datetime64, weather: Floats) -> Outcome:
+def _lived(
+    season: Season,
+    wanted: Setpoints,
+    template: Template,
+    start: np.datetime64,
+    weather: Floats,
+    warmth: Floats | None,
+) -> Outcome:
     """Return a day under setpoints (B, 24, S), lived once before.
 
     The day before is like it: the night that ends in the morning has had its dark hours, or has not, and air and floor
     begin as warm as the setpoints leave them. A morning that is the same for all gives to a cool strategy, for nothing,
-    a tenth of the heat that it needs.
+    a tenth of the heat that it needs. The soil is as warm as the air was on the typical day before (`warmth`, (B,)), on
+    the first one as the heating setpoint asks.
     """
+    if warmth is None:
+        warmth = wanted[:, :, SETPOINTS.index("heating_setpoint")].mean(axis=1)
     course = template.follow(np.tile(wanted, (1, 2, 1)), np.full(len(SETPOINTS), np.nan)).setpoints
-    return season.simulator.simulate(dict(MORNING), np.tile(weather, (2, 1)), course, start - DAY).last(24)
+    morning = {**MORNING, "mean_air_temperature": warmth}
+    return season.simulator.simulate(morning, np.tile(weather, (2, 1)), course, start - DAY).last(24)
 
 
 def asked(
