@@ -118,9 +118,7 @@ class OneUnitAnHour:
 
     setpoints = USUAL_SETPOINTS
 
-    def simulate(
-        self, initial: Initial, weather: np.ndarray, setpoints: np.ndarray, start: np.datetime64
-    ) -> Outcome:
+    def simulate(self, initial: Initial, weather: np.ndarray, setpoints: np.ndarray, start: np.datetime64) -> Outcome:
         ones = np.ones((1, *setpoints.shape[:2]))
         return Outcome(**{one.name: ones for one in fields(Outcome)})
 
