@@ -117,8 +117,8 @@ def virtual_log(
 
     columns = outside | asked | leaves
     day = round(86_400.0 / step)
-    first = lived(outside | empty | begin | leaves, day + 1)
-    known = {name: values[: day + 1] for name, values in (outside | leaves).items()}
+    first = lived(outside | empty | begin | leaves, day)
+    known = {name: values[:day] for name, values in (outside | leaves).items()}
     columns = columns | lived(known | first, count)
     if noise:
         for name, size in (("air_temperature", 0.05), ("air_humidity", 0.4), ("air_co2", 5.0)):

@@ -98,6 +98,14 @@ def test_grams_a_cubic_metre_outside_are_no_per_cent(clean: Clean) -> None:
     assert find_faults(table.with_columns({"outdoor_humidity": desert}), SITE) == ()
 
 
+def test_windward_vents_that_hardly_open_in_winter_are_no_fraction(clean: Clean) -> None:
+    lee = clean.telemetry["vent_lee"]
+    small = 0.98 * lee / lee.max()
+    assert find_faults(clean.telemetry.with_columns({"vent_wind": small}), SITE) == ()
+    (fault,) = find_faults(clean.telemetry.with_columns({"vent_lee": small, "vent_wind": 0.0 * lee}), SITE)
+    assert (fault.kind, fault.quantity) == ("fraction", "vent_lee")
+
+
 def test_lamps_that_only_burn_or_not_are_no_power(clean: Clean) -> None:
     burning = clean.telemetry.with_columns({"lamp_power": np.where(clean.telemetry["lamp_power"] > 1.0, 1.0, 0.0)})
     (fault,) = find_faults(burning, SITE)
