@@ -56,7 +56,7 @@ def wrong_units(telemetry: Telemetry) -> list[DataFault]:
 
 
 def _hardly_opens(lee: Floats, wind: Floats) -> bool:
-    """Tell whether windward vents are in % though they stay below 1: as a fraction they would open before the others."""
+    """Tell whether windward vents are in % though they stay below 1: as a fraction they would open first."""
     return len(lee) >= LEAST_VALUES and len(wind) > 0 and 1.001 < float(lee.max()) < 100.0 * float(wind.max())
 
 
