@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from igrow.core.effects import EFFECTS
+from igrow.core.simulator.hybrid.nominal import site_record
 from igrow.trainer.diagnosis import amplitudes, history, linear, search
 from igrow.trainer.diagnosis.change import changed, net_gain, proven_gain
 from igrow.trainer.diagnosis.design import Design, History
@@ -15,6 +16,7 @@ from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
 from tests.diagnosis.synthetic_design import BALANCES, PLAIN, Truth, make_design
+from tests.virtual_log import SITE, virtual_log
 
 RNG_SEED = 3
 PATTERN = "heat:cold weather"
@@ -74,6 +76,15 @@ def test_what_drifts_is_added_to_what_is_not_known() -> None:
     walls, crop = 2.0 * DEFAULT.wall_drift, 2.0 * DEFAULT.crop_drift
     typical = EFFECTS["lamp_heat"].amplitude.typical
     np.testing.assert_allclose(drift[:4], [walls, crop, walls, DEFAULT.effect_drift * typical])
+
+
+def test_of_vents_that_hardly_open_any_more_no_law_is_asked() -> None:
+    record = site_record(virtual_log(3, seed=3, step=900.0), SITE, 900.0)
+    opening = history.opening_of(record)
+    known = Discrepancy({}, Gaussian((), np.zeros(0), np.zeros((0, 0))), {}, 900.0, {}, record.time[0], 3.0 * opening)
+    assert {"vent_wind", "vent_stack", "vent_windward_ratio"} <= history.hardly_open(known, record, DEFAULT)
+    for silent in (replace(known, opening=1.5 * opening), replace(known, opening=0.0), None):
+        assert history.hardly_open(silent, record, DEFAULT) == frozenset()
 
 
 def test_own_gains_tell_what_comes_and_goes_in_a_log_without_a_change() -> None:

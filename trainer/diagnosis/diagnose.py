@@ -117,6 +117,7 @@ class _Question:
         # Of a crop that may be another by now nothing is asked, nor of the light, which its leaves take up.
         of_crop = LEAVES_AND_LIGHT if rules.crop_drift > self.rules.crop_drift else frozenset[str]()
         hidden = self.without | (frozenset({"co2_drift"}) if off else frozenset()) | of_crop
+        hidden |= history.hardly_open(knowledge.history, logged.record, rules)
         search = search_of(days, site, knowledge, hidden, rules, self.nuisance, self.drift)
         progress("searching for causes")
         first, last, found = search.run(rng)

@@ -29,6 +29,7 @@ from igrow.trainer.diagnosis.linear import DailyGrams, LinearModel
 from igrow.trainer.diagnosis.noise import Whitening
 from igrow.trainer.diagnosis.recalibration import averaging
 from igrow.trainer.diagnosis.rules import DecisionRules
+from igrow.trainer.diagnosis.visible_parameters import members
 from igrow.trainer.fit.climate import site_prior
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
@@ -66,6 +67,23 @@ def history_of(
         step=record.step,
         own_gains=own_gains(design),
         middle=record.time[0] + (record.time[-1] - record.time[0]) / 2,
+        opening=opening_of(record),
+    )
+
+
+def opening_of(record: Record) -> float:
+    """Return the mean opening of both rows of vents together, %."""
+    return float(sum(record.inputs[row][record.usable].mean() for row in ("vent_lee", "vent_wind")))
+
+
+def hardly_open(known: Discrepancy | None, record: Record, rules: DecisionRules) -> frozenset[str]:
+    """Return the parameters of the vents' law where these stand open much less than in the calibration log.
+
+    A law that wide openings taught says little of narrow ones: what changes then is its error, or the vents'.
+    """
+    vents = frozenset(members("ventilation")) | {"vent_curvature", "vent_windward_ratio"}
+    return (
+        vents if known is not None and opening_of(record) < rules.least_opening_share * known.opening else frozenset()
     )
 
 

@@ -83,6 +83,9 @@ class DecisionRules:
     least_left_by_hour: float = _tuned(25.0, "gain of a pattern by the hour beside a change that unmakes its name")
 
     # Which parameter has changed, where no effect is missing or none explains as much.
+    least_opening_share: float = _chosen(
+        0.5, "of the vents' opening at the calibration: with less their law is not asked"
+    )
     least_leading_change: float = _chosen(0.1, "share of its value by which a parameter that leads must have changed")
     least_other_change: float = _chosen(0.2, "the same of one that explains no more than an effect does")
     least_parameter_gain: float = _tuned(20.0, "gain that its change must bring, all else changing by physics alone")

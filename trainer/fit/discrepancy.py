@@ -39,6 +39,8 @@ class Discrepancy:
     """Largest gain in a window of the calibration log, learned on the rest, by effect or by a pattern's key."""
     middle: np.datetime64
     """Of the calibration log, UTC."""
+    opening: float = 0.0
+    """Of both rows of vents together, %, its mean over the calibration log; 0: not known."""
 
     def to_bytes(self) -> bytes:
         """Return the content of a file that holds it: plain arrays and JSON, never a pickle."""
@@ -49,6 +51,7 @@ class Discrepancy:
             "step": self.step,
             "own_gains": dict(self.own_gains),
             "middle": str(self.middle.astype("datetime64[s]")),
+            "opening": self.opening,
         }
         buffer, below = io.BytesIO(), np.tril_indices(len(self.amplitudes.names), -1)
         np.savez_compressed(
@@ -86,6 +89,7 @@ class Discrepancy:
                 float(plain["step"]),
                 {str(key): float(gain) for key, gain in plain["own_gains"].items()},
                 np.datetime64(plain["middle"], "s"),
+                float(plain.get("opening", 0.0)),
             )
         except Exception as error:
             # A damaged archive raises from zipfile, zlib or numpy; for the user it is one fault.
