@@ -173,6 +173,9 @@ def expected_gains(design: Design, case: Case, truth: Mapping[str, HiddenEffect]
     size = float(truth[name].size or 0.0)
     free = float(linear.fit(grams, model).deviations[0])
     known = float(grams.products[grams.fit, term.column, term.column].sum())
+    if free == 0.0:
+        # What a log does not show at all (rain where none fell) nobody sees in it.
+        return 0.0, 0.0
     return 0.5 * (size / free) ** 2, 0.5 * size**2 * known
 
 
