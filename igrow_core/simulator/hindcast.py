@@ -123,8 +123,8 @@ class Hindcast:
         rows = np.clip(origins[None, :] + np.arange(-settling, steps)[:, None], 0, None)
         inputs = np.stack([record.inputs[name][rows] for name in self._inputs], axis=1)
         shown = np.stack([filled[name] for name in PREDICTED])
-        settled = shown[0][rows[: settling + 1]].mean(axis=0)
-        beginning = dict(zip(PREDICTED, shown[:, rows[0]], strict=True)) | {"mean_air_temperature": settled}
+        mean = filled["air_temperature"][rows[: settling + 1]].mean(axis=0)
+        beginning = {name: filled[name][rows[0]] for name in PREDICTED} | {"mean_air_temperature": mean}
         feed = {
             "climate": np.stack([beginning[name] for name in self._beginning]),
             "inputs": inputs,

@@ -157,7 +157,7 @@ def test_a_sensor_that_is_off_from_a_day_on_is_named_with_its_size_and_day() -> 
     result = diagnose(log.with_columns({"air_temperature": off}), model_in_force())
     (found,) = result.findings
     assert (found.effect, found.kind) == ("air_temperature_offset", "sensor")
-    assert found.parameters["offset"].value == pytest.approx(1.5, rel=0.1)
+    assert found.parameters["offset"].value == pytest.approx(1.5, rel=0.06)
     began = log.telemetry.time[0] + np.timedelta64(round(9.4 * 24), "h")
     assert found.onset is not None
     assert abs(found.onset.time - began) <= np.timedelta64(1, "D")

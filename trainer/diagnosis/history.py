@@ -73,7 +73,7 @@ def history_of(
 
 def opening_of(record: Record) -> float:
     """Return the mean opening of both rows of vents together, %."""
-    return float(sum(record.inputs[row][record.usable].mean() for row in ("vent_lee", "vent_wind")))
+    return float(sum(record.inputs[row].mean() for row in ("vent_lee", "vent_wind")))
 
 
 def hardly_open(known: Discrepancy | None, record: Record, rules: DecisionRules) -> frozenset[str]:
