@@ -78,11 +78,15 @@ def test_what_drifts_is_added_to_what_is_not_known() -> None:
     np.testing.assert_allclose(drift[:4], [walls, crop, walls, DEFAULT.effect_drift * typical])
 
 
-def test_of_vents_that_hardly_open_any_more_no_law_is_asked() -> None:
+def test_of_vents_that_hardly_open_any_more_nothing_is_asked() -> None:
     record = site_record(virtual_log(3, seed=3, step=900.0), SITE, 900.0)
     opening = history.opening_of(record)
     known = Discrepancy({}, Gaussian((), np.zeros(0), np.zeros((0, 0))), {}, 900.0, {}, record.time[0], 3.0 * opening)
-    assert {"vent_wind", "vent_stack", "vent_windward_ratio"} <= history.hardly_open(known, record, DEFAULT)
+    hidden = history.hardly_open(known, record, DEFAULT)
+    assert {"vent_wind", "vent_stack", "vent_windward_ratio"} <= hidden
+    # An effect of vents would stand in for their law; leaks are none.
+    assert {"vent_backlash", "stack_ventilation", "vent_wind_asymmetry"} <= hidden
+    assert not {"wind_infiltration", "leakage_wind"} & hidden
     for silent in (replace(known, opening=1.5 * opening), replace(known, opening=0.0), None):
         assert history.hardly_open(silent, record, DEFAULT) == frozenset()
 

@@ -117,7 +117,8 @@ class _Question:
         # Of a crop that may be another by now nothing is asked, nor of the light, which its leaves take up.
         of_crop = LEAVES_AND_LIGHT if rules.crop_drift > self.rules.crop_drift else frozenset[str]()
         hidden = self.without | (frozenset({"co2_drift"}) if off else frozenset()) | of_crop
-        hidden |= history.hardly_open(knowledge.history, logged.record, rules)
+        of_vents = history.hardly_open(knowledge.history, logged.record, rules)
+        hidden |= of_vents
         search = search_of(days, site, knowledge, hidden, rules, self.nuisance, self.drift)
         progress("searching for causes")
         first, last, found = search.run(rng)
@@ -158,12 +159,14 @@ class _Question:
             *notes,
             *waiting,
             *((wording.NEW_CROP,) if new_crop else (wording.GROWN_CROP,) if of_crop else ()),
+            *((wording.VENTS_HARDLY_OPEN,) if of_vents else ()),
             *((wording.NOT_CALIBRATED,) if knowledge.transferred else ()),
             *((wording.NEWEST,) if log is not since else ()),
             *wording.thin_air(site),
             *((opened.sentence,) if opened is not None and off else ()),
         )
         possible = {name for one in findings for name in one.confounded}
+        not_asked = {*first.design.untestable, *of_crop, *of_vents}
         return Diagnosis(
             site=site.name,
             verdict=verdict,
@@ -178,7 +181,7 @@ class _Question:
             corrected=remembering(corrected, result.parameter, rules),
             # What a cause may as well be is told already.
             untestable=tuple(
-                name for name in EFFECTS if name in {*first.design.untestable, *of_crop} and name not in possible
+                name for name in EFFECTS if name in not_asked and name not in possible
             ),
             missing=logged.record.missing,
             notes=notes,

@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from igrow.core.arrays import Floats
+from igrow.core.effects import EFFECTS
 from igrow.core.simulator.hybrid.climate import ActiveEffects
 from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
@@ -77,14 +78,14 @@ def opening_of(record: Record) -> float:
 
 
 def hardly_open(known: Discrepancy | None, record: Record, rules: DecisionRules) -> frozenset[str]:
-    """Return the parameters of the vents' law where these stand open much less than in the calibration log.
+    """Return the parameters and effects of vents where these stand open much less than in the calibration log.
 
     A law that wide openings taught says little of narrow ones: what changes then is its error, or the vents'.
     """
-    vents = frozenset(members("ventilation")) | {"vent_curvature", "vent_windward_ratio"}
-    return (
-        vents if known is not None and opening_of(record) < rules.least_opening_share * known.opening else frozenset()
-    )
+    if known is None or opening_of(record) >= rules.least_opening_share * known.opening:
+        return frozenset()
+    law = {*members("ventilation"), "vent_curvature", "vent_windward_ratio"}
+    return frozenset(law) | {name for name, one in EFFECTS.items() if {"vent_lee", "vent_wind"} & set(one.drivers)}
 
 
 def jointly(

@@ -84,7 +84,7 @@ class DecisionRules:
 
     # Which parameter has changed, where no effect is missing or none explains as much.
     least_opening_share: float = _chosen(
-        0.5, "of the vents' opening at the calibration: with less their law is not asked"
+        0.5, "of the vents' opening at the calibration: with less nothing is asked of them"
     )
     least_leading_change: float = _chosen(0.1, "share of its value by which a parameter that leads must have changed")
     least_other_change: float = _chosen(0.2, "the same of one that explains no more than an effect does")

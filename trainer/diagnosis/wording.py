@@ -35,6 +35,10 @@ GROWN_CROP = N_(
     "Nobody logs the leaf area, and by its usual course the crop has grown since the calibration: what began in its "
     "leaves or in the light is not looked for. Log the leaf area, or calibrate again (igrow-trainer calibrate)."
 )
+VENTS_HARDLY_OPEN = N_(
+    "The vents opened less than half as far as in the weeks of the calibration: what changed at them is not looked "
+    "for. Calibrate again on weeks like these (igrow-trainer calibrate)."
+)
 THIN_AIR = N_(
     "This greenhouse lies high, and the simulator counts with air as it is at the sea: amounts of CO2, and of heat "
     "that goes with the air, are told too large, by 13 % at 1000 m, 27 % at 2000 m and 43 % at 3000 m."
