@@ -180,9 +180,7 @@ class _Question:
             model=model,
             corrected=remembering(corrected, result.parameter, rules),
             # What a cause may as well be is told already.
-            untestable=tuple(
-                name for name in EFFECTS if name in not_asked and name not in possible
-            ),
+            untestable=tuple(name for name in EFFECTS if name in not_asked and name not in possible),
             missing=logged.record.missing,
             notes=notes,
             evidence=Evidence(
