@@ -36,6 +36,22 @@ def test_each_of_a_batch_runs_as_it_would_alone(spring: Telemetry) -> None:
         assert batch.total("heat") == pytest.approx(alone.total("heat"), rel=1e-9)
 
 
+def test_a_batch_of_one_is_the_greenhouse_alone_and_goes_on_from_its_crop(spring: Telemetry) -> None:
+    own, plant, end = [HiddenEffect("wind_infiltration", 0.2)], GreenhouseParameters(), SPRING + hours(6)
+    alone = simulate(plant, spring, recipe, SPRING, end, seed=1, effects=own)
+    (one,) = simulate_many([plant], [spring], recipe, SPRING, end, count=1, seed=1, effects=[own])
+    for name, values in alone.measured.columns.items():
+        np.testing.assert_array_equal(one.measured[name], values, err_msg=name)
+    assert one.crop.fruit.shape == (len(alone.crop.fruit), 1) and one.crop.leaf == pytest.approx([alone.crop.leaf])
+    later = {
+        "alone": simulate(plant, spring, recipe, end, end + hours(3), seed=1, crop=alone.crop),
+        "one": simulate_many(plant, spring, recipe, end, end + hours(3), count=1, seed=1, crop=one.crop)[0],
+    }
+    assert later["one"].total("heat") == later["alone"].total("heat")
+    with pytest.raises(IgrowError, match="one of each, not 2"):
+        simulate_many(plant, [spring, spring], recipe, SPRING, end, count=1, seed=1)
+
+
 def test_each_of_a_batch_may_have_its_own_weather_and_setpoints(winter: Telemetry, spring: Telemetry) -> None:
     shifted = Telemetry(spring.time, {name: winter[name] for name in spring.columns})
     cold = Telemetry(spring.time[:1], {"heating_setpoint": np.array([15.0])})
