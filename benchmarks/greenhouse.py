@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks import greenhouse_agc, greenhouse_wur
-from igrow.core.greenhouse import GreenhouseParameters, generate_weather, recipe, simulate, simulate_many
+from igrow.core.greenhouse import GreenhouseParameters, generate_weather, recipe, simulate_many
 
 START = np.datetime64("2020-03-01T00:00:00", "s")
 
@@ -27,10 +27,7 @@ def speed() -> None:
         end = START + np.timedelta64(hours, "h")
         parameters = [GreenhouseParameters().varied(rng) for _ in range(count)]
         begin = time.process_time()
-        if count == 1:
-            simulate(parameters[0], weather, recipe, START, end, seed=1)
-        else:
-            simulate_many(parameters, weather, recipe, START, end, count=count, seed=1)
+        simulate_many(parameters, weather, recipe, START, end, count=count, seed=1)
         spent = time.process_time() - begin
         days = count * hours / 24.0
         step = 1e3 * spent / (hours * 12)

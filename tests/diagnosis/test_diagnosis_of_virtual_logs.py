@@ -15,7 +15,7 @@ from igrow.core.errors import IgrowError
 from igrow.core.local_time import utc_datetime
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import Log, prepare_log
-from igrow.trainer.diagnosis import Diagnosis, diagnose
+from igrow.trainer.diagnosis import Diagnosis, diagnose, history, wording
 from igrow.trainer.diagnosis.diagnosed_days import newest_weeks, since_calibration
 from igrow.trainer.diagnosis.evidence import errors_with
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, knowledge_of
@@ -273,3 +273,13 @@ def test_of_a_long_log_the_newest_six_weeks_are_asked_what_has_changed(quiet_log
     newest = newest_weeks(long, remembering, DEFAULT)
     assert newest.telemetry.time[-1] == long.telemetry.time[-1]
     assert newest.days == 41.0
+
+
+def test_what_is_not_asked_of_vents_is_said(
+    quiet_log: Log, quiet_diagnosis: Diagnosis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert wording.VENTS_HARDLY_OPEN not in quiet_diagnosis.notes
+    monkeypatch.setattr(history, "hardly_open", lambda *_: frozenset({"vent_backlash", "vent_wind"}))
+    result = diagnose(quiet_log, model_in_force())
+    assert wording.VENTS_HARDLY_OPEN in result.notes
+    assert "vent_backlash" in result.untestable
