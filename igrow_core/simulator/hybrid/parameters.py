@@ -229,12 +229,12 @@ _ROWS = (
     (
         "transpiration_deficit",
         "W m-2 kPa-1",
-        25.0,
+        50.0,
         0.6,
-        1.0,
-        120.0,
-        "evaporation per leaf area and kilopascal of deficit, by day",
-        "Baille et al. (1994)",
+        2.0,
+        240.0,
+        "evaporation per leaf area and kilopascal of deficit, by day in moist air",
+        "Baille et al. (1994), whose leaves stood at a kilopascal",
     ),
     (
         "transpiration_night_share",

@@ -23,8 +23,8 @@ def ports(blocks: PlanBlocks) -> tuple[Ports, Ports]:
         "harvest": (YIELD, (len(YIELD), "batch")),
         "equipment": (EQUIPMENT, (len(EQUIPMENT), "batch")),
         "weather": (blocks.weather, ("hours", len(blocks.weather), "w")),
-        "clock": (CLOCK, ("hours", len(CLOCK), 1)),
-        "day": (("day",), ("hours", 1)),
+        "clock": (CLOCK, ("hours", len(CLOCK), "w")),
+        "day": (("day",), ("hours", "w")),
         "setpoints": (blocks.setpoints, ("hours", len(blocks.setpoints), "batch")),
         "parameters": (blocks.parameters, (len(blocks.parameters), "members")),
     }

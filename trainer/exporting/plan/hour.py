@@ -110,8 +110,8 @@ def hour_graph(blocks: PlanBlocks, parameters: Mapping[str, str]) -> GraphProto:
         {
             "carried": width,
             "hour_weather": (len(blocks.weather), "w"),
-            "hour_clock": (len(CLOCK), 1),
-            "hour_day": (1,),
+            "hour_clock": (len(CLOCK), "w"),
+            "hour_day": ("w",),
             "hour_setpoints": (len(blocks.setpoints), "batch"),
         },
         {"carried_next": width, "hour_out": (len(rows), "batch")},
