@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from igrow.core.arrays import Floats
+from igrow.core.arrays import Floats, Times
 from igrow.core.simulator.growth import Count, GrowthBalance, GrowthDays, GrowthFit, regress, warmth
 from igrow.core.simulator.outcome import Initial, Outcome, Simulator
 from igrow.core.site import Crop, Greenhouse
@@ -142,7 +142,7 @@ class Corrected:
         """Those of the simulator."""
         return self.simulator.setpoints
 
-    def simulate(self, initial: Initial, weather: Floats, setpoints: Floats, start: np.datetime64) -> Outcome:
+    def simulate(self, initial: Initial, weather: Floats, setpoints: Floats, start: np.datetime64 | Times) -> Outcome:
         """Return what candidates do; see `igrow.core.simulator.outcome.Simulator`."""
         outcome = self.simulator.simulate(initial, weather, setpoints, start)
         changes = {name: self.factor[name] * getattr(outcome, name) for name in SCALED}

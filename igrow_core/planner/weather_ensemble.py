@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from igrow.core.arrays import Floats
+from igrow.core.arrays import Floats, Times
 from igrow.core.simulator.outcome import Initial, Outcome, Simulator
 
 
@@ -24,7 +24,7 @@ class WeatherEnsemble:
         """Those of the simulator."""
         return self.simulator.setpoints
 
-    def simulate(self, initial: Initial, weather: Floats, setpoints: Floats, start: np.datetime64) -> Outcome:
+    def simulate(self, initial: Initial, weather: Floats, setpoints: Floats, start: np.datetime64 | Times) -> Outcome:
         """Return what candidates do; see `igrow.core.simulator.outcome.Simulator`.
 
         `weather` is not read: the courses stand for it.

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from igrow.core.arrays import Floats
+from igrow.core.arrays import Floats, Times
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,10 @@ class Outcome:
         """Return what happens in the first hours."""
         return Outcome(**{one.name: getattr(self, one.name)[..., :hours] for one in fields(self)})
 
+    def of(self, candidates: slice) -> Outcome:
+        """Return what some of the candidates do."""
+        return Outcome(**{one.name: getattr(self, one.name)[:, candidates] for one in fields(self)})
+
     def last(self, hours: int) -> Outcome:
         """Return what happens in the last hours."""
         return Outcome(**{one.name: getattr(self, one.name)[..., -hours:] for one in fields(self)})
@@ -60,12 +64,13 @@ class Simulator(Protocol):
     def setpoints(self) -> tuple[str, ...]:
         """Setpoints that do anything in it, in the registry's order; plans choose no other."""
 
-    def simulate(self, initial: Initial, weather: Floats, setpoints: Floats, start: np.datetime64) -> Outcome:
+    def simulate(self, initial: Initial, weather: Floats, setpoints: Floats, start: np.datetime64 | Times) -> Outcome:
         """Return what candidates do.
 
         Args:
             initial: what is known of the present; what is not is as usual.
-            weather: (H, 6), the hours' means of `quantities.WEATHER`'s first six, in its order.
+            weather: (H, 6), the hours' means of `quantities.WEATHER`'s first six, in its order; or each candidate's
+                own, (B, H, 6).
             setpoints: (B, H, S), in the order of `quantities.SETPOINTS`.
-            start: UTC time at which the first hour begins.
+            start: UTC time at which the first hour begins; or each candidate's own, (B,).
         """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 
 import numpy as np
 
@@ -63,6 +64,8 @@ class BundleSimulator:
         try:
             tensors = {one.name: one.quantities for one in bundle.manifest.graphs["simulator"].inputs}
             self._beginning = tensors["climate"]
+            # A graph of before several days were run at once has one clock for all.
+            self._starts_of_each = {one.name: one.shape for one in self._session.get_inputs()}["clock"][-1] != 1
             self._weather = tensors["weather"]
             self.setpoints = tensors["setpoints"]
             """That the graph takes; a bundle of before one was known goes on without it."""
@@ -80,17 +83,19 @@ class BundleSimulator:
         self._parameters = self._parameters[: members or len(self._parameters)]
         self._heat_paid = _heat_paid(greenhouse, dict(zip(names, self._parameters.T, strict=True)))
 
-    def simulate(self, initial: Initial, weather: Floats, setpoints: Floats, start: np.datetime64) -> Outcome:
+    def simulate(self, initial: Initial, weather: Floats, setpoints: Floats, start: np.datetime64 | Times) -> Outcome:
         """Return what candidates do; see `igrow.core.simulator.outcome.Simulator`.
 
         Raises:
             IgrowError: the horizon is not a number of whole days.
         """
+        if np.ndim(start) and not self._starts_of_each:
+            return self._start_by_start(initial, weather, setpoints, np.asarray(start))
         candidates, hours, _ = setpoints.shape
         if hours == 0 or hours % 24:
             raise IgrowError(f"a plan needs whole days, not {hours} hours")
         members = len(self._parameters)
-        time = start.astype("datetime64[s]") + np.arange(hours) * np.timedelta64(3600, "s")
+        time = np.arange(hours)[:, None] * np.timedelta64(3600, "s") + np.atleast_1d(start).astype("datetime64[s]")
         given = {name: _known(initial, name, _USUAL[name]) for name in _USUAL}
         given["mean_air_temperature"] = _known(initial, "mean_air_temperature", given["air_temperature"])
         excess = np.maximum(np.asarray(initial.get("rail_pipe_temperature", 0.0)) - given["air_temperature"], 0.0)
@@ -100,14 +105,21 @@ class BundleSimulator:
             of_each = [np.broadcast_to(np.nan_to_num(np.asarray(value)), candidates) for value in values]
             return np.tile(np.stack(of_each), (1, members))
 
+        own = weather.ndim == 3 or np.ndim(start) == 1
+
+        def course(values: Floats, each: bool) -> Floats:
+            if not each:
+                return values
+            return np.tile(np.broadcast_to(values, (*values.shape[:-1], candidates)), members)
+
         feed = {
             "climate": spread([given[name] for name in self._beginning]),
             "growth": spread([given[name] for name in GROWTH]),
             "harvest": spread([given["fruit_fresh_weight"]]),
             "equipment": spread([standing.get(name, 0.0) for name in EQUIPMENT]),
-            "weather": self._columns(weather)[:, :, None],
-            "clock": self._clock(time)[:, :, None],
-            "day": self.settings.day(time)[:, None],
+            "weather": course(self._columns(weather), own),
+            "clock": course(self._clock(time), own and self._starts_of_each),
+            "day": course(self.settings.day(time), own and self._starts_of_each),
             "setpoints": np.tile(np.moveaxis(setpoints[..., self._asked], 0, -1), (1, 1, members)),
             "parameters": np.repeat(self._parameters.T, candidates, axis=1),
         }
@@ -137,16 +149,30 @@ class BundleSimulator:
         )
 
     def _columns(self, weather: Floats) -> Floats:
-        """Return the graph's weather (hours, w) from the planner's six columns."""
+        """Return the graph's weather (hours, columns, w) from the planner's six columns."""
+        of_hours = np.moveaxis(weather, 0, -1) if weather.ndim == 3 else weather[:, :, None]
         columns = []
         for name in self._weather:
-            if WEATHER.index(name) < weather.shape[1]:
-                columns.append(weather[:, WEATHER.index(name)])
+            if WEATHER.index(name) < of_hours.shape[1]:
+                columns.append(of_hours[:, WEATHER.index(name)])
             else:
-                columns.append(np.full(len(weather), _ABSENT_WEATHER[name]))
+                columns.append(np.full((len(of_hours), of_hours.shape[2]), _ABSENT_WEATHER[name]))
         return np.stack(columns, axis=1)
 
+    def _start_by_start(self, initial: Initial, weather: Floats, setpoints: Floats, start: Times) -> Outcome:
+        """Return what a graph of before `clock` had a width says of candidates that start at different times."""
+        parts: dict[str, Floats] = {}
+        for one in np.unique(start):
+            rows = start == one
+            mine = {name: np.asarray(value)[rows] if np.ndim(value) else value for name, value in initial.items()}
+            outcome = self.simulate(mine, weather[rows] if weather.ndim == 3 else weather, setpoints[rows], one)
+            for part in fields(Outcome):
+                found = getattr(outcome, part.name)
+                parts.setdefault(part.name, np.empty((len(found), *setpoints.shape[:2])))[:, rows] = found
+        return Outcome(**parts)
+
     def _clock(self, time: Times) -> Floats:
+        """Return the graph's clock (hours, columns, w) of the hours' beginnings (hours, w)."""
         middle = sun.unix_seconds(time) + 1800.0
         return np.stack(sun.position(np, middle, self.settings.latitude, self.settings.longitude), axis=1)
 

@@ -31,12 +31,14 @@ class ToySimulator:
         self.calls = 0
         self.setpoints = setpoints
 
-    def simulate(self, initial: Any, weather: np.ndarray, setpoints: np.ndarray, start: np.datetime64) -> Outcome:
+    def simulate(
+        self, initial: Any, weather: np.ndarray, setpoints: np.ndarray, start: np.datetime64 | np.ndarray
+    ) -> Outcome:
         self.calls += len(setpoints)
         asked = dict(zip(SETPOINTS, np.moveaxis(setpoints, -1, 0), strict=True))
         temperature, co2, lamp = (asked[name] for name in ("heating_setpoint", "co2_setpoint", "lamp_on"))
         damp = asked["humidity_setpoint"] if "humidity_setpoint" in self.setpoints else np.full(1, 80.0)
-        outdoor, radiation = weather[:, 0], weather[:, 3]
+        outdoor, radiation = weather[..., 0], weather[..., 3]
         light = radiation * 0.5 + 81.0 * np.array(self.members)[:, None, None] * lamp
         growth = 8e-6 * light * (co2 / (co2 + 400.0)) * np.exp(-(((temperature - 22.0) / 8.0) ** 2))
         beyond = np.maximum(np.cumsum(lamp, axis=-1) - self.known_lamp_hours, 0.0) / 10.0

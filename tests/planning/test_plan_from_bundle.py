@@ -118,7 +118,9 @@ class OneUnitAnHour:
 
     setpoints = USUAL_SETPOINTS
 
-    def simulate(self, initial: Initial, weather: np.ndarray, setpoints: np.ndarray, start: np.datetime64) -> Outcome:
+    def simulate(
+        self, initial: Initial, weather: np.ndarray, setpoints: np.ndarray, start: np.datetime64 | np.ndarray
+    ) -> Outcome:
         ones = np.ones((1, *setpoints.shape[:2]))
         return Outcome(**{one.name: ones for one in fields(Outcome)})
 

@@ -98,6 +98,19 @@ def test_typical_days_are_a_cold_and_a_mild_one_each_nearest_to_the_mean_of_its_
     assert typical_days(days)[:, 0, 3].tolist() == [15.0, 205.0]
 
 
+def test_days_run_at_once_are_the_days_one_after_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As many passes as there are days are what one after the other would be; two are that to a cent."""
+    whole = season.season_of(SITE, read_bundle(default_bundle_folder()), FIRST, None, lambda _line: None)
+    strategy = Strategy(whole.days, 2)
+    genes = np.random.default_rng(0).random((6, strategy.genes), dtype=np.float32)
+    profit = []
+    for passes in (1, course.PASSES, len(whole.stretches)):
+        monkeypatch.setattr(course, "PASSES", passes)
+        profit.append(run_season(whole, strategy, genes, first_crop(whole.plant, True)).balance.net_profit)
+    assert np.abs(profit[1] - profit[2]).max() < 0.01 < np.ptp(profit[2])
+    assert np.abs(profit[1] - profit[2]).max() < np.abs(profit[0] - profit[2]).max()
+
+
 def test_where_a_typical_day_begins_is_the_strategy_s_affair(monkeypatch: pytest.MonkeyPatch) -> None:
     """A cool strategy is not given the warmth of a morning that it never had."""
     whole = season.season_of(SITE, read_bundle(default_bundle_folder()), FIRST, None, lambda _line: None)

@@ -11,6 +11,7 @@ import pytest
 from onnx import helper
 
 from igrow.core.bundle import Bundle, default_bundle_folder, read_bundle
+from igrow.core.simulator.outcome import Initial
 from igrow.core.simulator.plan import BundleSimulator
 from igrow.core.site import Greenhouse
 from tests.setpoint_tables import OPTIONAL
@@ -84,3 +85,40 @@ def test_a_bundle_of_before_the_soil_is_planned_with_as_it_was(bundle: Bundle, t
     as_warm = new.simulate(initial | {"mean_air_temperature": 17.0}, NIGHT, WARM, START)
     np.testing.assert_array_equal(found.heat, as_warm.heat)
     assert (found.heat.sum() - new.simulate(initial, NIGHT, WARM, START).heat.sum()) > 0.01
+
+
+def starts() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the weather, the setpoints and the starts of three candidates: two of a winter's day, one of spring."""
+    spring = NIGHT + np.array([10.0, -10.0, 0.0, 300.0, 1.0, 8.0])
+    return (
+        np.stack([NIGHT, NIGHT, spring]),
+        np.concatenate([WARM, WARM + 1.0, WARM]),
+        np.array([START, START, START + np.timedelta64(90, "D")]),
+    )
+
+
+@pytest.mark.parametrize("members", [1, 3])
+def test_candidates_of_different_days_run_at_once_as_each_alone(bundle: Bundle, members: int) -> None:
+    simulator = BundleSimulator(bundle, Greenhouse(), members=members)
+    weather, setpoints, start = starts()
+    initial = {"air_temperature": np.array([17.0, 18.0, 19.0])}
+    both = simulator.simulate(initial, weather, setpoints, start)
+    for row in range(3):
+        mine = {"air_temperature": initial["air_temperature"][row]}
+        alone = simulator.simulate(mine, weather[row], setpoints[[row]], start[row])
+        for name in ("air_temperature", "air_humidity", "heat", "net_growth"):
+            found, expected = getattr(both.of(slice(row, row + 1)), name), getattr(alone, name)
+            np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-6)
+
+
+def test_a_graph_with_one_clock_runs_days_one_after_the_other(bundle: Bundle, tmp_path: Path) -> None:
+    model = onnx.load(str(bundle.graph("simulator")))
+    (clock,) = (one for one in model.graph.input if one.name == "clock")
+    clock.type.tensor_type.shape.dim[-1].dim_value = 1
+    onnx.save(model, str(tmp_path / "simulator.onnx"))
+    old = BundleSimulator(replace(bundle, folder=tmp_path), Greenhouse(), members=2)
+    new = BundleSimulator(bundle, Greenhouse(), members=2)
+    initial: Initial = {"air_temperature": np.array([17.0, 18.0, 19.0]), "air_co2": 700.0}
+    found, expected = (one.simulate(initial, *starts()) for one in (old, new))
+    for name in ("air_temperature", "air_humidity", "heat", "net_growth"):
+        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=1e-5, atol=1e-6)

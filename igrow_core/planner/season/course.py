@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +19,7 @@ from igrow.core.planner.season.crop import fresh, like, live, supplied
 from igrow.core.planner.season.strategy import Strategy
 from igrow.core.planner.template import Setpoints, Template, for_site
 from igrow.core.quantities import SETPOINTS, WEATHER
-from igrow.core.simulator.outcome import Outcome, Simulator
+from igrow.core.simulator.outcome import Initial, Outcome, Simulator
 from igrow.core.site import Site
 
 DAY = np.timedelta64(86_400, "s")
@@ -26,8 +28,25 @@ STRETCH = 10
 SUN_WARMS = 0.1
 """Sol-air temperature above that of the air for each W m-2 of global radiation, K."""
 OUTDOOR, RADIATION, WIND = (WEATHER.index(name) for name in ("outdoor_temperature", "global_radiation", "wind_speed"))
+PASSES = 2
+"""Runs of all days until each knows how warm the one before was; a third moves net profit by less than 0.01 EUR m-2."""
 MORNING = {"air_temperature": 18.0, "air_humidity": 80.0, "air_co2": 600.0, "leaf_area_index": 3.0}
 """Where the day before a typical one begins, at local midnight."""
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Days that are like one typical day."""
+
+    first: int
+    """Of the season's days, counted from the start."""
+    days: int
+    start: np.datetime64
+    """UTC of the first day's local midnight."""
+    weather: Floats
+    """Of the typical day, (24, 6)."""
+    template: Template
+    """Of that day, twice."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +73,16 @@ class Season:
         """Raise ValueError where days are left without weather."""
         if len(self.weather) * self.every < self.days:
             raise ValueError(f"{len(self.weather)} typical days for {self.every} days each leave some of {self.days}")
+
+    @cached_property
+    def stretches(self) -> tuple[Stretch, ...]:
+        """What its days are like, in their order."""
+        found = []
+        for first in range(0, self.days, self.every):
+            start, weather = self.start + first * DAY, self.weather[first // self.every]
+            template = for_site(self.site, start, 48, radiation=np.tile(weather[:, RADIATION], 2))
+            found.append(Stretch(first, min(self.every, self.days - first), start, weather, template))
+        return tuple(found)
 
 
 @dataclass(frozen=True)
@@ -85,21 +114,18 @@ def run_season(season: Season, strategy: Strategy, genes: NDArray[np.float32], c
     used = {name: np.zeros(count) for name in ("heat", "electricity", "co2", "net_growth")}
     penalty = np.zeros(count)
     damp, crops = [], []
-    warmth: Floats | None = None
-    for typical, weather in enumerate(season.weather):
-        first = typical * season.every
-        repeats = min(season.every, season.days - first)
-        if repeats <= 0:
-            break
+    wanted = [
+        asked(strategy, genes, season.first_day + one.first + one.days // 2, one.template, one.weather, season.recipe)
+        for one in season.stretches
+    ]
+    for stretch, outcome in zip(season.stretches, _lived(season, wanted), strict=True):
         crops.append(plants)
-        start = season.start + first * DAY
-        outcome = _typical_day(season, strategy, genes, first + repeats // 2, start, weather, warmth)
-        warmth = outcome.air_temperature[0].mean(axis=-1)
+        repeats = stretch.days
         gross = supplied(p, believed(outcome), outcome.air_temperature[0])
         supply, warm, leaves = (
             np.broadcast_to(one, (count, 24)) for one in (gross, outcome.air_temperature[0], outcome.leaf_area_index[0])
         )
-        time = start + np.arange(24) * np.timedelta64(3600, "s")
+        time = stretch.start + np.arange(24) * np.timedelta64(3600, "s")
         heat, electricity, co2 = (
             np.tile(getattr(outcome, name)[0], (1, repeats)) for name in ("heat", "electricity", "co2")
         )
@@ -113,7 +139,7 @@ def run_season(season: Season, strategy: Strategy, genes: NDArray[np.float32], c
         used = {name: before + repeats * getattr(outcome, name)[0].sum(axis=-1) for name, before in used.items()}
         penalty = penalty + repeats * OUTSIDE_PENALTY * outcome.outside[0].sum(axis=-1) / 24.0
         damp.append(np.broadcast_to(damp_hours(outcome, site), count))
-        for day in range(first, first + repeats):
+        for day in range(stretch.first, stretch.first + repeats):
             before = fresh(p, plants)
             plants = live(p, plants, supply, warm, leaves)
             if (day + season.first_day) % max(int(p.deleafing_interval), 1) == 0:
@@ -131,13 +157,8 @@ def run_season(season: Season, strategy: Strategy, genes: NDArray[np.float32], c
 
 def bearable_damp(season: Season) -> Floats:
     """Return how many hours of each typical day may be damp, (T,): as many as the crop bears, or the recipe has."""
-    damp, warmth = [], None
-    for first in range(0, season.days, season.every):
-        start, weather = season.start + first * DAY, season.weather[first // season.every]
-        template = _two_days(season, start, weather)
-        outcome = _lived(season, season.recipe[None], template, start, weather, warmth)
-        warmth = outcome.air_temperature[0].mean(axis=-1)
-        damp.append(float(damp_hours(outcome, season.site)[0]))
+    lived = _lived(season, [season.recipe[None]] * len(season.stretches))
+    damp = [float(damp_hours(outcome, season.site)[0]) for outcome in lived]
     return np.maximum(damp, season.site.crop.agronomy.damp_hours)
 
 
@@ -166,44 +187,32 @@ def believed(outcome: Outcome) -> Floats:
     return np.asarray(outcome.net_growth[0] * np.clip(1.0 - DISBELIEF * outcome.outside[0], 0.0, 1.0))
 
 
-def _typical_day(
-    season: Season,
-    strategy: Strategy,
-    genes: NDArray[np.float32],
-    day: int,
-    start: np.datetime64,
-    weather: Floats,
-    warmth: Floats | None,
-) -> Outcome:
-    template = _two_days(season, start, weather)
-    wanted = asked(strategy, genes, season.first_day + day, template, weather, season.recipe)
-    return _lived(season, wanted, template, start, weather, warmth)
-
-
-def _two_days(season: Season, start: np.datetime64, weather: Floats) -> Template:
-    return for_site(season.site, start, 48, radiation=np.tile(weather[:, RADIATION], 2))
-
-
-def _lived(
-    season: Season,
-    wanted: Setpoints,
-    template: Template,
-    start: np.datetime64,
-    weather: Floats,
-    warmth: Floats | None,
-) -> Outcome:
-    """Return a day under setpoints (B, 24, S), lived once before.
+def _lived(season: Season, wanted: Sequence[Setpoints]) -> list[Outcome]:
+    """Return each typical day under its setpoints, (B, 24, S) each, lived once before.
 
     The day before is like it: the night that ends in the morning has had its dark hours, or has not, and air and floor
     begin as warm as the setpoints leave them. A morning that is the same for all gives to a cool strategy, for nothing,
-    a tenth of the heat that it needs. The soil is as warm as the air was on the typical day before (`warmth`, (B,)), on
-    the first one as the heating setpoint asks.
+    a tenth of the heat that it needs.
+
+    The soil is as warm as the air was on the typical day before, on the first one as the heating setpoint asks. So that
+    all days run at once, they are run `PASSES` times: first with each day's own heating setpoint for that warmth, then
+    with what was found.
     """
-    if warmth is None:
-        warmth = wanted[:, :, SETPOINTS.index("heating_setpoint")].mean(axis=1)
-    course = template.follow(np.tile(wanted, (1, 2, 1)), np.full(len(SETPOINTS), np.nan)).setpoints
-    morning = {**MORNING, "mean_air_temperature": warmth}
-    return season.simulator.simulate(morning, np.tile(weather, (2, 1)), course, start - DAY).last(24)
+    count = len(wanted[0])
+    courses = np.concatenate(
+        [
+            one.template.follow(np.tile(day, (1, 2, 1)), np.full(len(SETPOINTS), np.nan)).setpoints
+            for one, day in zip(season.stretches, wanted, strict=True)
+        ]
+    )
+    weather = np.repeat(np.stack([np.tile(one.weather, (2, 1)) for one in season.stretches]), count, axis=0)
+    start = np.repeat(np.array([one.start - DAY for one in season.stretches]), count)
+    warmth = np.stack([day[:, :, SETPOINTS.index("heating_setpoint")].mean(axis=1) for day in wanted])
+    for _ in range(PASSES):
+        morning: Initial = {**MORNING, "mean_air_temperature": warmth.ravel()}
+        lived = season.simulator.simulate(morning, weather, courses, start).last(24)
+        warmth[1:] = lived.air_temperature[0].mean(axis=-1).reshape(warmth.shape)[:-1]
+    return [lived.of(slice(first, first + count)) for first in range(0, len(courses), count)]
 
 
 def asked(
