@@ -38,7 +38,7 @@ def canopy_drivers(xp: Any, climate: Values, inputs: Drivers, parameters: Values
     day_share = night + (1.0 - night) * radiation / (radiation + _STOMATA_HALF_OPEN)
     # Stomata close as the air dries (Leuning 1995), so that a crop answers to drier air less than in proportion.
     open_share = _CLOSING_DEFICIT / (_CLOSING_DEFICIT + xp.maximum(deficit, 0.0 * deficit))
-    response = 0.001 * parameters["transpiration_deficit"] * inputs["leaf_area_index"] * day_share * open_share
+    response = 0.001 * parameters["transpiration_moist_air"] * inputs["leaf_area_index"] * day_share * open_share
     # A crop that radiates to a cold cover is colder than the air, and evaporates less than the air's deficit says.
     long_wave = parameters["crop_long_wave_loss"] * climate["screens"]
     lost = long_wave * (temperature - climate["surroundings"])

@@ -227,7 +227,7 @@ _ROWS = (
         "Baille et al. (1994)",
     ),
     (
-        "transpiration_deficit",
+        "transpiration_moist_air",
         "W m-2 kPa-1",
         50.0,
         0.6,
