@@ -104,7 +104,7 @@ def test_days_run_at_once_are_the_days_one_after_the_other(monkeypatch: pytest.M
     strategy = Strategy(whole.days, 2)
     genes = np.random.default_rng(0).random((6, strategy.genes), dtype=np.float32)
     profit = []
-    for passes in (1, course.PASSES, len(whole.stretches)):
+    for passes in (1, course.PASSES, len(whole.typical_days)):
         monkeypatch.setattr(course, "PASSES", passes)
         profit.append(run_season(whole, strategy, genes, first_crop(whole.plant, True)).balance.net_profit)
     assert np.abs(profit[1] - profit[2]).max() < 0.01 < np.ptp(profit[2])

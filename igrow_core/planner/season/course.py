@@ -35,18 +35,19 @@ MORNING = {"air_temperature": 18.0, "air_humidity": 80.0, "air_co2": 600.0, "lea
 
 
 @dataclass(frozen=True)
-class Stretch:
-    """Days that are like one typical day."""
+class TypicalDay:
+    """A day, and the days that are like it."""
 
     first: int
-    """Of the season's days, counted from the start."""
+    """Of the days that are like it, counted from the season's start."""
     days: int
+    """How many are like it."""
     start: np.datetime64
     """UTC of the first day's local midnight."""
     weather: Floats
-    """Of the typical day, (24, 6)."""
+    """Its, (24, 6)."""
     template: Template
-    """Of that day, twice."""
+    """Of the day, twice."""
 
 
 @dataclass(frozen=True)
@@ -75,13 +76,13 @@ class Season:
             raise ValueError(f"{len(self.weather)} typical days for {self.every} days each leave some of {self.days}")
 
     @cached_property
-    def stretches(self) -> tuple[Stretch, ...]:
+    def typical_days(self) -> tuple[TypicalDay, ...]:
         """What its days are like, in their order."""
         found = []
         for first in range(0, self.days, self.every):
             start, weather = self.start + first * DAY, self.weather[first // self.every]
             template = for_site(self.site, start, 48, radiation=np.tile(weather[:, RADIATION], 2))
-            found.append(Stretch(first, min(self.every, self.days - first), start, weather, template))
+            found.append(TypicalDay(first, min(self.every, self.days - first), start, weather, template))
         return tuple(found)
 
 
@@ -101,7 +102,7 @@ class SeasonOutcome:
     used: dict[str, Floats]
     """heat (MJ m-2), electricity (kWh m-2), co2 and net_growth (kg m-2), (B,)."""
     crops: tuple[Crop, ...]
-    """Where each typical day's stretch begins."""
+    """On the first of the days that each typical one stands for."""
 
 
 def run_season(season: Season, strategy: Strategy, genes: NDArray[np.float32], crop: Crop) -> SeasonOutcome:
@@ -116,16 +117,16 @@ def run_season(season: Season, strategy: Strategy, genes: NDArray[np.float32], c
     damp, crops = [], []
     wanted = [
         asked(strategy, genes, season.first_day + one.first + one.days // 2, one.template, one.weather, season.recipe)
-        for one in season.stretches
+        for one in season.typical_days
     ]
-    for stretch, outcome in zip(season.stretches, _lived(season, wanted), strict=True):
+    for typical, outcome in zip(season.typical_days, _lived(season, wanted), strict=True):
         crops.append(plants)
-        repeats = stretch.days
+        repeats = typical.days
         gross = supplied(p, believed(outcome), outcome.air_temperature[0])
         supply, warm, leaves = (
             np.broadcast_to(one, (count, 24)) for one in (gross, outcome.air_temperature[0], outcome.leaf_area_index[0])
         )
-        time = stretch.start + np.arange(24) * np.timedelta64(3600, "s")
+        time = typical.start + np.arange(24) * np.timedelta64(3600, "s")
         heat, electricity, co2 = (
             np.tile(getattr(outcome, name)[0], (1, repeats)) for name in ("heat", "electricity", "co2")
         )
@@ -139,7 +140,7 @@ def run_season(season: Season, strategy: Strategy, genes: NDArray[np.float32], c
         used = {name: before + repeats * getattr(outcome, name)[0].sum(axis=-1) for name, before in used.items()}
         penalty = penalty + repeats * OUTSIDE_PENALTY * outcome.outside[0].sum(axis=-1) / 24.0
         damp.append(np.broadcast_to(damp_hours(outcome, site), count))
-        for day in range(stretch.first, stretch.first + repeats):
+        for day in range(typical.first, typical.first + repeats):
             before = fresh(p, plants)
             plants = live(p, plants, supply, warm, leaves)
             if (day + season.first_day) % max(int(p.deleafing_interval), 1) == 0:
@@ -157,7 +158,7 @@ def run_season(season: Season, strategy: Strategy, genes: NDArray[np.float32], c
 
 def bearable_damp(season: Season) -> Floats:
     """Return how many hours of each typical day may be damp, (T,): as many as the crop bears, or the recipe has."""
-    lived = _lived(season, [season.recipe[None]] * len(season.stretches))
+    lived = _lived(season, [season.recipe[None]] * len(season.typical_days))
     damp = [float(damp_hours(outcome, season.site)[0]) for outcome in lived]
     return np.maximum(damp, season.site.crop.agronomy.damp_hours)
 
@@ -202,11 +203,11 @@ def _lived(season: Season, wanted: Sequence[Setpoints]) -> list[Outcome]:
     courses = np.concatenate(
         [
             one.template.follow(np.tile(day, (1, 2, 1)), np.full(len(SETPOINTS), np.nan)).setpoints
-            for one, day in zip(season.stretches, wanted, strict=True)
+            for one, day in zip(season.typical_days, wanted, strict=True)
         ]
     )
-    weather = np.repeat(np.stack([np.tile(one.weather, (2, 1)) for one in season.stretches]), count, axis=0)
-    start = np.repeat(np.array([one.start - DAY for one in season.stretches]), count)
+    weather = np.repeat(np.stack([np.tile(one.weather, (2, 1)) for one in season.typical_days]), count, axis=0)
+    start = np.repeat(np.array([one.start - DAY for one in season.typical_days]), count)
     warmth = np.stack([day[:, :, SETPOINTS.index("heating_setpoint")].mean(axis=1) for day in wanted])
     for _ in range(PASSES):
         morning: Initial = {**MORNING, "mean_air_temperature": warmth.ravel()}
