@@ -28,7 +28,7 @@ def told(parameter: str, share: float) -> Finding:
         ("transmissivity", 0.2, True),
         ("transmissivity", -0.2, False),
         ("rail_pipe_heat_transfer", 0.2, False),
-        ("transpiration_deficit", 0.2, False),
+        ("transpiration_moist_air", 0.2, False),
     ],
 )
 def test_a_change_is_true_where_the_plants_own_is_large_and_in_the_direction_told(

@@ -104,12 +104,12 @@ def test_a_crop_may_differ_more_than_the_walls() -> None:
     another = replace(DEFAULT, crop_drift=DEFAULT.new_crop_drift)
     usual, new = (knowledge_of(model, model.site, one).prior.standard_deviation for one in (DEFAULT, another))
     wider = {name for name, one, two in zip(model.posterior.names, usual, new, strict=True) if two > 2.0 * one}
-    assert {"transpiration_radiation", "transpiration_deficit", "assimilation_light", "respiration"} <= wider
+    assert {"transpiration_radiation", "transpiration_moist_air", "assimilation_light", "respiration"} <= wider
     assert not {"transmissivity", "leakage_wind", "vent_wind", "cover_heat_transfer"} & wider
 
 
 def test_of_a_crop_that_may_be_another_neither_leaves_nor_light_are_asked() -> None:
-    of_leaves = {"transpiration_deficit", "assimilation_light", "respiration", "deficit_stomata_closure"}
+    of_leaves = {"transpiration_moist_air", "assimilation_light", "respiration", "deficit_stomata_closure"}
     of_light = {"transmissivity", "lamp_radiation_share", "structure_shade", "cover_ageing"}
     assert of_leaves | of_light <= LEAVES_AND_LIGHT
     known = {"humidity_offset", "wind_infiltration", "soil_respiration", "leakage_wind", "rail_pipe_heat_transfer"}

@@ -35,7 +35,7 @@ def shifted(telemetry: Telemetry, rows: int) -> Telemetry:
     return telemetry.with_columns(late)
 
 
-TRUTH = nominal(SITE) | {"transmissivity": 0.5, "leakage_wind": 0.1, "transpiration_deficit": 24.0, "sky_share": 0.3}
+TRUTH = nominal(SITE) | {"transmissivity": 0.5, "leakage_wind": 0.1, "transpiration_moist_air": 48.0, "sky_share": 0.3}
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ from datetime import date
 import numpy as np
 import pytest
 
-from igrow.core.air import STANDARD_PRESSURE
+from igrow.core.air import LATENT_HEAT, STANDARD_PRESSURE
 from igrow.core.effects import EFFECTS
 from igrow.core.simulator.hybrid import climate
 from igrow.core.simulator.hybrid import record as records
@@ -124,6 +124,25 @@ def test_a_closed_screen_stops_vents_and_leaks() -> None:
         drivers = climate.derive(np, state, inputs, values, 1.2)
         exchange.append(balances(np, state, drivers, values, {})["co2_concentration"][1])
     assert exchange[1] < 0.7 * exchange[0]
+
+
+def test_a_crop_answers_less_to_drier_air_the_drier_it_is() -> None:
+    """What it says of its answer is the slope of what it evaporates, in moist air four times that at a kilopascal."""
+    values, inputs = nominal(SITE), steady_inputs()
+
+    def of(humidity: float) -> dict[str, float]:
+        start = {"air_temperature": 20.0, "air_humidity": humidity, "air_co2": 600.0}
+        return climate.derive(np, climate.initial_state(np, start, inputs, values, {}, 1.2), inputs, values, 1.2)
+
+    answers = []
+    for humidity in (99.0, 80.0, 57.0):
+        moister, drier = of(humidity + 0.1), of(humidity - 0.1)
+        more = LATENT_HEAT * (drier["transpiration"] - moister["transpiration"])
+        slope = more / (drier["vapour_deficit"] - moister["vapour_deficit"])
+        assert slope == pytest.approx(of(humidity)["transpiration_response"], rel=0.06)
+        answers.append(slope)
+    assert answers[0] > 1.5 * answers[1] > 2.2 * answers[2] > 0.0
+    assert answers[0] / answers[2] == pytest.approx(4.0, rel=0.1)
 
 
 def test_the_step_is_small_enough() -> None:

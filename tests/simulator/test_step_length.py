@@ -11,7 +11,7 @@ from igrow.core.simulator.hybrid.parameters import PARAMETERS
 
 MINUTES = 1440
 # A crop that answers strongly to the air couples heat and vapour most tightly.
-VALUES = {name: parameter.value for name, parameter in PARAMETERS.items()} | {"transpiration_deficit": 60.0}
+VALUES = {name: parameter.value for name, parameter in PARAMETERS.items()} | {"transpiration_moist_air": 110.0}
 
 PULSES = np.where((np.arange(MINUTES) % 50 < 3) & (np.arange(MINUTES) // 60 % 24 >= 6), 6.0, 0.0)
 """Irrigation of each minute, L m-2 h-1: three minutes of fifty."""

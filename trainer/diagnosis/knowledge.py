@@ -28,7 +28,7 @@ PARAMETER_PREFIX = "parameter:"
 """Key of a parameter's shift in a discrepancy: what short errors of the calibration log say beside the long ones."""
 
 CROP = frozenset({
-    "transpiration_radiation", "transpiration_deficit", "transpiration_night_share", "crop_long_wave_loss",
+    "transpiration_radiation", "transpiration_moist_air", "transpiration_night_share", "crop_long_wave_loss",
     "assimilation_maximum", "assimilation_light", "assimilation_co2", "respiration",
 })  # fmt: skip
 """Parameters that change as the crop does."""

@@ -12,6 +12,9 @@ PASCAL_PER_CONTENT = 1.36e5
 """Vapour pressure of a vapour content, Pa per kg m-3, at 20 degC."""
 _STOMATA_HALF_OPEN = 6.0
 """Short-wave radiation at which the stomata of a canopy are half open, W m-2 (Stanghellini 1987: 3 for one leaf)."""
+_CLOSING_DEFICIT = 1000.0
+"""Deficit of the air at which a crop's conductance is half of that in moist air, Pa (Lohammar et al. 1980; Leuning
+1995, Plant, Cell and Environment 18, 339-355)."""
 _EXTINCTION = 0.7
 """Extinction of radiation in a tomato canopy (Stanghellini 1987)."""
 
@@ -33,7 +36,9 @@ def canopy_drivers(xp: Any, climate: Values, inputs: Drivers, parameters: Values
     radiation = radiation_inside + parameters["lamp_radiation_share"] * inputs["lamp_power"]
     night = parameters["transpiration_night_share"]
     day_share = night + (1.0 - night) * radiation / (radiation + _STOMATA_HALF_OPEN)
-    response = 0.001 * parameters["transpiration_deficit"] * inputs["leaf_area_index"] * day_share
+    # Stomata close as the air dries (Leuning 1995), so that a crop answers to drier air less than in proportion.
+    open_share = _CLOSING_DEFICIT / (_CLOSING_DEFICIT + xp.maximum(deficit, 0.0 * deficit))
+    response = 0.001 * parameters["transpiration_moist_air"] * inputs["leaf_area_index"] * day_share * open_share
     # A crop that radiates to a cold cover is colder than the air, and evaporates less than the air's deficit says.
     long_wave = parameters["crop_long_wave_loss"] * climate["screens"]
     lost = long_wave * (temperature - climate["surroundings"])
@@ -42,7 +47,7 @@ def canopy_drivers(xp: Any, climate: Values, inputs: Drivers, parameters: Values
     return {
         "transpiration": evaporation / air.LATENT_HEAT,
         "sun_transpiration": of_radiation * radiation_inside / air.LATENT_HEAT,
-        "transpiration_response": response * deficit / (deficit + 1.0),
+        "transpiration_response": response * open_share * deficit / (deficit + 1.0),
         "long_wave_response": of_radiation * long_wave,
         "assimilation": parameters["assimilation_maximum"]
         / 3.6e6
