@@ -29,7 +29,7 @@ from igrow.core.site import Agronomy, Band, Greenhouse, Rest, Site
 
 ZONES = ("Europe/Amsterdam", "UTC", "Asia/Kolkata", "America/New_York", "Australia/Adelaide", "Asia/Kathmandu")
 HOURS = 48
-QUICK = Budget(generations=4, patience=4)
+QUICK = Budget(candidates=400)
 
 
 def random_site(rng: np.random.Generator) -> Site:

@@ -70,7 +70,8 @@ class Planned(Recipe):
         self._site = site
         self._simulator = simulator
         self._season = season
-        self._budget = Budget(generations, generations)
+        candidates = generations * SEARCH.settings.offspring
+        self._budget = Budget(candidates, candidates)
         self._past: dict[int, deque[Lived]] = {}
         self._chosen: list[Floats] = []
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -26,12 +27,12 @@ NOT_ADMITTED = -1e6
 
 @dataclass(frozen=True)
 class Budget:
-    """When a search ends: the first of these."""
+    """When a search ends: the first of these. Counted in candidates, whatever a generation of the graph has of them."""
 
-    generations: int = 80
-    """Most generations."""
-    patience: int = 25
-    """Generations without a better candidate."""
+    candidates: int = 10_752
+    """Most candidates that are tried: 28 generations of 384."""
+    patience: int = 3_840
+    """Candidates without a better one."""
     seconds: float = float("inf")
     """Time by the monotonic clock that is passed in."""
 
@@ -177,14 +178,15 @@ def optimise(
     parent_fitness = np.full(settings.parents, WORST, dtype=np.float32)
     history: list[float] = []
     best_at = 0
-    for number in range(budget.generations):
+    for number in range(math.ceil(budget.candidates / settings.offspring)):
         offspring_fitness = fitness(template.decode(offspring, recipe, applied, state.memory))
         random = draw(rng, settings, template.genes)
         parents, parent_fitness, offspring = run(parents, parent_fitness, offspring, offspring_fitness, random)
         if not history or parent_fitness[0] > history[best_at] + 1e-6:
             best_at = number
         history.append(float(parent_fitness[0]))
-        if number - best_at >= budget.patience or monotonic() - began >= budget.seconds:
+        tried_since = (number - best_at) * settings.offspring
+        if tried_since >= budget.patience or monotonic() - began >= budget.seconds:
             break
 
     best_known = int(known_fitness.argmax())

@@ -12,7 +12,7 @@ from igrow.core.planner import Budget, optimise
 from igrow.core.planner.explain import PARTS, explain, limits_in_force
 from tests.planner.toy_greenhouse import ToySimulator
 
-QUICK = Budget(generations=25, patience=25)
+QUICK = Budget(candidates=4_800)
 
 
 @pytest.fixture

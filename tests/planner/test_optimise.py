@@ -18,7 +18,7 @@ from igrow.core.site import Site
 from tests.planner.toy_greenhouse import HOURS, START, ToySimulator, with_planning
 from tests.setpoint_tables import OPTIONAL
 
-QUICK = Budget(generations=40, patience=15)
+QUICK = Budget(candidates=3_840, patience=1_920)
 
 
 def plan(
@@ -133,7 +133,7 @@ def test_a_search_ends_with_its_time(site, state, weather, recipe) -> None:
         weather,
         recipe,
         np.random.default_rng(0),
-        Budget(generations=1000, patience=1000, seconds=5.0),
+        Budget(candidates=100_000, patience=100_000, seconds=5.0),
         monotonic=lambda: float(next(ticks)),
     )
     assert len(result.history) == 5

@@ -97,7 +97,7 @@ def test_a_day_is_searched_by_the_season_s_values(
     worth = plan.worth(site, state.time, {})
     assert worth is not None
     hopeless = replace(worth, values=replace(worth.values, buffer=0.0, leaf=0.0, fruit=0.0 * worth.values.fruit))
-    budget = Budget(generations=20)
+    budget = Budget(candidates=3_840)
     lamps = []
     for one in (None, hopeless):
         found = optimise(

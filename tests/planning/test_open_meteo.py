@@ -98,7 +98,7 @@ def test_an_unknown_unit_is_refused(tmp_path: Path) -> None:
 
 def test_a_plan_holds_against_the_spread_of_an_ensemble(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Members that differ add to the doubt that caution takes off."""
-    monkeypatch.setattr("igrow.edge.planning.make_plan.Budget", lambda: Budget(generations=4))
+    monkeypatch.setattr("igrow.edge.planning.make_plan.Budget", lambda: Budget(candidates=400))
     path = write(tmp_path, content("", "_member01", "_member02", unix=True))
     members = read_forecast(path)
     wild = tuple(

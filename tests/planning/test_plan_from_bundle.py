@@ -80,7 +80,7 @@ def test_a_plan_of_one_day_is_searched_with_the_day_after_it(monkeypatch: pytest
         return results[-1]
 
     monkeypatch.setattr("igrow.edge.planning.make_plan.optimise", search)
-    monkeypatch.setattr("igrow.edge.planning.make_plan.Budget", lambda: Budget(generations=4))
+    monkeypatch.setattr("igrow.edge.planning.make_plan.Budget", lambda: Budget(candidates=400))
     plan = make_plan(SITE, request())
     (found,) = results
     assert len(found.setpoints) == 48
@@ -163,7 +163,7 @@ def test_what_doses_more_since_last_week_has_not_done_so_since_planting(monkeypa
     assert co2_since_planting(site, log(), START, counted) == 5.0
 
     # What the recipe is worth is no affair of the search.
-    monkeypatch.setattr("igrow.edge.planning.make_plan.Budget", lambda: Budget(generations=4))
+    monkeypatch.setattr("igrow.edge.planning.make_plan.Budget", lambda: Budget(candidates=400))
     known = make_plan(site, replace(request(), telemetry=leaking, co2_counted=counted))
     assert known.co2_before == pytest.approx(5.36)
     assert make_plan(site, replace(request(), telemetry=leaking)).recipe_profit < known.recipe_profit

@@ -46,7 +46,7 @@ def test_a_bundle_carries_its_season_and_the_day_s_plan_speaks_of_it(
     assert again is not None
     assert again.to_json() == planned.to_json()
     assert read_model(bundle, replace(SITE, name="another")).season is None, "of another greenhouse it says nothing"
-    monkeypatch.setattr("igrow.edge.planning.make_plan.Budget", lambda: Budget(generations=4))
+    monkeypatch.setattr("igrow.edge.planning.make_plan.Budget", lambda: Budget(candidates=400))
     plan = make_plan(SITE, replace(request(), bundle=bundle.folder))
     told = "\n".join(reasons(plan, ZoneInfo("UTC")))
     assert "day 9 of 33 of the season" in told
