@@ -51,12 +51,12 @@ def told(job: tuple[Reference, Case, Telemetry]) -> Told:
     judged = changed(search.resolved(), 0.0, rng)
     if judged.cause is not None or judged.patterns:
         return Told(site.name, case.group, "", 0.0)
-    design = search.by_physics()
-    found = fitted_change.closest(days, knowledge, design, fitted_change.promising(design, rng))
+    design = search.by_physics(knowledge.terms)
+    found = fitted_change.closest(days, knowledge, design, fitted_change.promising(design, rng), rng)
     return (
         Told(site.name, case.group, "", 0.0)
         if found is None
-        else Told(site.name, case.group, found[0].effect, found[1])
+        else Told(site.name, case.group, found.hypothesis.effect, found.fall)
     )
 
 

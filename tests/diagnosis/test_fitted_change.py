@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from igrow.trainer.data import Log
-from igrow.trainer.diagnosis import DEFAULT, fitted_change
+from igrow.trainer.diagnosis import DEFAULT, fitted_change, linear, rounds
 from igrow.trainer.diagnosis.candidates import Candidate
+from igrow.trainer.diagnosis.compare import Round
+from igrow.trainer.diagnosis.drift import Drift
 from igrow.trainer.diagnosis.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, knowledge_of
 from igrow.trainer.diagnosis.linear import Term
@@ -24,26 +28,26 @@ def hypothesis(effect: str, amplitude: float) -> Hypothesis:
     return Hypothesis(Candidate(effect, ()), Term(0), 20.0, amplitude, 5.0, 0.001)
 
 
-def closest(log: Log, known: Knowledge | None = None) -> tuple[str, float] | None:
-    """What fits tell of a log, and the share of unseen days' error that it removes."""
+def closest(log: Log, known: Knowledge | None = None) -> fitted_change.Fitted | None:
+    """What fits tell of a log."""
     model, asked = model_in_force(), [hypothesis("co2_offset", 20.0), hypothesis("humidity_offset", 2.0)]
     design = with_parameters(Truth({}, {}), 1)
-    found = fitted_change.closest(log_days(log, model), known or knowledge_of(model, SITE, DEFAULT), design, asked)
-    return None if found is None else (found[0].effect, found[1])
+    known, rng = known or knowledge_of(model, SITE, DEFAULT), np.random.default_rng(0)
+    return fitted_change.closest(log_days(log, model), known, design, asked, rng)
 
 
 def test_the_effect_that_brings_free_runs_closest_is_told_with_what_it_takes_off_unseen_days(quiet_log: Log) -> None:
     shown = quiet_log.telemetry["air_humidity"] + 6.0
     found = closest(quiet_log.with_columns({"air_humidity": shown}))
     assert found is not None
-    effect, fall = found
-    assert effect == "humidity_offset"
-    assert fall > DEFAULT.least_change_fall
+    assert found.hypothesis.effect == "humidity_offset"
+    assert found.fall > DEFAULT.least_change_fall
+    assert found.bootstrap_p < 0.05
 
 
 def test_where_nothing_has_changed_no_fit_takes_that_much(quiet_log: Log) -> None:
     found = closest(quiet_log)
-    assert found is None or found[1] < DEFAULT.least_change_fall
+    assert found is None or found.fall < DEFAULT.least_change_fall
 
 
 def test_beside_a_term_that_began_within_the_log_nothing_is_fitted(quiet_log: Log) -> None:
@@ -61,3 +65,23 @@ def test_what_gains_little_by_physics_is_not_fitted(size: float, told: list[str]
     promising = fitted_change.promising(design, np.random.default_rng(0))
     assert [one.effect for one in promising][:1] == told
     assert len(promising) <= DEFAULT.most_change_fits
+
+
+def test_beside_a_cause_that_was_found_before_fits_are_asked_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of two causes steps may prove one alone; a third is not looked for where no more may be named."""
+    design = with_parameters(Truth({}, {}), 1)
+    null = linear.fit(design.grams, design.null_model())
+    asked: list[tuple[ActiveTerm, ...]] = []
+    monkeypatch.setattr(rounds, "changed", lambda *_, **__: Round(design, null, null, None, ()))
+    monkeypatch.setattr(fitted_change, "find", lambda _days, known, *_: asked.append(known.terms))
+    monkeypatch.setattr(rounds.Change, "_expected", lambda *_: design)
+    known = knowledge_of(model_in_force(), SITE, DEFAULT)
+    common: tuple[Any, ...] = (None, SITE, known, frozenset(), DEFAULT, None)
+    search = rounds.Change(*common, cast(Any, None), design, np.zeros(0), Drift({}, 42.0))
+    term = ActiveTerm("co2_offset", 80.0, {})
+    found = [cast(Any, SimpleNamespace(term=term, gain=50.0))]
+    rng = np.random.default_rng(0)
+    assert search.judge(design, [], rng, causes=True).cause is None
+    assert search.judge(design, found, rng, causes=True).cause is None
+    assert search.judge(design, found, rng, causes=False).cause is None
+    assert asked == [known.terms, (*known.terms, term)]

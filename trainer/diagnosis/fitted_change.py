@@ -9,6 +9,8 @@ fit saw, by more than any does where nothing has changed.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from igrow.core.arrays import Mask
@@ -21,12 +23,27 @@ from igrow.trainer.diagnosis.compare import Round
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.freerun import LogDays
 from igrow.trainer.diagnosis.knowledge import Knowledge, activate, home_drift
-from igrow.trainer.diagnosis.omission import fall, fit_together
+from igrow.trainer.diagnosis.omission import DAY, fall, fit_together
+from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.fit.climate import fit_climate
-from igrow.trainer.fit.evaluation import Model, held_out_errors
+from igrow.trainer.fit.evaluation import Model, errors_of, free_runs, held_out_errors
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.solver import DivergenceError
+
+
+_NOTHING = 1e-12
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A hypothesis that was fitted to free runs."""
+
+    hypothesis: Hypothesis
+    fall: float
+    """Share of the error a day ahead that goes on days that no fit saw, the mean of all quantities."""
+    bootstrap_p: float
+    """Probability, over these days, that it does not fall."""
 
 
 def find(days: LogDays, knowledge: Knowledge, design: Design, rng: np.random.Generator) -> Round | None:
@@ -39,10 +56,13 @@ def find(days: LogDays, knowledge: Knowledge, design: Design, rng: np.random.Gen
         rng: for flips and bootstraps.
     """
     null = linear.fit(design.grams, design.null_model())
-    found = closest(days, knowledge, design, promising(design, rng))
-    if found is None or found[1] < design.rules.least_change_fall:
+    found = closest(days, knowledge, design, promising(design, rng), rng)
+    if found is None or found.fall < design.rules.least_change_fall:
         return None
-    return change.round_of(design, null, found[0], rng)
+    told = change.round_of(design, null, found.hypothesis, rng)
+    assert told.cause is not None
+    # What unseen days say of it is said by the fits: within a drift that they do not allow for, single steps say less.
+    return replace(told, cause=replace(told.cause, bootstrap_p=found.bootstrap_p))
 
 
 def promising(design: Design, rng: np.random.Generator) -> list[Hypothesis]:
@@ -58,12 +78,9 @@ def promising(design: Design, rng: np.random.Generator) -> list[Hypothesis]:
 
 
 def closest(
-    days: LogDays, knowledge: Knowledge, design: Design, hypotheses: list[Hypothesis]
-) -> tuple[Hypothesis, float] | None:
-    """Return the hypothesis that brings the fitted days closest to what was measured, and its fall on unseen days.
-
-    The fall is the share of the error a day ahead that goes, the mean of all quantities.
-    """
+    days: LogDays, knowledge: Knowledge, design: Design, hypotheses: list[Hypothesis], rng: np.random.Generator
+) -> Fitted | None:
+    """Return the hypothesis that brings the fitted days closest to what was measured, and its fall on unseen days."""
     record, fitted = days.record, days.split.fit_rows
     known = activate(record, knowledge.terms)
     # Of what began within the log there is no one size beside which another could be fitted.
@@ -74,7 +91,7 @@ def closest(
         without: Model = (fit_climate([(record, fitted)], prior, known).values, known)
     except DivergenceError:
         return None
-    best: tuple[Hypothesis, float] | None = None
+    best: tuple[Hypothesis, Model] | None = None
     largest = 0.0
     for one in hypotheses:
         try:
@@ -82,9 +99,27 @@ def closest(
         except DivergenceError:
             continue
         if (closer := fall(held_out_errors(record, fitted, without, model))) > largest:
-            largest = closer
-            best = (one, fall(held_out_errors(record, ~fitted, without, model)))
-    return best
+            largest, best = closer, (one, model)
+    return None if best is None else Fitted(best[0], *_fall(record, ~fitted, without, best[1], design.rules, rng))
+
+
+def _fall(
+    record: Record, rows: Mask, before: Model, after: Model, rules: DecisionRules, rng: np.random.Generator
+) -> tuple[float, float]:
+    """Return the fall of the error a day ahead, and the bootstrap probability, over days, that it does not fall."""
+    old, new = (errors_of(record, free_runs(record, *one), (DAY,), rows) for one in (before, after))
+    shares = []
+    for key in old.keys() & new.keys():
+        _, day = np.unique(old[key].day, return_inverse=True)
+        shares.append([np.bincount(day, np.nansum(np.abs(one[key].error), axis=0)) for one in (old, new)])
+    if not shares:
+        return 0.0, 1.0
+    count = len(shares[0][0])
+    drawn = np.vstack([np.arange(count), rng.integers(0, count, size=(rules.bootstrap_draws, count))])
+    # Of days that are drawn but not measured nothing falls.
+    sums = [[np.maximum(one[drawn].sum(axis=1), _NOTHING) for one in part] for part in shares]
+    left = np.mean([after / before for before, after in sums], axis=0)
+    return 1.0 - float(left[0]), float(np.mean(left[1:] >= 1.0))
 
 
 def _fit(record: Record, rows: Mask, prior: Gaussian, known: ActiveEffects, one: Hypothesis) -> Model:

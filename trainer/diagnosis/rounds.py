@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -47,8 +47,7 @@ class Search:
         first: Round | None = None
         found: list[Estimated] = []
         while True:
-            explained = sum(one.gain for one in found)
-            judged = self.judge(design, explained, rng, causes=len(found) < self.rules.most_causes)
+            judged = self.judge(design, found, rng, causes=len(found) < self.rules.most_causes)
             first = first or judged
             new = estimate(judged, rng)
             terms = [] if new is None else self.refitted(judged, [*found, new])
@@ -65,9 +64,9 @@ class Search:
         """Return nothing: without a history nobody knows what a parameter was."""
         return None
 
-    def judge(self, design: Design, explained: float, rng: np.random.Generator, *, causes: bool) -> Round:
-        """Return what one round finds."""
-        return compare(design, explained, rng, causes=causes)
+    def judge(self, design: Design, found: Sequence[Estimated], rng: np.random.Generator, *, causes: bool) -> Round:
+        """Return what one round finds beside the causes found before, which the design has as terms."""
+        return compare(design, _explained(found), rng, causes=causes)
 
     def design(self, terms: Sequence[ActiveTerm], interval: float) -> Design:
         """Return the design of a model with terms; what usually differs stands in where its structure does not."""
@@ -121,12 +120,13 @@ class Change(Search):
     drift: Drift | None
     """How greenhouses like it change with time; None: what came with the trainer."""
 
-    def judge(self, design: Design, explained: float, rng: np.random.Generator, *, causes: bool) -> Round:
+    def judge(self, design: Design, found: Sequence[Estimated], rng: np.random.Generator, *, causes: bool) -> Round:
         """Return what one round finds; where time steps tell nothing, fits to free runs are asked."""
-        judged = changed(design, explained, rng, causes=causes)
-        if judged.cause is not None or judged.patterns or explained > 0.0:
+        judged = changed(design, _explained(found), rng, causes=causes)
+        if judged.cause is not None or judged.patterns or not causes:
             return judged
-        return fitted_change.find(self.days, self.knowledge, self.by_physics(), rng) or judged
+        known = replace(self.knowledge, terms=(*self.knowledge.terms, *(one.term for one in found)))
+        return fitted_change.find(self.days, known, self.by_physics(known.terms), rng) or judged
 
     def design(self, terms: Sequence[ActiveTerm], interval: float) -> Design:
         """Return the design of a model with terms, about the calibrated parameters."""
@@ -134,11 +134,11 @@ class Change(Search):
 
     def changed_parameter(self, rng: np.random.Generator) -> ParameterChange | None:
         """Return the parameter that has changed where no effect is missing."""
-        return parameter_change.find(self.by_physics(), rng)
+        return parameter_change.find(self.by_physics(self.knowledge.terms), rng)
 
-    def by_physics(self) -> Design:
-        """Return the design in which all changes by physics alone."""
-        return self._expected(self.knowledge.terms, (self.drift or read_drift()).by_physics())
+    def by_physics(self, terms: Sequence[ActiveTerm]) -> Design:
+        """Return the design of a model with terms in which all else changes by physics alone."""
+        return self._expected(terms, (self.drift or read_drift()).by_physics())
 
     def _expected(self, terms: Sequence[ActiveTerm], drift: Drift) -> Design:
         plain = history.laid_out(self.days, self.site, self.history, terms, self.rules) if terms else self.plain
@@ -167,6 +167,10 @@ def search_of(
     if not history.applies(known, plain):
         return Search(*common)
     return Change(*common, known, plain, history.expected_misfit(known, plain), drift)
+
+
+def _explained(found: Sequence[Estimated]) -> float:
+    return sum(one.gain for one in found)
 
 
 def _is_inside(one: Estimated, design: Design) -> bool:

@@ -72,7 +72,7 @@ class DecisionRules:
         1.3, "times the most that it brought where nothing had changed that a change must bring"
     )
     least_change_skill: float = _tuned(-0.01, "share that a first change removes: chance makes as much of four days")
-    least_fitted_change: float = _chosen(10.0, "gain by physics alone from which on a change is fitted to free runs")
+    least_fitted_change: float = _tuned(4.0, "gain by physics alone from which on a change is fitted to free runs")
     most_change_fits: int = _chosen(3, "changes that are fitted beside the parameters, those that gain most")
     least_change_fall: float = _fitted(
         "share of the error of unseen days that such a change must remove: more than any where nothing had changed"
