@@ -39,7 +39,7 @@ def test_a_parameter_that_moved_is_found_beside_coloured_disturbances() -> None:
 def test_what_is_expected_to_be_missing_moves_no_parameter() -> None:
     known = GREENHOUSE
     hours = np.arange(DAYS * 96) % 96
-    flux = np.where(hours < 24, 15.0, 0.0)
+    flux = np.where(hours < 24, 10.0, 0.0)
     record = prepare_log(virtual_log(DAYS, seed=10, step=900.0, added={"heat": flux}), SITE).record(0.0)
     split = split_days(record, SITE.longitude)
     prior = Gaussian.independent(known, {name: 0.1 * abs(value) + 1e-9 for name, value in known.items()})

@@ -55,16 +55,25 @@ def find(design: Design, rng: np.random.Generator) -> ParameterChange | None:
     scored = score(design, null, onsets, rng)
     net = {one.parameter: change.proven_gain(design, one) - _needed_gain(design, one) for one in scored}
     # Of what is none at the calibration there is no share.
-    visible = (
+    visible = [
         one
         for one in scored
         if one.parameter in VISIBLE
         and unasked.isdisjoint(members(one.parameter))
         and _range(design, one.parameter)[0] > 0.0
-    )
+    ]
     best = max(visible, key=lambda one: net[one.parameter], default=None)
     if best is None or net[best.parameter] < 0.0:
         return None
+    # Of what one thing changes together, and each of it alone, that which explains most: days that scatter say less.
+    # What explains as much alone is still what one thing changes together.
+    own = [
+        one
+        for one in visible
+        if net[one.parameter] >= 0.0 and set(members(one.parameter)) & set(members(best.parameter))
+    ]
+    together = {one.parameter: rules.confounded_gain for one in own if one.parameter in TOGETHER}
+    best = max(own, key=lambda one: change.net_gain(design, one) + together.get(one.parameter, 0.0))
     margin = max(rules.confounded_gain, rules.confounded_share * best.gain)
     if max(net.values()) > net[best.parameter] + margin:
         # One that nobody can look at explains it clearly better.
