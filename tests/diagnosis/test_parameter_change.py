@@ -259,8 +259,8 @@ def test_leaves_that_wilt_within_the_log_have_a_date_and_are_no_sensor(
 def test_a_cover_that_was_painted_some_days_ago_waits_for_a_later_log(
     log: tuple[Telemetry, Telemetry], model: FittedModel
 ) -> None:
-    # Fewer days than a diagnosis needs: no set of parameters is right for this log. A third of the light would not stand
-    # out in so few of them.
+    # Fewer days than a diagnosis needs: no set of parameters is right for this log. A third of the light would not
+    # stand out in so few of them.
     painted = GREENHOUSE | {"transmissivity": 0.6 * GREENHOUSE["transmissivity"]}
     after = virtual_log(DAYS, seed=5, step=STEP, added=disturbances(DAYS, STEP, seed=5), parameters=painted)
     told = diagnose(later((log[0], after), DAYS - KNOWN - 6), model)

@@ -31,7 +31,6 @@ from igrow.trainer.fit.evaluation import Model, errors_of, free_runs, held_out_e
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.solver import DivergenceError
 
-
 _NOTHING = 1e-12
 
 
