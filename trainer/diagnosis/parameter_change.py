@@ -8,7 +8,7 @@ expect, and must gain more than it did in any greenhouse in which nothing had ch
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -73,13 +73,36 @@ def find(design: Design, rng: np.random.Generator) -> ParameterChange | None:
         if net[one.parameter] >= 0.0 and set(members(one.parameter)) & set(members(best.parameter))
     ]
     together = {one.parameter: rules.confounded_gain for one in own if one.parameter in TOGETHER}
-    best = max(own, key=lambda one: change.net_gain(design, one) + together.get(one.parameter, 0.0))
+    own.sort(key=lambda one: change.net_gain(design, one) + together.get(one.parameter, 0.0), reverse=True)
+    effects = search.score_candidates(design, null, onsets, rng)
+    largest = max((change.net_gain(design, one) for one in effects), default=0.0)
+    told = (_told(design, one, scored, net, largest, rng) for one in own)
+    return next((one for one in told if one is not None), None)
+
+
+def _told(
+    design: Design,
+    best: Hypothesis,
+    scored: Sequence[Hypothesis],
+    net: Mapping[str, float],
+    largest: float,
+    rng: np.random.Generator,
+) -> ParameterChange | None:
+    """Return a parameter's change at its size; None where it cannot be, or one that nobody can look at explains more.
+
+    Args:
+        design: of the log, with groups of parameters.
+        best: the change.
+        scored: changes of all parameters.
+        net: by parameter, what each gains beyond what it must.
+        largest: gain of an effect.
+        rng: for the flips.
+    """
+    rules, onsets = design.rules, search.onset_days(design)
     margin = max(rules.confounded_gain, rules.confounded_share * best.gain)
     if max(net.values()) > net[best.parameter] + margin:
         # One that nobody can look at explains it clearly better.
         return None
-    effects = search.score_candidates(design, null, onsets, rng)
-    largest = max((change.net_gain(design, one) for one in effects), default=0.0)
     design, best = at_its_size(design, best, onsets, rng)
     null = linear.fit(design.grams, design.null_model())
     leads = best.gain >= rules.parameter_over_effect * largest
