@@ -29,7 +29,7 @@ CLIMATE_OUT = (*PREDICTED, "par")
 RESOURCES = ("heat", "electricity", "co2")
 """MJ m-2, kWh m-2 and kg m-2 used in each hour."""
 
-NARROW = 64
+_NARROW = 64
 """Candidates times members of which a row fills the least piece of memory that onnxruntime lays out, 256 bytes."""
 
 _ABSENT_WEATHER = {"wind_direction": 225.0, "rain": 0.0}
@@ -65,7 +65,7 @@ class BundleSimulator:
         """What growth is computed with; None where it is a network's affair."""
         self._graph = bundle.graph("simulator")
         self._session = open_session(self._graph)
-        self._width = NARROW
+        self._width = _NARROW
         try:
             tensors = {one.name: one.quantities for one in bundle.manifest.graphs["simulator"].inputs}
             self._beginning = tensors["climate"]

@@ -151,14 +151,16 @@ def test_an_effect_that_is_taken_out_is_not_named(leaky_log: Log) -> None:
     assert "wind_infiltration" not in [one.effect for one in result.findings]
 
 
-def test_a_sensor_that_is_off_from_a_day_on_is_named_with_its_size_and_day() -> None:
-    log = greenhouse_log(7)
+@pytest.mark.parametrize(("seed", "within"), [(7, 0.06), (5, 0.13)])
+def test_a_sensor_that_is_off_from_a_day_on_is_named_with_its_size_and_day(seed: int, within: float) -> None:
+    log = greenhouse_log(seed)
     age = np.arange(round(DAYS * 86_400 / STEP)) * STEP / 86_400.0
     off = np.array(log.telemetry["air_temperature"]) + 1.5 * (age >= 9.4)
     result = diagnose(log.with_columns({"air_temperature": off}), model_in_force())
     (found,) = result.findings
     assert (found.effect, found.kind) == ("air_temperature_offset", "sensor")
-    assert found.parameters["offset"].value == pytest.approx(1.5, rel=0.06)
+    assert found.parameters["offset"].value == pytest.approx(1.5, rel=within)
+    assert found.parameters["offset"].low < 1.5 < found.parameters["offset"].high
     began = log.telemetry.time[0] + np.timedelta64(round(9.4 * 24), "h")
     assert found.onset is not None
     assert abs(found.onset.time - began) <= np.timedelta64(1, "D")

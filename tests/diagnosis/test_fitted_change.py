@@ -50,6 +50,17 @@ def test_where_nothing_has_changed_no_fit_takes_that_much(quiet_log: Log) -> Non
     assert found is None or found.fall < DEFAULT.least_change_fall
 
 
+def test_what_no_unseen_day_bears_out_is_not_told(quiet_log: Log, monkeypatch: pytest.MonkeyPatch) -> None:
+    shown = quiet_log.with_columns({"air_humidity": quiet_log.telemetry["air_humidity"] + 6.0})
+    measured, asked = fitted_change.errors_of, log_days(shown, model_in_force()).split.fit_rows
+
+    def errors_of(*arguments: Any) -> Any:
+        return measured(*arguments) if np.array_equal(arguments[3], asked) else {}
+
+    monkeypatch.setattr(fitted_change, "errors_of", errors_of)
+    assert closest(shown) is None
+
+
 def test_beside_a_term_that_began_within_the_log_nothing_is_fitted(quiet_log: Log) -> None:
     known = knowledge_of(model_in_force(), SITE, DEFAULT)
     begins = quiet_log.telemetry.time[0] + np.timedelta64(5, "D")

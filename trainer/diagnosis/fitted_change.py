@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from igrow.core.arrays import Mask
+from igrow.core.arrays import Floats, Mask
 from igrow.core.effects import EFFECTS
 from igrow.core.simulator.hybrid.climate import ActiveEffects
 from igrow.core.simulator.hybrid.record import Record
@@ -23,15 +23,15 @@ from igrow.trainer.diagnosis.compare import Round
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.freerun import LogDays
 from igrow.trainer.diagnosis.knowledge import Knowledge, activate, home_drift
-from igrow.trainer.diagnosis.omission import DAY, fall, fit_together
-from igrow.trainer.diagnosis.rules import DecisionRules
+from igrow.trainer.diagnosis.omission import DAY, fit_together
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.fit.climate import fit_climate
-from igrow.trainer.fit.evaluation import Model, errors_of, free_runs, held_out_errors
+from igrow.trainer.fit.evaluation import Model, errors_of, free_runs
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.solver import DivergenceError
 
-_NOTHING = 1e-12
+_UNMEASURED = 1e-12
+"""Stands for the error of days without a measurement."""
 
 
 @dataclass(frozen=True)
@@ -97,28 +97,35 @@ def closest(
             model = _fit(record, fitted, prior, known, one)
         except DivergenceError:
             continue
-        if (closer := fall(held_out_errors(record, fitted, without, model))) > largest:
+        if (closer := float(_fall(_by_day(record, fitted, without, model)))) > largest:
             largest, best = closer, (one, model)
-    return None if best is None else Fitted(best[0], *_fall(record, ~fitted, without, best[1], design.rules, rng))
+    if best is None:
+        return None
+    unseen = _by_day(record, ~fitted, without, best[1])
+    if not unseen.size:
+        return None
+    drawn = rng.integers(0, unseen.shape[-1], size=(design.rules.bootstrap_draws, unseen.shape[-1]))
+    return Fitted(best[0], float(_fall(unseen)), float(np.mean(_fall(unseen[..., drawn]) <= 0.0)))
 
 
-def _fall(
-    record: Record, rows: Mask, before: Model, after: Model, rules: DecisionRules, rng: np.random.Generator
-) -> tuple[float, float]:
-    """Return the fall of the error a day ahead, and the bootstrap probability, over days, that it does not fall."""
+def _by_day(record: Record, rows: Mask, before: Model, after: Model) -> Floats:
+    """Return the sums of absolute errors a day ahead of both models by the day on which a run starts, (q, 2, days)."""
     old, new = (errors_of(record, free_runs(record, *one), (DAY,), rows) for one in (before, after))
-    shares = []
-    for key in old.keys() & new.keys():
-        _, day = np.unique(old[key].day, return_inverse=True)
-        shares.append([np.bincount(day, np.nansum(np.abs(one[key].error), axis=0)) for one in (old, new)])
-    if not shares:
-        return 0.0, 1.0
-    count = len(shares[0][0])
-    drawn = np.vstack([np.arange(count), rng.integers(0, count, size=(rules.bootstrap_draws, count))])
+    days = {key: np.unique(one.day, return_inverse=True)[1] for key, one in old.items()}
+    sums = [
+        [np.bincount(day, np.nansum(np.abs(one[key].error), axis=0)) for one in (old, new)] for key, day in days.items()
+    ]
+    return np.array(sums, dtype=np.float64) if sums else np.zeros((0, 2, 0))
+
+
+def _fall(errors: Floats) -> Floats:
+    """Return the share of the errors of days (q, 2, ..., days) that goes, the mean of all quantities, (...)."""
+    if not len(errors):
+        return np.zeros(errors.shape[2:-1])
     # Of days that are drawn but not measured nothing falls.
-    sums = [[np.maximum(one[drawn].sum(axis=1), _NOTHING) for one in part] for part in shares]
-    left = np.mean([after / before for before, after in sums], axis=0)
-    return 1.0 - float(left[0]), float(np.mean(left[1:] >= 1.0))
+    before, after = np.moveaxis(np.maximum(errors.sum(axis=-1), _UNMEASURED), 1, 0)
+    left: Floats = np.mean(after / before, axis=0)
+    return 1.0 - left
 
 
 def _fit(record: Record, rows: Mask, prior: Gaussian, known: ActiveEffects, one: Hypothesis) -> Model:
