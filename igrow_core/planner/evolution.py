@@ -36,7 +36,7 @@ class EvolutionSettings:
     """Sizes and rates of the algorithm; the sizes are fixed in an exported graph.
 
     A run of the simulator takes little longer for 384 candidates than for 96, so that few large generations find as
-    good a plan in half the time of many small ones.
+    good a plan in three fifths of the time of many small ones.
     """
 
     parents: int = 48
