@@ -18,6 +18,7 @@ from igrow.trainer.diagnosis.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, knowledge_of
 from igrow.trainer.diagnosis.linear import Term
 from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.fit import evaluation
 from tests.diagnosis.conftest import model_in_force
 from tests.diagnosis.synthetic_design import Truth
 from tests.diagnosis.test_parameter_change import with_parameters
@@ -52,7 +53,7 @@ def test_where_nothing_has_changed_no_fit_takes_that_much(quiet_log: Log) -> Non
 
 def test_what_no_unseen_day_bears_out_is_not_told(quiet_log: Log, monkeypatch: pytest.MonkeyPatch) -> None:
     shown = quiet_log.with_columns({"air_humidity": quiet_log.telemetry["air_humidity"] + 6.0})
-    measured, asked = fitted_change.errors_of, log_days(shown, model_in_force()).split.fit_rows
+    measured, asked = evaluation.errors_of, log_days(shown, model_in_force()).split.fit_rows
 
     def errors_of(*arguments: Any) -> Any:
         return measured(*arguments) if np.array_equal(arguments[3], asked) else {}
@@ -87,8 +88,10 @@ def test_beside_a_cause_that_was_found_before_fits_are_asked_with_it(monkeypatch
     monkeypatch.setattr(fitted_change, "find", lambda _days, known, *_: asked.append(known.terms))
     monkeypatch.setattr(rounds.Change, "_expected", lambda *_: design)
     known = knowledge_of(model_in_force(), SITE, DEFAULT)
-    common: tuple[Any, ...] = (None, SITE, known, frozenset(), DEFAULT, None)
-    search = rounds.Change(*common, cast(Any, None), design, np.zeros(0), Drift({}, 42.0))
+    unasked = cast(Any, None)
+    search = rounds.Change(
+        unasked, SITE, known, frozenset(), DEFAULT, unasked, unasked, design, np.zeros(0), Drift({}, 42.0)
+    )
     term = ActiveTerm("co2_offset", 80.0, {})
     found = [cast(Any, SimpleNamespace(term=term, gain=50.0))]
     rng = np.random.default_rng(0)
