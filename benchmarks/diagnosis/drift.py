@@ -8,7 +8,7 @@ learned from the nurseries of the other seasons. No case of a benchmark has thes
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
@@ -50,6 +50,8 @@ class NullLog:
     group: str
     design: Design
     pair: Pair
+    parameter_gains: dict[str, float]
+    """Proven gain of every parameter, and of those that change together, where all else changes by physics alone."""
 
 
 def null_cases(season: str, known: Sequence[Reference]) -> list[list[Case]]:
@@ -74,11 +76,13 @@ def null_log(job: tuple[Reference, Case, Telemetry]) -> NullLog:
     assert known is not None
     days = log_days(prepare_log(telemetry, site), reference.model)
     plain = history.laid_out(days, site, known, (), DEFAULT)
-    design = history.expected(known, plain, history.expected_misfit(known, plain))
+    # By physics alone: what was learned before would say something of what is learned now.
+    design = history.expected(known, plain, history.expected_misfit(known, plain), (), Drift({}, BETWEEN))
+    moved = parameter_gains(design)
     # What the search needs is in the products; the columns themselves would fill the memory.
     light = replace(design, values=design.values[:, :0], grams=_single(design))
     pair = sharing.pair(known, plain, light, BETWEEN)
-    return NullLog(reference.greenhouse.site.name.split("-")[0], site.name, case.group, light, pair)
+    return NullLog(reference.greenhouse.site.name.split("-")[0], site.name, case.group, light, pair, moved)
 
 
 def _single(design: Design) -> linear.DailyGrams:
@@ -87,17 +91,21 @@ def _single(design: Design) -> linear.DailyGrams:
 
 def gains_under(log: NullLog, learned: Drift) -> dict[str, float]:
     """Return the proven gain of every effect in a log under a drift, the one that would be named first."""
-    return _gains(_under(log, learned), search.score_candidates)
-
-
-def parameter_gains(log: NullLog) -> dict[str, float]:
-    """Return the same of every parameter where all else changes by physics alone."""
-    return _gains(parameter_change.joined(_under(log, Drift({}, BETWEEN))), parameter_change.score)
-
-
-def _gains(design: Design, score: Callable[..., list[search.Hypothesis]]) -> dict[str, float]:
+    design = _under(log, learned)
     fitted = linear.fit(design.grams, design.null_model())
-    scored = score(design, fitted, search.onset_days(design), np.random.default_rng(0))
+    rng = np.random.default_rng(0)
+    return _by_gain(design, search.score_candidates(design, fitted, search.onset_days(design), rng))
+
+
+def parameter_gains(by_physics: Design) -> dict[str, float]:
+    """Return the same of every parameter at its size, in a log's design in which all else changes by physics alone."""
+    design, rng = parameter_change.joined(by_physics), np.random.default_rng(0)
+    fitted, onsets = linear.fit(design.grams, design.null_model()), search.onset_days(design)
+    slopes = parameter_change.score(design, fitted, onsets, rng)
+    return _by_gain(design, parameter_change.sized(design, slopes, rng))
+
+
+def _by_gain(design: Design, scored: Sequence[search.Hypothesis]) -> dict[str, float]:
     ranked = sorted(scored, key=lambda one: -change.net_gain(design, one))
     return {one.key: change.proven_gain(design, one) for one in ranked}
 
@@ -197,7 +205,7 @@ def main(processes: int) -> int:
             least = float(bound)
         if bound <= 2 * LEAST:
             print(f"  bound {bound}: {len(claims)} {claims}")
-    moved = [parameter_gains(one) for one in logs]
+    moved = [one.parameter_gains for one in logs]
     print(f"parameters that would be named by the gains of other greenhouses: {false_parameters(logs, moved)}")
     found = learn(logs)
     for key, rate in sorted(found.rates.items(), key=lambda item: -item[1])[:20]:
