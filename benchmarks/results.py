@@ -227,6 +227,29 @@ RESULTS = {
         "none",
         long=True,
     ),
+    "real-weekly": Result(
+        "A real compartment, refitted weekly",
+        ("benchmarks.real_greenhouses", "../shared/data/agc2019", "Reference", "--tables", "weekly"),
+        "AGC 2019 Reference, twelve weeks, each predicted by a model of the weeks before it: mean absolute error with "
+        "a 90 % interval over days.",
+        "none",
+        long=True,
+    ),
+    "real-later": Result(
+        "The same compartment, fitted once",
+        ("benchmarks.real_greenhouses", "../shared/data/agc2019", "Reference", "--tables", "later"),
+        "Weeks 1 to 12 fit, 13 to 15 select, 16 to 20 (April) test.",
+        "none",
+        long=True,
+    ),
+    "real-across": Result(
+        "Compartments by a model of the others",
+        ("benchmarks.real_greenhouses", "../shared/data/agc2018", "--tables", "across", "--every", "18900"),
+        "AGC 2018, each compartment by a model that was fitted on three others, by it and the first 7 days of its own, "
+        "and by these alone.",
+        "none",
+        long=True,
+    ),
     "diagnosis-real": Result(
         "Real logs",
         ("benchmarks.diagnosis", "real", "../shared/data"),

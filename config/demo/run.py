@@ -162,18 +162,14 @@ def run(demo: Demo) -> None:
     """The story, step by step."""
     days = WELL_DAYS + BROKEN_DAYS + SHADOW_DAYS + DAYS_AFTER
     broken = f"{demo.effect}@{demo.day(WELL_DAYS)}"
-    prepare(demo)
-    generate = ["igrow-trainer", "generate", *demo.plant]
+    lay_out(demo)
     # What the greenhouse beside it does needs no daemon; it is simulated meanwhile, without getting in its way.
-    nothing = demo.spawn(
-        "nothing",
-        [*generate, "--start", demo.start, "--days", str(WELL_DAYS + BROKEN_DAYS), "--out", "nothing"],
-    )
-    recipe = demo.spawn(
-        "recipe", [*generate, "--start", demo.start, "--days", str(days), "--effect", broken, "--out", "recipe"]
-    )
+    generate = ["igrow-trainer", "generate", *demo.plant, "--start", demo.start]
+    nothing = demo.spawn("nothing", [*generate, "--days", str(WELL_DAYS + BROKEN_DAYS), "--out", "nothing"])
+    recipe = demo.spawn("recipe", [*generate, "--days", str(days), "--effect", broken, "--out", "recipe"])
     for process in (nothing, recipe):
         os.setpriority(os.PRIO_PROCESS, process.pid, 15)
+    make_first_bundle(demo)
 
     demo.say(f"the daemon takes over; on day {WELL_DAYS} something breaks that no model knows: {demo.effect}")
     demo.spawn(
@@ -223,8 +219,8 @@ def run(demo: Demo) -> None:
         raise DemoError("something was found in the greenhouse in which nothing is missing")
 
 
-def prepare(demo: Demo) -> None:
-    """Lay out the folders, make the keys, and calibrate the first bundle on the greenhouse's own weeks."""
+def lay_out(demo: Demo) -> None:
+    """Lay out the folder, and make the keys."""
     out = demo.out
     shutil.copy(HERE / "site.yaml", out)
     shutil.copy(HERE / "daemon.yaml", out)
@@ -232,6 +228,10 @@ def prepare(demo: Demo) -> None:
     (out / "register-map.yaml").write_text(template.replace("port: 5020", f"port: {free_port()}"))
     demo.run("keys", ["igrow-trainer", "keys", "create", "keys"])
     shutil.copy(out / "keys/1.root.json", out / "root.json")
+
+
+def make_first_bundle(demo: Demo) -> None:
+    """Calibrate the first bundle on the greenhouse's own weeks, and plan its season."""
     demo.run(
         "before",
         ["igrow-trainer", "generate", *demo.plant, "--start", demo.day(-7 * WEEKS_BEFORE), "--days",
