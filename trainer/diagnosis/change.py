@@ -9,6 +9,7 @@ noise says, or a few odd days would speak for all.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -30,19 +31,20 @@ def changed(design: Design, explained: float, rng: np.random.Generator, *, cause
         rng: for flips and bootstraps.
         causes: look for a cause, and not for patterns only.
     """
-    rules, null = design.rules, linear.fit(design.grams, design.null_model())
+    assert design.history is not None and design.history.drift is not None
+    rules, drift, null = design.rules, design.history.drift, linear.fit(design.grams, design.null_model())
     onsets = search.onset_days(design)
     cause = best(design, search.score_candidates(design, null, onsets, rng)) if causes else None
-    pattern = best(design, search.score_patterns(design, null, onsets[:: rules.pattern_onset_stride], rng))
+    patterns = search.score_patterns(design, null, onsets[:: rules.pattern_onset_stride], rng)
     nothing = Round(design, null, null, None, ())
-    if pattern is not None:
-        gained = 0.0 if cause is None else net_gain(design, cause)
-        needed = max(rules.least_pattern_change, rules.pattern_over_change * gained, explained)
-        if net_gain(design, pattern) >= needed and proven_gain(design, pattern) >= rules.least_proven_pattern:
-            return replace(nothing, patterns=(pattern,))
-    assert design.history is not None and design.history.drift is not None
-    if cause is None or proven_gain(design, cause) < design.history.drift.needed_gain(cause.effect, rules):
+    gained = 0.0 if cause is None else net_gain(design, cause)
+    stands = (one for one in patterns if proven_gain(design, one) >= drift.needed_by_pattern(one.key, rules))
+    pattern = best(design, stands)
+    if pattern is not None and net_gain(design, pattern) >= max(rules.pattern_over_change * gained, explained):
+        return replace(nothing, patterns=(pattern,))
+    if cause is None or proven_gain(design, cause) < drift.needed_gain(cause.effect, rules):
         return nothing
+    pattern = best(design, patterns)
     if pattern is not None and left_by_hour(design, null, cause, rng) >= rules.least_left_by_hour:
         return replace(nothing, patterns=(pattern,))
     return round_of(design, null, cause, rng)
@@ -60,7 +62,7 @@ def left_by_hour(design: Design, null: Fit, cause: Hypothesis, rng: np.random.Ge
     return max((proven_gain(design, one) for one in by_hour), default=0.0)
 
 
-def best(design: Design, scored: list[Hypothesis]) -> Hypothesis | None:
+def best(design: Design, scored: Iterable[Hypothesis]) -> Hypothesis | None:
     """Return the hypothesis with the largest net gain, None for none."""
     known = design.history.without if design.history is not None else frozenset()
     return max((one for one in scored if one.effect not in known), key=lambda one: net_gain(design, one), default=None)

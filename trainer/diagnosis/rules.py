@@ -77,8 +77,6 @@ class DecisionRules:
     least_change_fall: float = _fitted(
         "share of the error of unseen days that such a change must remove: more than any where nothing had changed"
     )
-    least_pattern_change: float = _tuned(60.0, "the same of a pattern: greenhouses drift with the weather")
-    least_proven_pattern: float = _tuned(20.0, "of it, what the scatter of day scores must bear out")
     pattern_over_change: float = _tuned(1.5, "times a change's gain at which a pattern replaces it")
     least_left_by_hour: float = _tuned(25.0, "gain of a pattern by the hour beside a change that unmakes its name")
 
