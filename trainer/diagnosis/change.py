@@ -62,6 +62,16 @@ def left_by_hour(design: Design, null: Fit, cause: Hypothesis, rng: np.random.Ge
     return max((proven_gain(design, one) for one in by_hour), default=0.0)
 
 
+def stands_beside(design: Design, pattern: Hypothesis, cause: Hypothesis, rng: np.random.Generator) -> bool:
+    """Tell whether a pattern still gains what it must beside a cause that steps alone did not prove."""
+    assert design.history is not None and design.history.drift is not None
+    null = linear.fit(design.grams, design.null_model())
+    named = linear.fit(design.grams, null.model.with_term(cause.term))
+    left = search.score_patterns(design, named, [pattern.term.onset], rng)
+    needed = design.history.drift.needed_by_pattern(pattern.key, design.rules)
+    return any(one.key == pattern.key and proven_gain(design, one) >= needed for one in left)
+
+
 def best(design: Design, scored: Iterable[Hypothesis]) -> Hypothesis | None:
     """Return the hypothesis with the largest net gain, None for none."""
     known = design.history.without if design.history is not None else frozenset()
