@@ -7,11 +7,9 @@ learned from the nurseries of the other seasons. No case of a benchmark has thes
 
 from __future__ import annotations
 
-import itertools
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from importlib.resources import files
 from pathlib import Path
 
@@ -36,10 +34,10 @@ SEEDS = {"spring": 110_000, "autumn": 120_000, "winter": 130_000}
 GREENHOUSES, DAYS = 8, 28
 BETWEEN = 42.0
 """Days from the middle of a calibration to that of a later log."""
-FALSE_CLAIMS, FALSE_PATTERNS = 0.06, 0.02
-"""Share of logs with nothing missing that the search may give a name, or a pattern, each greenhouse judged by the gains
-of the others alone. By those of all it gives fewer, and unseen days refuse some names: `same` counts what is left."""
-LEAST, MOST = 8, 40
+FALSE_CLAIMS = 0.06
+"""Share of logs with nothing missing that the search may give a name, each greenhouse judged by the gains of the others
+alone. By those of all it gives fewer, and unseen days refuse some of these: `same` counts what is left."""
+LEAST, MOST = 8, 30
 """Bounds that are tried."""
 
 
@@ -52,8 +50,6 @@ class NullLog:
     group: str
     design: Design
     pair: Pair
-    parameter_gains: dict[str, float]
-    """Proven gain of every parameter, and of those that change together, where all else changes by physics alone."""
 
 
 def null_cases(season: str, known: Sequence[Reference]) -> list[list[Case]]:
@@ -78,13 +74,11 @@ def null_log(job: tuple[Reference, Case, Telemetry]) -> NullLog:
     assert known is not None
     days = log_days(prepare_log(telemetry, site), reference.model)
     plain = history.laid_out(days, site, known, (), DEFAULT)
-    # By physics alone: what was learned before would say something of what is learned now.
-    design = history.expected(known, plain, history.expected_misfit(known, plain), (), Drift({}, BETWEEN))
-    moved = parameter_gains(design)
+    design = history.expected(known, plain, history.expected_misfit(known, plain))
     # What the search needs is in the products; the columns themselves would fill the memory.
     light = replace(design, values=design.values[:, :0], grams=_single(design))
     pair = sharing.pair(known, plain, light, BETWEEN)
-    return NullLog(reference.greenhouse.site.name.split("-")[0], site.name, case.group, light, pair, moved)
+    return NullLog(reference.greenhouse.site.name.split("-")[0], site.name, case.group, light, pair)
 
 
 def _single(design: Design) -> linear.DailyGrams:
@@ -93,29 +87,17 @@ def _single(design: Design) -> linear.DailyGrams:
 
 def gains_under(log: NullLog, learned: Drift) -> dict[str, float]:
     """Return the proven gain of every effect in a log under a drift, the one that would be named first."""
-    design = _under(log, learned)
+    return _gains(_under(log, learned), search.score_candidates)
+
+
+def parameter_gains(log: NullLog) -> dict[str, float]:
+    """Return the same of every parameter where all else changes by physics alone."""
+    return _gains(parameter_change.joined(_under(log, Drift({}, BETWEEN))), parameter_change.score)
+
+
+def _gains(design: Design, score: Callable[..., list[search.Hypothesis]]) -> dict[str, float]:
     fitted = linear.fit(design.grams, design.null_model())
-    rng = np.random.default_rng(0)
-    return _by_gain(design, search.score_candidates(design, fitted, search.onset_days(design), rng))
-
-
-def pattern_gains_under(log: NullLog, learned: Drift) -> dict[str, float]:
-    """Return the same of every pattern."""
-    design = _under(log, learned)
-    fitted, onsets = linear.fit(design.grams, design.null_model()), search.onset_days(design)
-    onsets = onsets[:: DEFAULT.pattern_onset_stride]
-    return _by_gain(design, search.score_patterns(design, fitted, onsets, np.random.default_rng(0)))
-
-
-def parameter_gains(by_physics: Design) -> dict[str, float]:
-    """Return that of every parameter at its size, in the design of a log in which all else changes by physics alone."""
-    design, rng = parameter_change.joined(by_physics), np.random.default_rng(0)
-    fitted, onsets = linear.fit(design.grams, design.null_model()), search.onset_days(design)
-    slopes = parameter_change.score(design, fitted, onsets, rng)
-    return _by_gain(design, parameter_change.sized(design, slopes, rng))
-
-
-def _by_gain(design: Design, scored: Sequence[search.Hypothesis]) -> dict[str, float]:
+    scored = score(design, fitted, search.onset_days(design), np.random.default_rng(0))
     ranked = sorted(scored, key=lambda one: -change.net_gain(design, one))
     return {one.key: change.proven_gain(design, one) for one in ranked}
 
@@ -136,52 +118,30 @@ def largest(gains: Sequence[dict[str, float]]) -> dict[str, float]:
     return {name: float(f"{max(0.0, *(one.get(name, 0.0) for one in gains)):.3g}") for name in names}
 
 
-Claim = tuple[str, str, str]
-"""Greenhouse, group and what is told of a log in which nothing is missing."""
-
-
-def elsewhere(logs: Sequence[NullLog], gains: Sequence[dict[str, float]]) -> list[dict[str, float]]:
-    """Return for each log the largest gains in the greenhouses that it is not of."""
-    return [
-        largest([own for other, own in zip(logs, gains, strict=True) if other.greenhouse != log.greenhouse])
-        for log in logs
-    ]
-
-
 def false_claims(
-    logs: Sequence[NullLog], asked: Sequence[dict[str, float]], others: Sequence[dict[str, float]], least: float
-) -> list[Claim]:
-    """Return what is told of logs: of each the first that gains what it must, by its gains elsewhere."""
+    logs: Sequence[NullLog], gains: Sequence[dict[str, float]], least: float
+) -> list[tuple[str, str, str]]:
+    """Return (greenhouse, group, effect) of every log with a name, each judged by the gains of other greenhouses."""
     claims = []
-    for log, own, rest in zip(logs, asked, others, strict=True):
-        told = (key for key, gain in own.items() if gain >= max(least, DEFAULT.change_over_null * rest.get(key, 0.0)))
-        claims += [(log.greenhouse, log.group, key) for key in itertools.islice(told, 1)]
+    for log, own in zip(logs, gains, strict=True):
+        rest = [one for other, one in zip(logs, gains, strict=True) if other.greenhouse != log.greenhouse]
+        bound = Drift({}, BETWEEN, largest(rest), least)
+        named = next(iter(own), "")
+        if named and own[named] >= bound.needed_gain(named, DEFAULT):
+            claims.append((log.greenhouse, log.group, named))
     return claims
-
-
-def fitted_bound(what: str, claims: Callable[[float], list[Claim]], most: float) -> float:
-    """Return the least bound by which no more logs than `most` are told something; print what is told."""
-    print(f"logs with nothing missing that are told {what}, each greenhouse by the gains of the others:")
-    least = float(MOST)
-    for bound in range(MOST, LEAST - 1, -1):
-        told = claims(bound)
-        if len(told) > most or bound <= 2 * LEAST:
-            print(f"  bound {bound}: {len(told)} {told}")
-        if len(told) > most:
-            break
-        least = float(bound)
-    return least
 
 
 def false_parameters(logs: Sequence[NullLog], gains: Sequence[dict[str, float]]) -> list[str]:
     """Return the parameters that gain what they must, each greenhouse judged by the gains of the others."""
-    least, over = DEFAULT.least_parameter_gain, DEFAULT.parameter_over_null
-    return [
-        f"{log.greenhouse} {key}"
-        for log, own, rest in zip(logs, gains, elsewhere(logs, gains), strict=True)
-        for key, gain in own.items()
-        if gain >= max(least, over * rest.get(key, 0.0))
-    ]
+    claims = []
+    for log, own in zip(logs, gains, strict=True):
+        rest = largest([one for other, one in zip(logs, gains, strict=True) if other.greenhouse != log.greenhouse])
+        needed = {
+            key: max(DEFAULT.least_parameter_gain, DEFAULT.parameter_over_null * rest.get(key, 0.0)) for key in own
+        }
+        claims += [f"{log.greenhouse} {key}" for key, gain in own.items() if gain >= needed[key]]
+    return claims
 
 
 def unchanged(jobs: Jobs) -> list[tuple[Reference, Case, Telemetry]]:
@@ -225,33 +185,27 @@ def main(processes: int) -> int:
             logs.append(one)
             print(f"{len(logs)} logs", file=sys.stderr, flush=True)
     gains: list[dict[str, float]] = []
-    patterns: list[dict[str, float]] = []
     for season in SEEDS:
         learned = learn([one for one in logs if one.season != season])
-        for one in (one for one in logs if one.season == season):
-            gains.append(gains_under(one, learned))
-            patterns.append(pattern_gains_under(one, learned))
+        gains += [gains_under(one, learned) for one in logs if one.season == season]
         print(f"{season}: judged under the rates of the other seasons", file=sys.stderr, flush=True)
-    print(f"{len(logs)} logs")
-    # Of causes that which gains most is named or none, of patterns any that gains what it must.
-    first = [dict(itertools.islice(one.items(), 1)) for one in gains]
-    causes = partial(false_claims, logs, first, elsewhere(logs, gains))
-    least = fitted_bound("a cause", causes, FALSE_CLAIMS * len(logs))
-    unexplained = partial(false_claims, logs, patterns, elsewhere(logs, patterns))
-    of_pattern = fitted_bound("a pattern", unexplained, FALSE_PATTERNS * len(logs))
-    moved = [one.parameter_gains for one in logs]
+    print(f"{len(logs)} logs with nothing missing; false claims, each greenhouse by the gains of the others:")
+    least = float(MOST)
+    for bound in range(MOST, LEAST - 1, -1):
+        claims = false_claims(logs, gains, bound)
+        if len(claims) <= FALSE_CLAIMS * len(logs):
+            least = float(bound)
+        if bound <= 2 * LEAST:
+            print(f"  bound {bound}: {len(claims)} {claims}")
+    moved = [parameter_gains(one) for one in logs]
     print(f"parameters that would be named by the gains of other greenhouses: {false_parameters(logs, moved)}")
     found = learn(logs)
     for key, rate in sorted(found.rates.items(), key=lambda item: -item[1])[:20]:
         print(f"  {key:40} {rate:.3f}")
     done = replace(
-        found,
-        null_gains=largest(gains) | largest(patterns) | largest(moved),
-        least_gain=least,
-        least_pattern_gain=of_pattern,
-        provenance=provenance(COMMAND, dict(SEEDS)),
+        found, null_gains=largest(gains) | largest(moved), least_gain=least, provenance=provenance(COMMAND, dict(SEEDS))
     )
     path = Path(str(files("igrow.trainer.diagnosis"))) / drift.FILE
     drift.write_drift(path, done)
-    print(f"least gain {least:g}, of a pattern {of_pattern:g}; wrote {path}")
+    print(f"least gain {least:g}; wrote {path}")
     return 0

@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 from igrow.trainer.data import Log
-from igrow.trainer.diagnosis import DEFAULT, change, fitted_change, linear, rounds, search
+from igrow.trainer.diagnosis import DEFAULT, fitted_change, linear, rounds
 from igrow.trainer.diagnosis.candidates import Candidate
 from igrow.trainer.diagnosis.compare import Round
-from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.drift import Drift
 from igrow.trainer.diagnosis.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, knowledge_of
@@ -80,15 +79,6 @@ def test_what_gains_little_by_physics_is_not_fitted(size: float, told: list[str]
     assert len(promising) <= DEFAULT.most_change_fits
 
 
-def search_in(design: Design, known: Knowledge, monkeypatch: pytest.MonkeyPatch) -> rounds.Change:
-    """A search in a log that is nothing but its design."""
-    monkeypatch.setattr(rounds.Change, "_expected", lambda *_: design)
-    unasked = cast(Any, None)
-    return rounds.Change(
-        unasked, SITE, known, frozenset(), DEFAULT, unasked, unasked, design, np.zeros(0), Drift({}, 42.0)
-    )
-
-
 def test_beside_a_cause_that_was_found_before_fits_are_asked_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of two causes steps may prove one alone; a third is not looked for where no more may be named."""
     design = with_parameters(Truth({}, {}), 1)
@@ -96,30 +86,16 @@ def test_beside_a_cause_that_was_found_before_fits_are_asked_with_it(monkeypatch
     asked: list[tuple[ActiveTerm, ...]] = []
     monkeypatch.setattr(rounds, "changed", lambda *_, **__: Round(design, null, null, None, ()))
     monkeypatch.setattr(fitted_change, "find", lambda _days, known, *_: asked.append(known.terms))
+    monkeypatch.setattr(rounds.Change, "_expected", lambda *_: design)
     known = knowledge_of(model_in_force(), SITE, DEFAULT)
-    question = search_in(design, known, monkeypatch)
+    unasked = cast(Any, None)
+    search = rounds.Change(
+        unasked, SITE, known, frozenset(), DEFAULT, unasked, unasked, design, np.zeros(0), Drift({}, 42.0)
+    )
     term = ActiveTerm("co2_offset", 80.0, {})
     found = [cast(Any, SimpleNamespace(term=term, gain=50.0))]
     rng = np.random.default_rng(0)
-    assert question.judge(design, [], rng, causes=True).cause is None
-    assert question.judge(design, found, rng, causes=True).cause is None
-    assert question.judge(design, found, rng, causes=False).cause is None
+    assert search.judge(design, [], rng, causes=True).cause is None
+    assert search.judge(design, found, rng, causes=True).cause is None
+    assert search.judge(design, found, rng, causes=False).cause is None
     assert asked == [known.terms, (*known.terms, term)]
-
-
-@pytest.mark.parametrize("explains", [True, False])
-def test_a_cause_that_fits_tell_stands_where_it_leaves_nothing_of_a_pattern(
-    monkeypatch: pytest.MonkeyPatch, explains: bool
-) -> None:
-    design = with_parameters(Truth({}, {"heat:cold weather": 4.0}), 4)
-    null, rng = linear.fit(design.grams, design.null_model()), np.random.default_rng(0)
-    (pattern,) = search.score_patterns(design, null, [None], rng)
-    assert change.proven_gain(design, pattern) > Drift({}, 42.0).least_pattern_gain
-    cause = search.score_candidates(design, null, [None], rng)[0]
-    # An effect that acts as the pattern does, or one that has nothing to do with it.
-    cause = replace(cause, term=pattern.term) if explains else cause
-    seen, told = Round(design, null, null, None, (pattern,)), change.round_of(design, null, cause, rng)
-    monkeypatch.setattr(rounds, "changed", lambda *_, **__: seen)
-    monkeypatch.setattr(fitted_change, "find", lambda *_: told)
-    known = knowledge_of(model_in_force(), SITE, DEFAULT)
-    assert search_in(design, known, monkeypatch).judge(design, [], rng, causes=True) is (told if explains else seen)

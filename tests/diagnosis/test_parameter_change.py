@@ -27,9 +27,7 @@ from igrow.trainer.diagnosis import (
 )
 from igrow.trainer.diagnosis.design import Design, History
 from igrow.trainer.diagnosis.drift import Drift
-from igrow.trainer.diagnosis.linear import fit
 from igrow.trainer.diagnosis.parameter_change import find
-from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.diagnosis.visible_parameters import VISIBLE, members
 from igrow.trainer.fit import FittedModel
 from igrow.trainer.fit.gaussian import Gaussian
@@ -84,28 +82,6 @@ def test_the_parameter_that_has_changed_is_named_with_its_size() -> None:
     assert found.confounded == ("transmissivity",)
     assert found.share.low < -0.3 < found.share.high
     assert abs(found.share.value + 0.3) < 0.03
-
-
-@pytest.mark.parametrize(("larger", "told"), [(2.0, True), (0.5, False)])
-def test_a_change_counts_by_what_proves_more_its_slope_or_its_size(
-    monkeypatch: pytest.MonkeyPatch, larger: float, told: bool
-) -> None:
-    """A leak of three times as much gains twice what its slope says; in few days a size scatters more than a slope."""
-    design = parameter_change.joined(with_parameters(Truth({}, {}, (-3.0, 0.0, 0.0)), 1))
-    null, rng = fit(design.grams, design.null_model()), np.random.default_rng(0)
-    slopes = parameter_change.score(design, null, [None], rng)
-    asked: list[str] = []
-
-    def at_its_size(design: Design, one: Hypothesis, *_: object) -> tuple[Design, Hypothesis]:
-        asked.append(one.parameter)
-        return design, replace(one, gain=larger * one.gain, statistic=larger * one.statistic)
-
-    monkeypatch.setattr(parameter_change, "at_its_size", at_its_size)
-    found = parameter_change.sized(design, slopes, rng)
-    assert asked == [one.parameter for one in slopes if one.gain >= DEFAULT.least_sized_gain]
-    assert "transmissivity" in asked and len(asked) < len(slopes)
-    by_slope, own = (next(one for one in all_ if one.parameter == "transmissivity") for all_ in (slopes, found))
-    assert own.gain == (larger * by_slope.gain if told else by_slope.gain)
 
 
 @pytest.mark.usefixtures("linear")

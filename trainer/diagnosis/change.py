@@ -9,7 +9,6 @@ noise says, or a few odd days would speak for all.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -31,20 +30,19 @@ def changed(design: Design, explained: float, rng: np.random.Generator, *, cause
         rng: for flips and bootstraps.
         causes: look for a cause, and not for patterns only.
     """
-    assert design.history is not None and design.history.drift is not None
-    rules, drift, null = design.rules, design.history.drift, linear.fit(design.grams, design.null_model())
+    rules, null = design.rules, linear.fit(design.grams, design.null_model())
     onsets = search.onset_days(design)
     cause = best(design, search.score_candidates(design, null, onsets, rng)) if causes else None
-    patterns = search.score_patterns(design, null, onsets[:: rules.pattern_onset_stride], rng)
+    pattern = best(design, search.score_patterns(design, null, onsets[:: rules.pattern_onset_stride], rng))
     nothing = Round(design, null, null, None, ())
-    gained = 0.0 if cause is None else net_gain(design, cause)
-    stands = (one for one in patterns if proven_gain(design, one) >= drift.needed_by_pattern(one.key, rules))
-    pattern = best(design, stands)
-    if pattern is not None and net_gain(design, pattern) >= max(rules.pattern_over_change * gained, explained):
-        return replace(nothing, patterns=(pattern,))
-    if cause is None or proven_gain(design, cause) < drift.needed_gain(cause.effect, rules):
+    if pattern is not None:
+        gained = 0.0 if cause is None else net_gain(design, cause)
+        needed = max(rules.least_pattern_change, rules.pattern_over_change * gained, explained)
+        if net_gain(design, pattern) >= needed and proven_gain(design, pattern) >= rules.least_proven_pattern:
+            return replace(nothing, patterns=(pattern,))
+    assert design.history is not None and design.history.drift is not None
+    if cause is None or proven_gain(design, cause) < design.history.drift.needed_gain(cause.effect, rules):
         return nothing
-    pattern = best(design, patterns)
     if pattern is not None and left_by_hour(design, null, cause, rng) >= rules.least_left_by_hour:
         return replace(nothing, patterns=(pattern,))
     return round_of(design, null, cause, rng)
@@ -62,17 +60,7 @@ def left_by_hour(design: Design, null: Fit, cause: Hypothesis, rng: np.random.Ge
     return max((proven_gain(design, one) for one in by_hour), default=0.0)
 
 
-def stands_beside(design: Design, pattern: Hypothesis, cause: Hypothesis, rng: np.random.Generator) -> bool:
-    """Tell whether a pattern still gains what it must beside a cause that steps alone did not prove."""
-    assert design.history is not None and design.history.drift is not None
-    null = linear.fit(design.grams, design.null_model())
-    named = linear.fit(design.grams, null.model.with_term(cause.term))
-    left = search.score_patterns(design, named, [pattern.term.onset], rng)
-    needed = design.history.drift.needed_by_pattern(pattern.key, design.rules)
-    return any(one.key == pattern.key and proven_gain(design, one) >= needed for one in left)
-
-
-def best(design: Design, scored: Iterable[Hypothesis]) -> Hypothesis | None:
+def best(design: Design, scored: list[Hypothesis]) -> Hypothesis | None:
     """Return the hypothesis with the largest net gain, None for none."""
     known = design.history.without if design.history is not None else frozenset()
     return max((one for one in scored if one.effect not in known), key=lambda one: net_gain(design, one), default=None)

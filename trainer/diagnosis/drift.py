@@ -54,22 +54,16 @@ class Drift:
     days: float
     """From the middle of one log to that of the other, in the pairs that they were learned from."""
     null_gains: Mapping[str, float] = field(default_factory=dict)
-    """Largest gain in logs with nothing missing of greenhouses that the rates were not learned from: of an effect or a
-    pattern, and, where all else changes by physics alone, of a parameter (``parameter:name``)."""
+    """Largest gain in logs with nothing missing of greenhouses that the rates were not learned from: of an effect, and,
+    where all else changes by physics alone, of a parameter (``parameter:name``)."""
     least_gain: float = 12.0
     """Gain that a change must have at least: so few of these logs have more, each by the gains of the others."""
-    least_pattern_gain: float = 20.0
-    """The same of a pattern."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
     """The command that learned it, its date and seeds."""
 
     def needed_gain(self, effect: str, rules: DecisionRules) -> float:
         """Return what a change must gain: more, by some, than it did in any greenhouse in which nothing had changed."""
         return max(self.least_gain, rules.change_over_null * self.null_gains.get(effect, 0.0))
-
-    def needed_by_pattern(self, key: str, rules: DecisionRules) -> float:
-        """Return the same of a pattern."""
-        return max(self.least_pattern_gain, rules.change_over_null * self.null_gains.get(key, 0.0))
 
     def by_physics(self) -> Drift:
         """Return the change that physics alone lets expect: what one parameter's own change is told from."""
@@ -143,13 +137,7 @@ def read_drift(path: Path | None = None) -> Drift:
     file = files("igrow.trainer.diagnosis").joinpath(FILE) if path is None else path
     try:
         known = Drift(**json.loads(file.read_text(encoding="utf-8")))
-        numbers = [
-            *known.rates.values(),
-            *known.null_gains.values(),
-            known.days,
-            known.least_gain,
-            known.least_pattern_gain,
-        ]
+        numbers = [*known.rates.values(), *known.null_gains.values(), known.days, known.least_gain]
         if not np.all(np.isfinite(np.array(numbers, dtype=np.float64))):
             raise ValueError("a number is none")
         return known

@@ -52,8 +52,7 @@ def find(design: Design, rng: np.random.Generator) -> ParameterChange | None:
     assert design.history is not None
     rules, unasked, design = design.rules, design.history.without, joined(design)
     null, onsets = linear.fit(design.grams, design.null_model()), search.onset_days(design)
-    slopes = {one.parameter: one for one in score(design, null, onsets, rng)}
-    scored = sized(design, list(slopes.values()), rng)
+    scored = score(design, null, onsets, rng)
     net = {one.parameter: change.proven_gain(design, one) - _needed_gain(design, one) for one in scored}
     # Of what is none at the calibration there is no share.
     visible = [
@@ -77,8 +76,7 @@ def find(design: Design, rng: np.random.Generator) -> ParameterChange | None:
     own.sort(key=lambda one: change.net_gain(design, one) + together.get(one.parameter, 0.0), reverse=True)
     effects = search.score_candidates(design, null, onsets, rng)
     largest = max((change.net_gain(design, one) for one in effects), default=0.0)
-    run = (at_its_size(design, slopes[one.parameter], onsets, rng) for one in own)
-    told = (_told(*one, scored, net, largest) for one in run)
+    told = (_told(design, one, scored, net, largest, rng) for one in own)
     return next((one for one in told if one is not None), None)
 
 
@@ -88,21 +86,24 @@ def _told(
     scored: Sequence[Hypothesis],
     net: Mapping[str, float],
     largest: float,
+    rng: np.random.Generator,
 ) -> ParameterChange | None:
-    """Return a parameter's change; None where it cannot be, or one that nobody can look at explains more.
+    """Return a parameter's change at its size; None where it cannot be, or one that nobody can look at explains more.
 
     Args:
-        design: of the log, with the change at its size.
+        design: of the log, with groups of parameters.
         best: the change.
-        scored: changes of all parameters at their sizes.
+        scored: changes of all parameters.
         net: by parameter, what each gains beyond what it must.
         largest: gain of an effect.
+        rng: for the flips.
     """
-    rules = design.rules
+    rules, onsets = design.rules, search.onset_days(design)
     margin = max(rules.confounded_gain, rules.confounded_share * best.gain)
     if max(net.values()) > net[best.parameter] + margin:
         # One that nobody can look at explains it clearly better.
         return None
+    design, best = at_its_size(design, best, onsets, rng)
     null = linear.fit(design.grams, design.null_model())
     leads = best.gain >= rules.parameter_over_effect * largest
     named = linear.fit(design.grams, null.model.with_term(best.term))
@@ -129,24 +130,6 @@ def _told(
         (best.parameter, *as_good),
         leads,
     )
-
-
-def sized(design: Design, slopes: Sequence[Hypothesis], rng: np.random.Generator) -> list[Hypothesis]:
-    """Return changes of parameters as what proves more of each, its slope or the change at its size.
-
-    Args:
-        design: of `joined`.
-        slopes: of `score`; of those that gain little the size is not asked.
-        rng: for the flips.
-    """
-    onsets, least = search.onset_days(design), design.rules.least_sized_gain
-
-    def proven(one: Hypothesis) -> Hypothesis:
-        if one.gain < least:
-            return one
-        return max(one, at_its_size(design, one, onsets, rng)[1], key=lambda told: change.proven_gain(design, told))
-
-    return [proven(one) for one in slopes]
 
 
 def at_its_size(

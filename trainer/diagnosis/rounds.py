@@ -10,7 +10,7 @@ import numpy as np
 from igrow.core.arrays import Floats
 from igrow.core.site import Site
 from igrow.trainer.diagnosis import fitted_change, history, parameter_change
-from igrow.trainer.diagnosis.change import changed, stands_beside
+from igrow.trainer.diagnosis.change import changed
 from igrow.trainer.diagnosis.compare import Round, compare
 from igrow.trainer.diagnosis.design import Design, prepare
 from igrow.trainer.diagnosis.drift import Drift, read_drift
@@ -123,15 +123,10 @@ class Change(Search):
     def judge(self, design: Design, found: Sequence[Estimated], rng: np.random.Generator, *, causes: bool) -> Round:
         """Return what one round finds; where time steps tell nothing, fits to free runs are asked."""
         judged = changed(design, _explained(found), rng, causes=causes)
-        if judged.cause is not None or not causes:
+        if judged.cause is not None or judged.patterns or not causes:
             return judged
         known = replace(self.knowledge, terms=(*self.knowledge.terms, *(one.term for one in found)))
-        told = fitted_change.find(self.days, known, self.by_physics(known.terms), rng)
-        if told is None or told.cause is None:
-            return judged
-        # A cause that fits tell is the answer where it leaves nothing of a pattern that steps tell.
-        unexplained = any(stands_beside(design, one, told.cause.hypothesis, rng) for one in judged.patterns)
-        return judged if unexplained else told
+        return fitted_change.find(self.days, known, self.by_physics(known.terms), rng) or judged
 
     def design(self, terms: Sequence[ActiveTerm], interval: float) -> Design:
         """Return the design of a model with terms, about the calibrated parameters."""

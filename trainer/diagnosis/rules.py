@@ -77,6 +77,8 @@ class DecisionRules:
     least_change_fall: float = _fitted(
         "share of the error of unseen days that such a change must remove: more than any where nothing had changed"
     )
+    least_pattern_change: float = _tuned(60.0, "the same of a pattern: greenhouses drift with the weather")
+    least_proven_pattern: float = _tuned(20.0, "of it, what the scatter of day scores must bear out")
     pattern_over_change: float = _tuned(1.5, "times a change's gain at which a pattern replaces it")
     least_left_by_hour: float = _tuned(25.0, "gain of a pattern by the hour beside a change that unmakes its name")
 
@@ -87,7 +89,6 @@ class DecisionRules:
     least_leading_change: float = _chosen(0.1, "share of its value by which a parameter that leads must have changed")
     least_other_change: float = _chosen(0.2, "the same of one that explains no more than an effect does")
     least_parameter_gain: float = _tuned(20.0, "gain that its change must bring, all else changing by physics alone")
-    least_sized_gain: float = _chosen(10.0, "gain along its slope from which on a change is run at its size")
     parameter_over_null: float = _tuned(2.0, "times its largest gain where nothing had changed that it must bring")
     parameter_over_effect: float = _tuned(
         1.1, "times the largest gain of an effect at which it goes before all effects"
