@@ -132,12 +132,22 @@ def test_the_report_is_one_page_that_fetches_nothing(leak: Diagnosis, tmp_path: 
     assert document == leak.to_json()
 
 
-def test_without_wind_a_leak_is_among_what_it_could_be_whatever_is_named(leaky_log: Log) -> None:
+@pytest.mark.parametrize(
+    "drier",
+    [
+        6.0,
+        pytest.param(
+            0.0,
+            marks=pytest.mark.xfail(strict=True, reason="since stomata close a leak alone is not told without wind"),
+        ),
+    ],
+)
+def test_without_wind_a_leak_is_among_what_it_could_be_whatever_is_named(leaky_log: Log, drier: float) -> None:
     """Vents that do not close were named alone, in other such logs sensors of humidity and temperature."""
     lacking = {"wind_speed", "outdoor_humidity", "co2_dosing"}
     kept = [name for name in leaky_log.telemetry.columns if name not in lacking]
-    drier = leaky_log.with_columns({"air_humidity": np.array(leaky_log.telemetry["air_humidity"]) - 6.0})
-    result = diagnose(prepare_log(drier.telemetry.only(kept), SITE), model_in_force())
+    shown = leaky_log.with_columns({"air_humidity": np.array(leaky_log.telemetry["air_humidity"]) - drier})
+    result = diagnose(prepare_log(shown.telemetry.only(kept), SITE), model_in_force())
     assert result.verdict == "ambiguous"
     assert set(result.errors) == {"air_temperature", "air_humidity"}, "of CO2 the dose is not known"
     assert all("wind_infiltration" in one.confounded[1:] for one in result.findings)
@@ -151,17 +161,31 @@ def test_an_effect_that_is_taken_out_is_not_named(leaky_log: Log) -> None:
     assert "wind_infiltration" not in [one.effect for one in result.findings]
 
 
-@pytest.mark.parametrize(("seed", "within"), [(7, 0.06), (5, 0.13)])
-def test_a_sensor_that_is_off_from_a_day_on_is_named_with_its_size_and_day(seed: int, within: float) -> None:
+@made_once
+def sensor_off_by(offset: float, since: float, seed: int) -> Diagnosis:
     log = greenhouse_log(seed)
     age = np.arange(round(DAYS * 86_400 / STEP)) * STEP / 86_400.0
-    off = np.array(log.telemetry["air_temperature"]) + 1.5 * (age >= 9.4)
-    result = diagnose(log.with_columns({"air_temperature": off}), model_in_force())
+    off = np.array(log.telemetry["air_temperature"]) + offset * (age >= since)
+    return diagnose(log.with_columns({"air_temperature": off}), model_in_force())
+
+
+@pytest.mark.parametrize(
+    ("seed", "within"),
+    [
+        (7, 0.06),
+        (5, 0.13),
+        pytest.param(
+            5, 0.06, marks=pytest.mark.xfail(strict=True, reason="since stomata close the size is off by an eighth")
+        ),
+    ],
+)
+def test_a_sensor_that_is_off_from_a_day_on_is_named_with_its_size_and_day(seed: int, within: float) -> None:
+    result = sensor_off_by(1.5, 9.4, seed)
     (found,) = result.findings
     assert (found.effect, found.kind) == ("air_temperature_offset", "sensor")
     assert found.parameters["offset"].value == pytest.approx(1.5, rel=within)
     assert found.parameters["offset"].low < 1.5 < found.parameters["offset"].high
-    began = log.telemetry.time[0] + np.timedelta64(round(9.4 * 24), "h")
+    began = greenhouse_log(seed).telemetry.time[0] + np.timedelta64(round(9.4 * 24), "h")
     assert found.onset is not None
     assert abs(found.onset.time - began) <= np.timedelta64(1, "D")
     assert found.onset.low <= began <= found.onset.high

@@ -256,12 +256,23 @@ def test_leaves_that_wilt_within_the_log_have_a_date_and_are_no_sensor(
     assert worth(told, finding) is None
 
 
+@pytest.mark.parametrize(
+    "left",
+    [
+        0.6,
+        pytest.param(
+            0.67,
+            marks=pytest.mark.xfail(
+                strict=True, reason="since stomata close a third of the light is told from day 8 on"
+            ),
+        ),
+    ],
+)
 def test_a_cover_that_was_painted_some_days_ago_waits_for_a_later_log(
-    log: tuple[Telemetry, Telemetry], model: FittedModel
+    log: tuple[Telemetry, Telemetry], model: FittedModel, left: float
 ) -> None:
-    # Fewer days than a diagnosis needs: no set of parameters is right for this log. A third of the light would not
-    # stand out in so few of them.
-    painted = GREENHOUSE | {"transmissivity": 0.6 * GREENHOUSE["transmissivity"]}
+    # Fewer days than a diagnosis needs: no set of parameters is right for this log.
+    painted = GREENHOUSE | {"transmissivity": left * GREENHOUSE["transmissivity"]}
     after = virtual_log(DAYS, seed=5, step=STEP, added=disturbances(DAYS, STEP, seed=5), parameters=painted)
     told = diagnose(later((log[0], after), DAYS - KNOWN - 6), model)
     assert told.findings == ()

@@ -37,7 +37,16 @@ def test_a_parameter_that_moved_is_found_beside_coloured_disturbances() -> None:
     assert np.mean(counted**2) == pytest.approx(1.0, abs=0.15)
 
 
-def test_what_is_expected_to_be_missing_moves_no_parameter() -> None:
+@pytest.mark.parametrize(
+    ("beside_noise", "share"),
+    [
+        (True, 0.15),
+        pytest.param(
+            False, 0.3, marks=pytest.mark.xfail(strict=True, reason="since stomata close noise alone moves as much")
+        ),
+    ],
+)
+def test_what_is_expected_to_be_missing_moves_no_parameter(*, beside_noise: bool, share: float) -> None:
     """Beyond what sensor noise moves them by, which is there without it too."""
     known = GREENHOUSE
     hours = np.arange(DAYS * 96) % 96
@@ -53,6 +62,7 @@ def test_what_is_expected_to_be_missing_moves_no_parameter() -> None:
         line, _ = recalibrate(start, split, prior, expected if expects else 0.0 * expected, average, DEFAULT)
         return np.array([line.parameters[name] for name in prior.names]) / prior.standard_deviation
 
-    without = recalibrated(0.0 * flux, expects=False)
+    start = prior.mean / prior.standard_deviation
+    without = recalibrated(0.0 * flux, expects=False) if beside_noise else start
     moved = [float(np.abs(recalibrated(flux, expects=one) - without).max()) for one in (True, False)]
-    assert moved[0] < 0.15 * moved[1]
+    assert moved[0] < share * moved[1]
