@@ -29,10 +29,11 @@ test: $(STAMP) ## Run the tests (ten minutes on two cores, twelve on slow ones).
 page-pictures: $(STAMP) ## Take the pictures of docs/page.md anew (needs Chromium).
 	IGROW_PICTURES=1 $(BIN)/pytest tests/page/test_page_in_a_browser.py
 
-lint: $(STAMP) ## Run ruff and strict mypy.
+lint: $(STAMP) ## Run ruff and strict mypy, on the notebooks too.
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/nbqa 'mypy --allow-untyped-calls --no-warn-unused-ignores' docs
 	MYPYPATH=config/demo $(BIN)/mypy config/demo
 
 format: $(STAMP) ## Format the code.
