@@ -2,8 +2,10 @@
 
 A tabular CUSUM over its live errors a day ahead (Page 1954, Biometrika 41:100; Montgomery, Introduction to Statistical
 Quality Control, ch. 9): what lies more than half a standard deviation above the first days is added up, and an excess
-of five standard deviations is no chance. The change began when the sum last left zero. Weather alone makes predictions
-a little worse for weeks, so the days since then must be half as wrong again in the mean.
+of five standard deviations is no chance. Weather alone makes predictions a little worse for weeks, so the days since
+the sum last left zero must be half as wrong again in the mean. That day dates no change: one odd day holds the sum up
+until the change comes. The change is dated by maximum likelihood (Hinkley 1970, Biometrika 57:1; Pignatiello and Samuel
+2001, Journal of Quality Technology 33:357): where a step parts the days best.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
+from igrow.core.arrays import Floats
 from igrow.core.quantities import difference_with_unit
 
 DAY = 86_400.0
@@ -23,6 +26,8 @@ SLACK, LIMIT = 0.5, 5.0
 """Allowance and decision interval of the CUSUM, in standard deviations."""
 LEAST_SCATTER = 0.2
 """Standard deviation, as a share of the mean, that days have at least: five of them tell little of their scatter."""
+LEAST_ERROR = 0.1
+"""Of the mean error, what a day counts at least when the change is dated: an error of nothing has no logarithm."""
 LEAST_RATIO = 1.5
 """Mean error since the change over that of the first days."""
 HORIZON = " 24_h"
@@ -73,13 +78,28 @@ def _worsening(quantity: str, history: Sequence[tuple[float, Mapping[str, float]
         return None
     mean = float(np.mean(reference))
     scatter = max(float(np.std(reference, ddof=1)), LEAST_SCATTER * mean, 1e-9)
-    total, since = 0.0, days[REFERENCE_DAYS][0]
-    for time, error in days[REFERENCE_DAYS:]:
+    total, left_zero = 0.0, REFERENCE_DAYS
+    for number, (_, error) in enumerate(days[REFERENCE_DAYS:], REFERENCE_DAYS):
         if total <= 0.0:
-            since = time - DAY
+            left_zero = number
         total = max(0.0, total + (error - mean) / scatter - SLACK)
-    later = float(np.mean([error for time, error in days if time > since]))
-    return Worsening(quantity, since, mean, later) if total > LIMIT and later > LEAST_RATIO * mean else None
+    errors = np.array([error for _, error in days])
+    if total <= LIMIT or errors[left_zero:].mean() <= LEAST_RATIO * mean:
+        return None
+    first = _first_worse(errors)
+    return Worsening(quantity, days[first][0] - DAY, mean, float(errors[first:].mean()))
+
+
+def _first_worse(errors: Floats) -> int:
+    """Return the first day after the step upwards that parts a course (n,) best, after the days of reference.
+
+    In logarithms, since errors scatter in proportion to themselves.
+    """
+    numbers = np.arange(REFERENCE_DAYS, len(errors))
+    sums = np.cumsum(np.log(np.maximum(errors, LEAST_ERROR * errors.mean())))
+    before, after = sums[numbers - 1] / numbers, (sums[-1] - sums[numbers - 1]) / (len(errors) - numbers)
+    parted = numbers * (len(errors) - numbers) * np.maximum(after - before, 0.0) ** 2
+    return int(numbers[np.argmax(parted)])
 
 
 def _days(errors: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:

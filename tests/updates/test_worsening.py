@@ -24,6 +24,27 @@ def test_a_step_is_dated_to_its_day() -> None:
     assert found.now == pytest.approx(1.0)
 
 
+def test_an_odd_day_before_the_change_does_not_date_it() -> None:
+    """The errors of a greenhouse in which something broke on the tenth day, after one day of odd weather."""
+    well = [0.285, 0.346, 0.216, 0.374, 0.348, 0.338, 0.564, 0.298, 0.310, 0.447]
+    (found,) = find_worsening(course([*well, 2.425, 2.353, 1.920]))
+    assert found.since == 10 * DAY
+    assert found.now == pytest.approx(2.233, abs=0.001)
+
+
+@pytest.mark.parametrize("size", [1.8, 3.0])
+def test_steps_are_dated_within_two_days(size: float) -> None:
+    rng = np.random.default_rng(4)
+    late = []
+    for _ in range(200):
+        daily = 0.3 * np.exp(0.25 * rng.normal(size=26))
+        daily[14:] *= size
+        late += [one.since / DAY - 14.0 for one in find_worsening(course(list(daily), every=24.0))]
+    assert len(late) > 150
+    assert np.mean(np.abs(late) <= 2.0) > 0.9
+    assert abs(np.mean(late)) < 0.5
+
+
 def test_a_slow_decline_is_found_too() -> None:
     rng = np.random.default_rng(2)
     daily = [0.3 * (1.0 + 0.05 * max(0, day - 10)) + 0.03 * rng.normal() for day in range(40)]
