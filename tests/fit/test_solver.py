@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from igrow.trainer.fit.gaussian import Gaussian
-from igrow.trainer.fit.solver import DivergenceError, by_differences, covariance, solve
+from igrow.trainer.fit.solver import DivergenceError, by_differences, covariance, remembered, solve
 
 NAMES = ("a", "b", "c")
 FAR = np.full(3, 1e9)
@@ -166,3 +166,16 @@ def test_progress_is_told_of_every_step_with_the_errors_there() -> None:
     assert [number for number, _ in told] == list(range(len(told)))
     assert told[-1][1] == pytest.approx(float(np.sum(found.residuals**2)))
     assert told[-1][1] < told[0][1]
+
+
+def test_a_model_is_run_once_for_errors_and_slopes_at_a_point() -> None:
+    asked: list[list[float]] = []
+
+    def model(point: np.ndarray) -> np.ndarray:
+        asked.append(point.tolist())
+        return 2.0 * point
+
+    once = remembered(model)
+    for point in ([1.0, 2.0], [1.0, 2.0], [3.0, 2.0], [3.0, 2.0], [1.0, 2.0]):
+        assert once(np.array(point)).tolist() == (2.0 * np.array(point)).tolist()
+    assert asked == [[1.0, 2.0], [3.0, 2.0], [1.0, 2.0]]

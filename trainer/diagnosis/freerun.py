@@ -91,6 +91,7 @@ class LogDays:
         low, high = bounds(prior.names)
         begin = np.array([(start or prior.values)[name] for name in prior.names])
 
+        @solver.remembered
         def line(point: Floats) -> Linearisation:
             return sensitivity.linearise(record, runs, clipped(prior.names, point), effects, added)
 

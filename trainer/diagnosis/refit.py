@@ -106,9 +106,9 @@ class _Unknowns:
         active = activate(record, [*self.before, *(self.terms(point) if terms is None else terms)])
         return sensitivity.linearise(record, self.design.line.runs, parameters, active)
 
-    def slopes(self, point: Floats) -> Floats:
-        """Return d(error)/d(parameter) and d(error)/d(knob), (p + k, 3, r, steps)."""
-        line, terms, prior = self.line(point), self.terms(point), self.design.prior
+    def slopes(self, point: Floats, line: Linearisation) -> Floats:
+        """Return d(error)/d(parameter) and d(error)/d(knob), (p + k, 3, r, steps), about the model at a point."""
+        terms, prior = self.terms(point), self.design.prior
         parameters = sensitivity.parameter_sensitivities(line, prior.names, prior.standard_deviation)
         return np.concatenate([parameters, *(self._slope(point, line, terms, knob)[None] for knob in self.knobs)])
 
@@ -147,19 +147,20 @@ def refit(design: Design, named: Fit, terms: Sequence[ActiveTerm], before: Seque
     point[:size] += [design.line.parameters[name] for name in prior.names]
     point = np.clip(point, unknowns.low, unknowns.high)
     whitening: Whitening | None = None
+    line = solver.remembered(unknowns.line)
     for _ in range(rules.refit_rounds):
         # The noise is fitted about the model as it now stands.
-        errors = average(unknowns.line(point).errors[None])[0]
+        errors = average(line(point).errors[None])[0]
         errors = errors + misfit + np.tensordot(point[size : size + other], background, axes=1)
         whitening = design.fit_noise(errors, whitening)
         view = _View(whitening, average, design.fitted)
 
         def residuals(point: Floats, view: _View = view) -> Floats:
-            plain = average(unknowns.line(point).errors[None])
+            plain = average(line(point).errors[None])
             return view.flat(plain + np.tensordot(point[size : size + other], background, axes=1) + misfit)[:, 0]
 
         def jacobian(point: Floats, view: _View = view) -> Floats:
-            slopes = average(unknowns.slopes(point))
+            slopes = average(unknowns.slopes(point, line(point)))
             return view.flat(np.concatenate([slopes[:size], background, slopes[size:]]))
 
         solution = solver.solve(

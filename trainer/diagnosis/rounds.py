@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -119,6 +119,8 @@ class Change(Search):
     """What the model is expected to miss in this log."""
     drift: Drift | None
     """How greenhouses like it change with time; None: what came with the trainer."""
+    _latest: list[tuple[list[ActiveTerm], Design]] = field(default_factory=list)
+    """Terms that the log was laid out with last: it is asked in two ways, and laid out once."""
 
     def judge(self, design: Design, found: Sequence[Estimated], rng: np.random.Generator, *, causes: bool) -> Round:
         """Return what one round finds; where time steps tell nothing, fits to free runs are asked."""
@@ -141,8 +143,14 @@ class Change(Search):
         return self._expected(terms, (self.drift or read_drift()).by_physics())
 
     def _expected(self, terms: Sequence[ActiveTerm], drift: Drift) -> Design:
-        plain = history.laid_out(self.days, self.site, self.history, terms, self.rules) if terms else self.plain
-        return history.expected(self.history, plain, self.misfit, self.without, drift)
+        return history.expected(self.history, self._laid_out(list(terms)), self.misfit, self.without, drift)
+
+    def _laid_out(self, terms: list[ActiveTerm]) -> Design:
+        if not terms:
+            return self.plain
+        if not self._latest or self._latest[0][0] != terms:
+            self._latest[:] = [(terms, history.laid_out(self.days, self.site, self.history, terms, self.rules))]
+        return self._latest[0][1]
 
     def resolved(self) -> Design:
         """Return the first design: by the steps that the history was learned from."""

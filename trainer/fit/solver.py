@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
@@ -26,6 +27,8 @@ Jacobian = Callable[[Floats], Floats]
 """Point (p,) -> d(errors)/d(point), (n, p)."""
 Batch = Callable[[Floats], Floats]
 """Points (m, p) -> errors in units of their scale, (m, n)."""
+
+Answer = TypeVar("Answer")
 
 DIFFERENCE = 0.05
 """Finite difference of a parameter, in standard deviations of its prior."""
@@ -161,6 +164,20 @@ def covariance(
     return 0.5 * (inverse + inverse.T)
 
 
+def remembered(model: Callable[[Floats], Answer]) -> Callable[[Floats], Answer]:
+    """Return a model that knows its answer to the latest point, whose errors are asked before its slopes.
+
+    Args:
+        model: of a point (p,); nobody may write into its answer.
+    """
+
+    @lru_cache(maxsize=1)
+    def known(point: bytes) -> Answer:
+        return model(np.frombuffer(point))
+
+    return lambda point: known(point.tobytes())
+
+
 def by_differences(batch: Batch, prior: Gaussian, high: Floats) -> tuple[Residuals, Jacobian]:
     """Return residuals and Jacobian of a model that runs many points in one batch.
 
@@ -170,13 +187,7 @@ def by_differences(batch: Batch, prior: Gaussian, high: Floats) -> tuple[Residua
         high: largest value of each parameter, (p,); a difference that would pass it goes the other way.
     """
 
-    @lru_cache(maxsize=1)
-    def known(point: bytes) -> Floats:
-        errors: Floats = batch(np.frombuffer(point)[None])[0]
-        return errors
-
-    def residuals(point: Floats) -> Floats:
-        return known(point.tobytes())
+    residuals: Residuals = remembered(lambda point: np.asarray(batch(point[None])[0]))
 
     def jacobian(point: Floats) -> Floats:
         step = DIFFERENCE * prior.standard_deviation
