@@ -14,13 +14,13 @@ from datetime import UTC, datetime
 import numpy as np
 
 from igrow.core.bundle import BUILT_IN
-from igrow.core.greenhouse import Season, generate_weather, recipe_by_hour, simulate_many
+from igrow.core.greenhouse import Season, generate_weather, simulate_many
 from igrow.core.greenhouse.described import parameters_of
+from igrow.core.greenhouse.recipe import recipe_course, varied_recipe
 from igrow.core.quantities import USUAL_SETPOINTS
 from igrow.core.simulator.crop import CropStages
 from igrow.core.simulator.hybrid.nominal import site_record
 from igrow.core.site import Site
-from igrow.core.telemetry import Telemetry
 from igrow.trainer.calibration import calibrate
 from igrow.trainer.data import prepare_log
 from igrow.trainer.exporting.plan import RANGED
@@ -54,33 +54,12 @@ def virtual_seasons(site: Site, count: int, days: int, seed: int) -> list[Season
     return simulate_many(
         plants,
         weathers,
-        [plain_recipe(START, end), *(varied_recipe(START, end, random) for _ in range(count - 1))],
+        [recipe_course(START, end), *(varied_recipe(START, end, random) for _ in range(count - 1))],
         START,
         end,
         count=count,
         seed=seed,
     )
-
-
-def plain_recipe(start: np.datetime64, end: np.datetime64) -> Telemetry:
-    """Return the recipe hour by hour."""
-    hours = np.arange(start, end + np.timedelta64(1, "h"), np.timedelta64(1, "h"))
-    rows = recipe_by_hour(start, len(hours))
-    return Telemetry(hours, {name: rows[:, column] for column, name in enumerate(USUAL_SETPOINTS)})
-
-
-def varied_recipe(start: np.datetime64, end: np.datetime64, random: np.random.Generator) -> Telemetry:
-    """Return the recipe hour by hour with each day's levels shifted, so that the data hold what planning may try."""
-    plain = plain_recipe(start, end)
-    hours, rows = plain.time, np.stack([plain[name] for name in USUAL_SETPOINTS], axis=1)
-    day = ((hours - start) // np.timedelta64(1, "D")).astype(int)
-    shift = random.normal(0.0, 1.5, day.max() + 1)[day]
-    carbon = random.uniform(0.6, 1.25, day.max() + 1)[day]
-    lamps = random.random(day.max() + 1)[day] < 0.75
-    rows[:, 0] = np.clip(rows[:, 0] + shift, 12.0, 26.0)
-    rows[:, 1] = np.clip(rows[:, 1] * carbon, 400.0, 1000.0)
-    rows[:, 2] *= lamps
-    return Telemetry(hours, {name: rows[:, column] for column, name in enumerate(USUAL_SETPOINTS)})
 
 
 def default_model(site: Site, *, seed: int = 0, progress: Progress = silent) -> FittedModel:
@@ -114,16 +93,3 @@ def default_model(site: Site, *, seed: int = 0, progress: Progress = silent) -> 
         crop=CropStages(growth, harvest, conversion, maintenance),
         training_range=training_envelope(columns),
     )
-
-
-def equipped(model: FittedModel) -> FittedModel:
-    """Return the model with the capacities of its site's equipment."""
-    greenhouse = model.site.greenhouse
-    rules, held = dict(model.actuation), dict(model.holding)
-    rules["lamp_capacity"] = greenhouse.lamps.power if greenhouse.lamps else 0.0
-    rules["co2_capacity"] = held["co2_capacity"] = greenhouse.co2_dosing_capacity
-    held["heating_capacity"] = greenhouse.heating_capacity
-    for name, screen in (("energy_screen", greenhouse.energy_screen), ("blackout_screen", greenhouse.blackout_screen)):
-        if screen is None:
-            rules |= {f"{name}_unlit": 0.0, f"{name}_lit": 0.0, f"{name}_open": 0.0}
-    return replace(model, actuation=rules, holding=held)

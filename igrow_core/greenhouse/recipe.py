@@ -6,8 +6,9 @@ import numpy as np
 
 from igrow.core.arrays import Floats
 from igrow.core.greenhouse.climate_computer import ClimateComputer
-from igrow.core.quantities import SETPOINTS
+from igrow.core.quantities import SETPOINTS, USUAL_SETPOINTS
 from igrow.core.sun import solar_hour
+from igrow.core.telemetry import Telemetry
 
 COMPUTER = {
     "humidity_setpoint": ClimateComputer().humidity_start,
@@ -46,3 +47,24 @@ def recipe_by_hour(start: np.datetime64, hours: int, longitude: float = 4.53) ->
     times = start + np.arange(hours) * np.timedelta64(3600, "s")
     rows = [COMPUTER | recipe(time, longitude) for time in times]
     return np.array([[row[name] for name in SETPOINTS] for row in rows])
+
+
+def recipe_course(start: np.datetime64, end: np.datetime64) -> Telemetry:
+    """Return the recipe hour by hour, both ends included (UTC)."""
+    hours = np.arange(start, end + np.timedelta64(1, "h"), np.timedelta64(1, "h"))
+    rows = recipe_by_hour(start, len(hours))
+    return Telemetry(hours, {name: rows[:, column] for column, name in enumerate(USUAL_SETPOINTS)})
+
+
+def varied_recipe(start: np.datetime64, end: np.datetime64, random: np.random.Generator) -> Telemetry:
+    """Return the recipe hour by hour with each day's levels shifted, so that the data hold what planning may try."""
+    plain = recipe_course(start, end)
+    hours, rows = plain.time, np.stack([plain[name] for name in USUAL_SETPOINTS], axis=1)
+    day = ((hours - start) // np.timedelta64(1, "D")).astype(int)
+    shift = random.normal(0.0, 1.5, day.max() + 1)[day]
+    carbon = random.uniform(0.6, 1.25, day.max() + 1)[day]
+    lamps = random.random(day.max() + 1)[day] < 0.75
+    rows[:, 0] = np.clip(rows[:, 0] + shift, 12.0, 26.0)
+    rows[:, 1] = np.clip(rows[:, 1] * carbon, 400.0, 1000.0)
+    rows[:, 2] *= lamps
+    return Telemetry(hours, {name: rows[:, column] for column, name in enumerate(USUAL_SETPOINTS)})

@@ -36,6 +36,11 @@ def test_an_import_loads_nothing_heavy(code: str, most: int) -> None:
     assert len(found) < most
 
 
+@pytest.mark.parametrize("command", ["generate", "export", "diagnose", "collect", "publish", "evaluate"])
+def test_only_commands_that_train_load_torch(command: str) -> None:
+    assert "torch" not in loaded_by(f"import igrow.trainer.cli.{command}")
+
+
 def test_the_process_that_sends_a_message_fits_into_its_little_memory() -> None:
     found = loaded_by("import igrow.edge.notifications.sending")
     assert (HEAVY | {"numpy"}) & {name.split(".")[0] for name in found} == set()

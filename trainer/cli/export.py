@@ -9,7 +9,6 @@ from pathlib import Path
 from igrow.core.bundle import default_bundle_folder, self_test
 from igrow.core.errors import IgrowError
 from igrow.core.site import load_site
-from igrow.trainer.default_bundle import equipped
 from igrow.trainer.exporting import export, read_model
 
 EXAMPLE = "igrow-trainer export --site config/site.yaml --out out/first-bundle"
@@ -34,7 +33,7 @@ def run(arguments: argparse.Namespace) -> int:
     site = load_site(arguments.site)
     model = read_model(arguments.bundle or default_bundle_folder(), site)
     if arguments.bundle is None:
-        model = equipped(model)
+        model = model.equipped()
     if arguments.same_greenhouse:
         model = replace(model, calibrated_on=site.name)
     bundle = export(model, arguments.out)

@@ -11,11 +11,11 @@ import numpy as np
 from igrow.core.errors import IgrowError
 from igrow.core.greenhouse import generate_weather, recipe, simulate_many
 from igrow.core.greenhouse.described import parameters_of, parse_effect
+from igrow.core.greenhouse.recipe import varied_recipe
 from igrow.core.greenhouse.weather import WeatherClimate
 from igrow.core.site import load_site
 from igrow.core.telemetry import Telemetry, read_csv, write_csv
 from igrow.trainer.cli.progress import days_done
-from igrow.trainer.default_bundle import varied_recipe
 
 EXAMPLE = "igrow-trainer generate --site config/site.yaml --days 28 --effect wind_infiltration=0.1 --out out/virtual"
 

@@ -128,6 +128,19 @@ class FittedModel:
             errors=tuple(replace(one, after=after.get((one.quantity, one.horizon), one.after)) for one in self.errors),
         )
 
+    def equipped(self) -> FittedModel:
+        """Return the model with the capacities of its site's equipment."""
+        greenhouse = self.site.greenhouse
+        rules, held = dict(self.actuation), dict(self.holding)
+        rules["lamp_capacity"] = greenhouse.lamps.power if greenhouse.lamps else 0.0
+        rules["co2_capacity"] = held["co2_capacity"] = greenhouse.co2_dosing_capacity
+        held["heating_capacity"] = greenhouse.heating_capacity
+        screens = (("energy_screen", greenhouse.energy_screen), ("blackout_screen", greenhouse.blackout_screen))
+        for name, screen in screens:
+            if screen is None:
+                rules |= {f"{name}_unlit": 0.0, f"{name}_lit": 0.0, f"{name}_open": 0.0}
+        return replace(self, actuation=rules, holding=held)
+
     def summary(self) -> str:
         """Return the parameters with their 90 % intervals, the effects and the errors, as a table for people."""
         lines = [repr(self)[len("FittedModel(") : -1]]
