@@ -173,10 +173,7 @@ def sensor_off_by(offset: float, since: float, seed: int) -> Diagnosis:
     ("seed", "within"),
     [
         (7, 0.06),
-        (5, 0.13),
-        pytest.param(
-            5, 0.06, marks=pytest.mark.xfail(strict=True, reason="since stomata close the size is off by an eighth")
-        ),
+        (5, 0.06),
     ],
 )
 def test_a_sensor_that_is_off_from_a_day_on_is_named_with_its_size_and_day(seed: int, within: float) -> None:
