@@ -213,6 +213,13 @@ RESULTS = {
         "300000 and on",
         long=True,
     ),
+    "diagnosis-same-season": Result(
+        "The same greenhouse later, over twelve weeks",
+        ("benchmarks.diagnosis", "same", "--days", "84", "--greenhouses", "2", "--cases", "60", "--history-only"),
+        "The same greenhouses and causes; of a log that is longer than six weeks the newest six are asked.",
+        "300000 and on",
+        long=True,
+    ),
     "diagnosis-omission": Result(
         "A term of the physics that the model lacks from its first day",
         ("benchmarks.diagnosis", "omission", "--greenhouses", "2"),
