@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from igrow.core.bundle import Span
+from igrow.core.bundle import Estimate, Span
 from igrow.core.errors import IgrowError
 from igrow.core.local_time import utc_datetime
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import Log, prepare_log
-from igrow.trainer.diagnosis import Diagnosis, diagnose, history, wording
+from igrow.trainer.diagnosis import Diagnosis, diagnose, history, rounds, wording
 from igrow.trainer.diagnosis.diagnosed_days import newest_weeks, since_calibration
 from igrow.trainer.diagnosis.evidence import errors_with
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, knowledge_of
+from igrow.trainer.diagnosis.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.fit import FittedModel
 from igrow.trainer.fit.discrepancy import Discrepancy
@@ -55,6 +57,21 @@ def test_a_leak_is_named_with_its_size_and_form(leak: Diagnosis) -> None:
     assert size.value == pytest.approx(LEAK, rel=0.15)
     assert size.low < LEAK < size.high
     assert exponent.low < 1.0 < exponent.high
+
+
+def test_a_parameter_that_unseen_days_do_not_bear_out_takes_no_cause_with_it(
+    leak: Diagnosis, leaky_log: Log, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It led by the fitted days, so that the cause had given way to it, and then nothing was told at all."""
+    share = Estimate(-0.4, -0.5, -0.3, "1")
+    leading = ParameterChange("transmissivity", share, None, 0.001, ("transmissivity",), leads=True)
+    monkeypatch.setattr(rounds.Search, "changed_parameter", lambda *_: leading)
+    monkeypatch.setattr(rounds.Change, "changed_parameter", lambda *_: leading)
+    module = sys.modules["igrow.trainer.diagnosis.diagnose"]  # its function has its name
+    monkeypatch.setattr(module, "with_parameter", lambda _days, _knowledge, result, *_: result)
+    told = diagnose(leaky_log, model_in_force())
+    assert told.verdict == leak.verdict
+    assert [one.effect for one in told.findings] == [one.effect for one in leak.findings]
 
 
 def test_with_the_leak_in_it_the_model_predicts_as_with_the_truth_known(leak: Diagnosis) -> None:

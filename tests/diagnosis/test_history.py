@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from igrow.core.effects import EFFECTS
 from igrow.core.simulator.hybrid.nominal import site_record
 from igrow.trainer.diagnosis import amplitudes, history, linear, search
+from igrow.trainer.diagnosis.candidates import Pattern
 from igrow.trainer.diagnosis.change import changed, net_gain, proven_gain
 from igrow.trainer.diagnosis.design import Design, History
 from igrow.trainer.diagnosis.drift import Drift
@@ -125,6 +127,19 @@ def test_a_pattern_that_fits_better_than_every_name_is_not_named() -> None:
     judged = changed(design, 0.0, np.random.default_rng(RNG_SEED))
     assert judged.cause is None
     assert [one.key for one in judged.patterns] == [PATTERN]
+
+
+@pytest.mark.parametrize(("left", "named"), [(0.25, True), (0.6, False)])
+def test_what_hours_leave_beside_a_change_unmakes_its_name_where_it_is_much_of_its_gain(
+    left: float, named: bool
+) -> None:
+    """Of a large change of a slightly other form much is left; of a wrong one as much as it gains."""
+    hours = Pattern("heat", "19 to 11 h", ("hour",))
+    truth = Truth({"lamp_heat": 0.8}, {hours.key: left})
+    design = with_history(make_design(truth, patterns=(hours,), seed=5), 0.01)
+    judged = changed(design, 0.0, np.random.default_rng(RNG_SEED))
+    assert (judged.cause is not None) == named
+    assert [one.key for one in judged.patterns] == ([] if named else [hours.key])
 
 
 def test_effects_that_are_not_to_be_considered_are_no_candidates() -> None:

@@ -11,7 +11,8 @@ from igrow.trainer.diagnosis import linear
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
 from igrow.trainer.diagnosis.linear import Term
-from igrow.trainer.diagnosis.refit import Refitted, are_identifiable, refit
+from igrow.trainer.diagnosis.refit import Refitted, are_identifiable, refit, twins_held
+from igrow.trainer.fit.gaussian import Gaussian
 from tests.diagnosis.conftest import DAYS, STEP, greenhouse_log
 from tests.diagnosis.test_design import prepared
 
@@ -54,3 +55,12 @@ def test_two_ways_for_co2_to_leak_in_are_confounded_and_a_leak_and_a_sensor_are_
     for found, truth in zip(both, (1.0, 2.0), strict=True):
         assert abs(found.term.amplitude - truth) < 3.0 * found.deviation
     assert not are_identifiable(together(design, {"co2_valve_leak": 0.5, "soil_respiration": 0.5}))
+
+
+def test_parameters_that_terms_are_more_of_are_held_and_no_others() -> None:
+    names = ("leakage_wind", "vent_stack", "transmissivity")
+    prior = Gaussian(names, np.array([2.0, 3.0, 0.5]), np.diag([0.4, 0.6, 0.1]) ** 2 + 0.001)
+    held = twins_held(prior, [ActiveTerm("wind_infiltration", 0.1, {}), ActiveTerm("lamp_heat", 0.2, {})])
+    assert (held.names, held.mean.tolist()) == (names, prior.mean.tolist())
+    np.testing.assert_allclose(held.standard_deviation, prior.standard_deviation * np.array([0.1, 1.0, 1.0]))
+    np.testing.assert_allclose(held.correlation, prior.correlation)

@@ -43,7 +43,8 @@ def changed(design: Design, explained: float, rng: np.random.Generator, *, cause
     assert design.history is not None and design.history.drift is not None
     if cause is None or proven_gain(design, cause) < design.history.drift.needed_gain(cause.effect, rules):
         return nothing
-    if pattern is not None and left_by_hour(design, null, cause, rng) >= rules.least_left_by_hour:
+    left = max(rules.least_left_by_hour, rules.left_by_hour_share * net_gain(design, cause))
+    if pattern is not None and left_by_hour(design, null, cause, rng) >= left:
         return replace(nothing, patterns=(pattern,))
     return round_of(design, null, cause, rng)
 

@@ -128,6 +128,12 @@ def may_give_way(kept: Sequence[Estimated]) -> bool:
     return all(EFFECTS[one.effect].kind == "sensor" for one in kept)
 
 
+def predicts_better(log: LogDays, one: Corrected, other: Corrected, rules: DecisionRules) -> bool:
+    """Tell whether a correction predicts days that no fit has seen clearly better than another."""
+    before, after = log.run(other.stages["corrected"]), log.run(one.stages["corrected"])
+    return before is not None and after is not None and freerun.skill(before, after) >= rules.clear_skill
+
+
 def same_in_all_regimes(regimes: Mapping[str, Estimate], rules: DecisionRules) -> bool:
     """Tell whether a cause's size is about the same by day and by night, in calm and in wind, and so on.
 

@@ -21,7 +21,14 @@ from igrow.trainer.data.log import Log
 from igrow.trainer.diagnosis import history, wording
 from igrow.trainer.diagnosis.actuators import Completed, complete, may_hide_in_parameters
 from igrow.trainer.diagnosis.candidates import hidden_by_missing_weather
-from igrow.trainer.diagnosis.correction import Corrected, correct, corrected_model, may_give_way, with_parameter
+from igrow.trainer.diagnosis.correction import (
+    Corrected,
+    correct,
+    corrected_model,
+    may_give_way,
+    predicts_better,
+    with_parameter,
+)
 from igrow.trainer.diagnosis.crop import LEAVES_AND_LIGHT, has_new_crop, of_one_crop, with_its_drift
 from igrow.trainer.diagnosis.diagnosed_days import newest_weeks, since_calibration
 from igrow.trainer.diagnosis.drift import Drift
@@ -138,14 +145,22 @@ class _Question:
             parameter = None
         leads = parameter is not None and parameter.leads
         progress("correcting the model")
-        found, patterns = ([], ()) if leads or waiting or new_crop else (found, last.patterns)
-        result = correct(days, knowledge, found, patterns, site.longitude, rules)
+        nothing_asked = bool(waiting) or new_crop
+        causes, patterns = ([], ()) if leads or nothing_asked else (found, last.patterns)
+        result = correct(days, knowledge, causes, patterns, site.longitude, rules)
         if parameter is not None and not patterns and may_give_way(result.kept):
-            faults = [one.term for one in result.kept] or rivals
+            # A fault of a sensor that gave way to one that leads is its rival on unseen days all the same.
+            told_beside = found if leads and may_give_way(found) else result.kept
+            faults = [one.term for one in told_beside] or rivals
             if parameter.onset is None:
                 result = with_parameter(days, knowledge, result, parameter, faults, rules)
             elif (told := self._since(parameter, parameter.onset.time, log, notes, faults)) is not None:
                 return told
+        if leads and not nothing_asked and (found or last.patterns):
+            # What the search told beside the parameter stands where unseen days do not bear that out, or less.
+            beside = correct(days, knowledge, found, last.patterns, site.longitude, rules)
+            if result.parameter is None or predicts_better(days, beside, result, rules):
+                result, patterns = beside, last.patterns
         verdict, findings = _verdict(completed, result, patterns, rules)
         stages = _stages(result, completed, logged)
         progress("predicting unseen days")

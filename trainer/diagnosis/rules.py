@@ -81,6 +81,9 @@ class DecisionRules:
     least_proven_pattern: float = _tuned(20.0, "of it, what the scatter of day scores must bear out")
     pattern_over_change: float = _tuned(1.5, "times a change's gain at which a pattern replaces it")
     least_left_by_hour: float = _tuned(25.0, "gain of a pattern by the hour beside a change that unmakes its name")
+    left_by_hour_share: float = _tuned(
+        0.4, "the same as a share of the change's own: a large one of a slightly other form leaves much as well"
+    )
 
     # Which parameter has changed, where no effect is missing or none explains as much.
     least_opening_share: float = _chosen(
