@@ -17,6 +17,7 @@ from igrow.core.local_time import utc_datetime
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import Log, prepare_log
 from igrow.trainer.diagnosis import Diagnosis, diagnose, history, rounds, wording
+from igrow.trainer.diagnosis.correction import Corrected, predicts_better
 from igrow.trainer.diagnosis.diagnosed_days import newest_weeks, since_calibration
 from igrow.trainer.diagnosis.evidence import errors_with
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, knowledge_of
@@ -72,6 +73,16 @@ def test_a_parameter_that_unseen_days_do_not_bear_out_takes_no_cause_with_it(
     told = diagnose(leaky_log, model_in_force())
     assert told.verdict == leak.verdict
     assert [one.effect for one in told.findings] == [one.effect for one in leak.findings]
+
+
+def test_of_two_corrections_that_predicts_better_which_has_the_cause(leak: Diagnosis) -> None:
+    assert leak.evidence is not None
+    named, without = (
+        Corrected({"corrected": leak.evidence.stages[stage]}, ()) for stage in ("corrected", "recalibrated")
+    )
+    assert predicts_better(leak.evidence.log, named, without, DEFAULT)
+    assert not predicts_better(leak.evidence.log, without, named, DEFAULT)
+    assert not predicts_better(leak.evidence.log, named, named, DEFAULT)
 
 
 def test_with_the_leak_in_it_the_model_predicts_as_with_the_truth_known(leak: Diagnosis) -> None:
@@ -178,28 +189,17 @@ def test_an_effect_that_is_taken_out_is_not_named(leaky_log: Log) -> None:
     assert "wind_infiltration" not in [one.effect for one in result.findings]
 
 
-@made_once
-def sensor_off_by(offset: float, since: float, seed: int) -> Diagnosis:
+@pytest.mark.parametrize("seed", [7, 5])
+def test_a_sensor_that_is_off_from_a_day_on_is_named_with_its_size_and_day(seed: int) -> None:
     log = greenhouse_log(seed)
     age = np.arange(round(DAYS * 86_400 / STEP)) * STEP / 86_400.0
-    off = np.array(log.telemetry["air_temperature"]) + offset * (age >= since)
-    return diagnose(log.with_columns({"air_temperature": off}), model_in_force())
-
-
-@pytest.mark.parametrize(
-    ("seed", "within"),
-    [
-        (7, 0.06),
-        (5, 0.06),
-    ],
-)
-def test_a_sensor_that_is_off_from_a_day_on_is_named_with_its_size_and_day(seed: int, within: float) -> None:
-    result = sensor_off_by(1.5, 9.4, seed)
+    off = np.array(log.telemetry["air_temperature"]) + 1.5 * (age >= 9.4)
+    result = diagnose(log.with_columns({"air_temperature": off}), model_in_force())
     (found,) = result.findings
     assert (found.effect, found.kind) == ("air_temperature_offset", "sensor")
-    assert found.parameters["offset"].value == pytest.approx(1.5, rel=within)
+    assert found.parameters["offset"].value == pytest.approx(1.5, rel=0.06)
     assert found.parameters["offset"].low < 1.5 < found.parameters["offset"].high
-    began = greenhouse_log(seed).telemetry.time[0] + np.timedelta64(round(9.4 * 24), "h")
+    began = log.telemetry.time[0] + np.timedelta64(round(9.4 * 24), "h")
     assert found.onset is not None
     assert abs(found.onset.time - began) <= np.timedelta64(1, "D")
     assert found.onset.low <= began <= found.onset.high

@@ -60,7 +60,7 @@ def test_two_ways_for_co2_to_leak_in_are_confounded_and_a_leak_and_a_sensor_are_
 def test_parameters_that_terms_are_more_of_are_held_and_no_others() -> None:
     names = ("leakage_wind", "vent_stack", "transmissivity")
     prior = Gaussian(names, np.array([2.0, 3.0, 0.5]), np.diag([0.4, 0.6, 0.1]) ** 2 + 0.001)
-    held = twins_held(prior, [ActiveTerm("wind_infiltration", 0.1, {}), ActiveTerm("lamp_heat", 0.2, {})])
+    held = twins_held(prior, [ActiveTerm("wind_infiltration", 0.1, {}), ActiveTerm("lamp_heat", 0.2, {})], 0.1)
     assert (held.names, held.mean.tolist()) == (names, prior.mean.tolist())
     np.testing.assert_allclose(held.standard_deviation, prior.standard_deviation * np.array([0.1, 1.0, 1.0]))
     np.testing.assert_allclose(held.correlation, prior.correlation)

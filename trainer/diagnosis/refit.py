@@ -33,8 +33,6 @@ _DIFFERENCE = 0.05
 """Finite difference of a knob, in its scale."""
 _LEAST_SCALE = 0.2
 """Of an amplitude, in typical ones, however small it is."""
-_TWIN = 0.1
-"""Of its standard deviation, by which a parameter may move beside a term that is more of it."""
 _AT_BOUND = 1e-6
 """Share of its range within which a knob lies on its bound."""
 
@@ -201,7 +199,7 @@ def _unknowns(design: Design, terms: Sequence[ActiveTerm], before: Sequence[Acti
             knobs.append(
                 Knob(index, one.name, one.low, one.high, design.rules.nonlinear_spread * (one.high - one.low), True)
             )
-    prior = design.prior if design.history is None else twins_held(design.prior, terms)
+    prior = design.prior if design.history is None else twins_held(design.prior, terms, design.rules.twin_drift)
     low, high = bounds(prior.names)
     blocks = [design.block(name) for name in NULL[1:]]
     parts: list[tuple[Floats, Floats]] = [(prior.mean, prior.covariance)]
@@ -231,14 +229,19 @@ def _unknowns(design: Design, terms: Sequence[ActiveTerm], before: Sequence[Acti
     )
 
 
-def twins_held(prior: Gaussian, terms: Sequence[ActiveTerm]) -> Gaussian:
+def twins_held(prior: Gaussian, terms: Sequence[ActiveTerm], share: float) -> Gaussian:
     """Return a prior in which the parameters that terms are more of hardly move: else they would take the terms over.
 
     In a greenhouse whose history is known they have drifted by far less than a term that was found.
+
+    Args:
+        prior: of all parameters.
+        terms: that were found.
+        share: of their standard deviations that such parameters keep.
     """
     twins = {twin for one in terms for twin in EFFECTS[one.effect].resembles}
-    share = np.array([_TWIN if name in twins else 1.0 for name in prior.names])
-    return Gaussian(prior.names, prior.mean, prior.covariance * np.outer(share, share))
+    kept = np.array([share if name in twins else 1.0 for name in prior.names])
+    return Gaussian(prior.names, prior.mean, prior.covariance * np.outer(kept, kept))
 
 
 def _refitted(unknowns: _Unknowns, solution: solver.Solution, view: _View) -> list[Refitted]:

@@ -84,6 +84,7 @@ class DecisionRules:
     left_by_hour_share: float = _tuned(
         0.4, "the same as a share of the change's own: a large one of a slightly other form leaves much as well"
     )
+    twin_drift: float = _tuned(0.1, "share of its drift that a parameter keeps beside a change that is more of it")
 
     # Which parameter has changed, where no effect is missing or none explains as much.
     least_opening_share: float = _chosen(
