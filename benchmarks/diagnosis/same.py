@@ -27,7 +27,7 @@ from igrow.core.effects import EFFECTS
 from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.diagnosis import DEFAULT
-from igrow.trainer.diagnosis.drift import read_drift
+from igrow.trainer.diagnosis.null_gains import read_null_gains
 
 CASES, DAYS = 60, 28
 SEEDS = {"tuning": 200_000, "scoring": 300_000}
@@ -103,7 +103,7 @@ def table(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int, str]]:
         "-",
     )
     alone = [one for one in of("single", size=1.0) if one.expected_gain is not None]
-    enough = read_drift().least_gain
+    enough = read_null_gains().least
     share(
         "oracle: gain enough at ENR 1, were the structure right",
         alone,

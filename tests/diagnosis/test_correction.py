@@ -80,10 +80,12 @@ def test_beside_another_a_cause_must_do_more(values: dict[str, float], stays: bo
 @pytest.mark.parametrize(
     ("values", "stays"),
     [
-        ({"skill": 0.0, "bootstrap_p": 0.4}, True),
-        ({"skill": 0.0, "bootstrap_p": 0.6}, False),
-        ({"skill": -0.02, "bootstrap_p": 0.1}, False),
-        ({"skill": 0.0, "bootstrap_p": 0.1, "effect_to_noise": 0.1}, False),
+        ({"change_skill": 0.03, "bootstrap_p": 0.9}, True),
+        ({"skill": 0.04, "change_skill": -0.1, "bootstrap_p": 0.9}, True),
+        ({"skill": 0.02, "change_skill": 0.0, "bootstrap_p": 0.1}, True),
+        ({"skill": 0.02, "change_skill": 0.0, "bootstrap_p": 0.4}, False),
+        ({"skill": 0.02, "change_skill": -0.01, "bootstrap_p": 0.1}, False),
+        ({"change_skill": 0.1, "bootstrap_p": 0.1, "effect_to_noise": 0.1}, False),
     ],
 )
 def test_a_change_must_not_make_unseen_days_worse(values: dict[str, float], stays: bool) -> None:

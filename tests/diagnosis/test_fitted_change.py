@@ -13,10 +13,10 @@ from igrow.trainer.data import Log
 from igrow.trainer.diagnosis import DEFAULT, fitted_change, linear, rounds
 from igrow.trainer.diagnosis.candidates import Candidate
 from igrow.trainer.diagnosis.compare import Round
-from igrow.trainer.diagnosis.drift import Drift
 from igrow.trainer.diagnosis.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, knowledge_of
 from igrow.trainer.diagnosis.linear import Term
+from igrow.trainer.diagnosis.null_gains import NullGains
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.fit import evaluation
 from tests.diagnosis.conftest import model_in_force
@@ -86,11 +86,10 @@ def test_beside_a_cause_that_was_found_before_fits_are_asked_with_it(monkeypatch
     asked: list[tuple[ActiveTerm, ...]] = []
     monkeypatch.setattr(rounds, "changed", lambda *_, **__: Round(design, null, null, None, ()))
     monkeypatch.setattr(fitted_change, "find", lambda _days, known, *_: asked.append(known.terms))
-    monkeypatch.setattr(rounds.Change, "_expected", lambda *_: design)
     known = knowledge_of(model_in_force(), SITE, DEFAULT)
     unasked = cast(Any, None)
     search = rounds.Change(
-        unasked, SITE, known, frozenset(), DEFAULT, unasked, unasked, design, np.zeros(0), Drift({}, 42.0)
+        unasked, SITE, known, frozenset(), DEFAULT, unasked, unasked, design, np.zeros(0), NullGains({})
     )
     term = ActiveTerm("co2_offset", 80.0, {})
     found = [cast(Any, SimpleNamespace(term=term, gain=50.0))]

@@ -13,7 +13,7 @@ from igrow.trainer.diagnosis import amplitudes, history, linear, search
 from igrow.trainer.diagnosis.candidates import Pattern
 from igrow.trainer.diagnosis.change import changed, net_gain, proven_gain
 from igrow.trainer.diagnosis.design import Design, History
-from igrow.trainer.diagnosis.drift import Drift
+from igrow.trainer.diagnosis.null_gains import NullGains
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
@@ -22,7 +22,7 @@ from tests.virtual_log import SITE, virtual_log
 
 RNG_SEED = 3
 PATTERN = "heat:cold weather"
-BARE = Drift({}, 42.0)
+BARE = NullGains({})
 """Nothing was learned."""
 
 
@@ -30,7 +30,7 @@ def with_history(design: Design, deviation: float = 0.3, **own: float) -> Design
     """The design with a history that expects nothing, give or take a deviation of every amplitude."""
     names = amplitudes.keys(design)
     prior = Gaussian(names, np.zeros(len(names)), deviation**2 * np.eye(len(names)))
-    known = History(prior, np.zeros_like(design.values[0]), (PLAIN,) * BALANCES, own, drift=BARE)
+    known = History(prior, np.zeros_like(design.values[0]), (PLAIN,) * BALANCES, own, null_gains=BARE)
     _, solved = history.solve_jointly(replace(design, history=known))
     return solved
 
@@ -71,13 +71,21 @@ def test_what_drifts_is_added_to_what_is_not_known() -> None:
         design.line.record.time[0],
     )
     drift = amplitudes.drift_within(design)
-    now = history.drifted(known, design, Drift({}, 365.0)).covariance
+    now = history.drifted(known, design).covariance
     np.testing.assert_allclose(now[:-1, :-1], root @ root.T + np.diag(drift[:-1] ** 2))
     # The pattern is new in this log: its prior is that of before any log.
     assert np.isclose(now[-1, -1], DEFAULT.omission_pattern**2 + DEFAULT.pattern_drift**2)
     walls, crop = 2.0 * DEFAULT.wall_drift, 2.0 * DEFAULT.crop_drift
     typical = EFFECTS["lamp_heat"].amplitude.typical
     np.testing.assert_allclose(drift[:4], [walls, crop, walls, DEFAULT.effect_drift * typical])
+
+
+def test_a_later_log_may_have_drifted_as_far_as_a_walk_goes() -> None:
+    design = in_real_parameters(make_design(seed=2))
+    soon, late = (amplitudes.drift_over(design, days) for days in (DEFAULT.later_days, 4.0 * DEFAULT.later_days))
+    np.testing.assert_allclose(late, 2.0 * soon)
+    np.testing.assert_allclose(amplitudes.drift_over(design, 1.0), soon)
+    assert np.all(soon >= amplitudes.drift_within(design))
 
 
 def test_of_vents_that_hardly_open_any_more_nothing_is_asked() -> None:
@@ -161,5 +169,5 @@ def test_a_change_that_comes_and_goes_from_day_to_day_is_not_proven() -> None:
     null = linear.fit(fickle.grams, fickle.null_model())
     scored = search.score_candidates(fickle, null, [None], np.random.default_rng(0))
     (found,) = [one for one in scored if one.effect == "lamp_heat"]
-    assert net_gain(fickle, found) > BARE.least_gain > proven_gain(fickle, found)
+    assert net_gain(fickle, found) > BARE.least > proven_gain(fickle, found)
     assert changed(fickle, 0.0, np.random.default_rng(RNG_SEED)).cause is None

@@ -26,7 +26,7 @@ from igrow.trainer.diagnosis import (
     wording,
 )
 from igrow.trainer.diagnosis.design import Design, History
-from igrow.trainer.diagnosis.drift import Drift
+from igrow.trainer.diagnosis.null_gains import NullGains
 from igrow.trainer.diagnosis.parameter_change import find
 from igrow.trainer.diagnosis.visible_parameters import VISIBLE, members
 from igrow.trainer.fit import FittedModel
@@ -69,7 +69,7 @@ def with_parameters(truth: Truth, seed: int, *, names: Sequence[str] = NAMES, **
         np.zeros_like(design.values[0]),
         (PLAIN,) * BALANCES,
         {},
-        drift=Drift({}, 42.0, gains),
+        null_gains=NullGains(gains),
     )
     _, solved = history.solve_jointly(replace(design, history=known))
     return solved

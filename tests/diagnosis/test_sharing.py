@@ -1,4 +1,4 @@
-"""What a greenhouse tells others: its log's own word on parameters, discrepancy and change, and no row of the log."""
+"""What a greenhouse tells others: its log's own word on parameters and discrepancy, and no row of the log."""
 
 from __future__ import annotations
 
@@ -8,16 +8,11 @@ import numpy as np
 import pytest
 
 from igrow.trainer.diagnosis import DEFAULT, learned_from
-from igrow.trainer.diagnosis.amplitudes import drift_within, omission, units
-from igrow.trainer.diagnosis.drift import Drift
-from igrow.trainer.diagnosis.history import change_of
-from igrow.trainer.diagnosis.sharing import pair
+from igrow.trainer.diagnosis.amplitudes import omission
 from igrow.trainer.fit import FittedModel
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.population import Learned, learn_population
-from tests.diagnosis.synthetic_design import Truth, make_design
-from tests.diagnosis.test_history import in_real_parameters, with_history
 from tests.virtual_log import SITE
 
 EFFECT, PATTERN = "lamp_heat", "heat:cold weather"
@@ -47,22 +42,3 @@ def test_what_several_greenhouses_miss_is_expected_of_a_further_one() -> None:
     assert 0.5 < mean[0] / before[0] < 0.8
     assert deviation[0] < before[0]
     assert (mean[1], deviation[1]) == (0.0, before[1]), "of what nobody saw nothing is known"
-
-
-def test_a_change_is_shared_at_the_time_that_rates_count_for() -> None:
-    plain = in_real_parameters(make_design(Truth({EFFECT: 0.4}, {}), seed=2))
-    design = with_history(plain)
-    assert design.history is not None
-    time = plain.line.record.time
-    middle = time[0] + (time[-1] - time[0]) / 2
-    known = Discrepancy(
-        plain.prior.values, design.history.amplitudes, {}, 3600.0, {}, middle - np.timedelta64(168, "D")
-    )
-    told = pair(known, plain, design, 42.0)
-    np.testing.assert_allclose(told.unit, 2.0 * units(plain))  # four times as long: twice the walk
-    np.testing.assert_allclose(told.unit * told.expected, change_of(known, plain, Drift({}, 42.0)))
-    np.testing.assert_allclose(told.expected * units(plain), drift_within(plain))
-    np.testing.assert_allclose(told.known, known.amplitudes.covariance, atol=1e-12)
-    count = len(told.keys)
-    assert {one.shape for one in (told.unit, told.expected, told.score)} == {(count,)}
-    assert told.information.shape == (count, count), "products over all days, no row of the log"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -14,7 +13,6 @@ from igrow.core.bundle import read_bundle
 from igrow.core.simulator.hybrid.nominal import nominal
 from igrow.trainer.cli import fleet as cli
 from igrow.trainer.cli import main
-from igrow.trainer.diagnosis.drift import Pair, read_drift
 from igrow.trainer.fit.population import read_population
 from igrow.trainer.fleet.registry import load_registry
 from igrow.trainer.service import history
@@ -61,29 +59,12 @@ def test_what_three_sites_share_is_the_fourths_prior_and_no_row_of_a_log_is_in_i
     assert set(shared) == {"shift", "variance"}
 
 
-def test_a_long_log_tells_how_a_site_changes_and_three_of_these_make_the_fleets_drift(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(cli, "utc_now", lambda: datetime(2020, 3, 23, tzinfo=UTC))
-    options = "{" + ", ".join(f"{name}: {{learning: true}}" for name in NAMES[:3]) + "}"
-    fleet = make_fleet(tmp_path, NAMES[:3], sites=options)
-    log = virtual_log(50, seed=1, step=HOUR, added=disturbances(50, HOUR, 1))
-    for name in NAMES[:3]:
-        Archive(fleet / "state" / "archive").add_telemetry(name, log)
-    assert main(["fleet", "learn", str(fleet), "--site", "one"]) == 2, "one is too few"
-    assert "; how it changes" in capsys.readouterr().out
-    folder = fleet / "state" / "sites" / "one"
-    told = Pair.from_bytes((folder / "change.npz").read_bytes(), where="one")
-    assert told.information.shape == (len(told.keys),) * 2
-    for name in NAMES[1:3]:
-        shutil.copytree(folder, fleet / "state" / "sites" / name)
-    entries = load_registry(fleet).entries
-    assert "how 3 sites change" in cli.write_shared(load_registry(fleet), entries)
-    known, came = read_drift(fleet / "state" / "drift.json"), read_drift()
-    assert known.rates != came.rates
-    assert known.null_gains == came.null_gains
-    assert cli.shared(entries[0], load_registry(fleet).drift) == str(fleet / "state" / "drift.json")
-    assert cli.shared(replace(entries[0], learning=False), load_registry(fleet).drift) is None, "who gives nothing"
+def test_what_sites_share_goes_to_those_alone_that_share(fleet: Path) -> None:
+    entry = load_registry(fleet).entries[0]
+    (file := fleet / "shared.json").write_text("{}")
+    assert cli.shared(entry, file) == str(file)
+    assert cli.shared(replace(entry, learning=False), file) is None, "who gives nothing"
+    assert cli.shared(entry, fleet / "none.json") is None
 
 
 def test_a_site_without_a_bundle_is_calibrated_and_published_once(

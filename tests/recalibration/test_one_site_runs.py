@@ -42,7 +42,7 @@ def diagnosed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Put a diagnosis of no time in the place of the real one; collects the bundles that it is asked to build on."""
     asked: list[str] = []
 
-    def diagnose(site, log, bundle, target, drift):
+    def diagnose(site, log, bundle, target):
         asked.append(bundle.identity)
         errors = {"air_temperature": {"24_h": {"deployed": 1.0, "corrected": 0.8}}}
         causes = (SimpleNamespace(effect="wind_infiltration"),)

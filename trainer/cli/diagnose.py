@@ -15,7 +15,6 @@ from igrow.trainer.cli.common import replace_bundle
 from igrow.trainer.cli.log_arguments import add_log_arguments, log_of, typed
 from igrow.trainer.cli.progress import progress
 from igrow.trainer.diagnosis import diagnose
-from igrow.trainer.diagnosis.drift import read_drift
 from igrow.trainer.diagnosis.evidence import errors_with
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
 from igrow.trainer.exporting import read_model
@@ -29,9 +28,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_log_arguments(parser)
     parser.add_argument("--bundle", type=Path, help="the bundle in force (default: the built-in one)")
     parser.add_argument("--out", type=Path, required=True, help="folder for diagnosis.json, report.html and the bundle")
-    parser.add_argument(
-        "--drift", type=Path, metavar="FILE", help="what `igrow-trainer fleet learn` wrote of how greenhouses change"
-    )
     parser.add_argument("--without", action="append", default=[], metavar="EFFECT", help="an effect not to consider")
     parser.add_argument(
         "--truth",
@@ -55,9 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
     log = log_of(arguments)
     model = read_model(bundle, log.known_site)
     with progress("diagnosing") as say:
-        result = diagnose(
-            log, model, without=arguments.without, seed=arguments.seed, drift=read_drift(arguments.drift), progress=say
-        )
+        result = diagnose(log, model, without=arguments.without, seed=arguments.seed, progress=say)
         say("writing the report")
         write_diagnosis(arguments.out, result, arguments.language, typed(arguments))
         if result.findings:

@@ -14,7 +14,7 @@ from igrow.trainer.fleet.overview import SiteRow, overview, utc
 from igrow.trainer.fleet.registry import Entry, Registry, load_registry
 from igrow.trainer.fleet.runner import run_tasks
 from igrow.trainer.fleet.tasks import Ending, Task, TaskOutcome
-from igrow.trainer.fleet.work import CHANGE, LATER_DAYS, LEARNED
+from igrow.trainer.fleet.work import LEARNED
 from igrow.trainer.service import history
 from igrow.trainer.service.recalibration import DAYS
 from igrow.trainer.service.site_memory import site_folder
@@ -34,13 +34,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     diagnose = actions.add_parser("diagnose", help="diagnose now, publish nothing")
     recalibrate = actions.add_parser("recalibrate", help="diagnose the sites that are due, and publish what is better")
     calibrate = actions.add_parser("calibrate", help="calibrate sites without a bundle of their own, and publish it")
-    learn = actions.add_parser("learn", help="learn from the sites that share it where they lie and how they change")
+    learn = actions.add_parser(
+        "learn", help="learn from the sites that share it where they lie, and what models of them miss"
+    )
     publish = actions.add_parser("publish", help="sign again what expires soon")
     for one in (status, collect, diagnose, recalibrate, calibrate, learn, publish):
         one.add_argument("fleet", type=Path, help="folder with fleet.yaml and sites/")
         one.add_argument("--site", action="append", default=[], metavar="NAME", help="only this one; may be repeated")
     status.add_argument("--page", type=Path, metavar="FOLDER", help="write the page and the reports into this folder")
-    for one, days in ((diagnose, DAYS), (recalibrate, DAYS), (calibrate, DAYS), (learn, DAYS + LATER_DAYS)):
+    for one, days in ((diagnose, DAYS), (recalibrate, DAYS), (calibrate, DAYS), (learn, DAYS)):
         one.add_argument("--days", type=int, default=days, help=f"newest days of the log (default {days})")
     collect.add_argument("--take-over", action="store_true", help="go on where another archive has collected so far")
     recalibrate.add_argument("--force", action="store_true", help="also the sites that are not due")
@@ -92,8 +94,8 @@ def make_task(arguments: argparse.Namespace, registry: Registry, entry: Entry, n
     common |= {"exchange": exchange} if arguments.action != "learn" else {}
     site, file, keys = entry.site.name, str(entry.file.resolve()), str(registry.keys.resolve())
     asked = vars(arguments)
-    days, drift = asked.get("days"), shared(entry, registry.drift)
-    again = {"file": file, "keys": keys, "days": days, "drift": drift}
+    days = asked.get("days")
+    again = {"file": file, "keys": keys, "days": days}
     population, forward = shared(entry, registry.population), registry.file.forward
     function, own = {
         "collect": ("collect_site", {"site": site, "forward_to": forward, "take_over": asked.get("take_over")}),
@@ -128,21 +130,13 @@ def shared(entry: Entry, file: Path) -> str | None:
 
 def write_shared(registry: Registry, entries: Sequence[Entry]) -> str:
     """Put together what sites have learned; returns a sentence a file. Raises IgrowError where too few have."""
-    from igrow.trainer.diagnosis import drift  # noqa: PLC0415  (status needs no scipy)
-    from igrow.trainer.fit.population import learn_population, read_learned  # noqa: PLC0415
+    from igrow.trainer.fit.population import learn_population, read_learned  # noqa: PLC0415  (status needs no scipy)
 
     folders = [site_folder(registry.state, entry.site.name) for entry in entries]
     population = learn_population([read_learned(one / LEARNED) for one in folders if (one / LEARNED).exists()])
     population.write(registry.population)
-    lines = [f"wrote {registry.population}: {len(population.mean)} parameters, effects and patterns "
-             f"of {population.sites} sites"]  # fmt: skip
-    changes = [one / CHANGE for one in folders if (one / CHANGE).exists()]
-    if len(changes) >= drift.LEAST_PAIRS:
-        known = drift.read_drift()
-        pairs = [drift.Pair.from_bytes(one.read_bytes(), where=str(one)) for one in changes]
-        drift.write_drift(registry.drift, drift.learn(pairs, known.days, known))
-        lines.append(f"wrote {registry.drift}: how {len(pairs)} sites change")
-    return "\n".join(lines)
+    count = len(population.mean)
+    return f"wrote {registry.population}: {count} parameters, effects and patterns of {population.sites} sites"
 
 
 def remember(registry: Registry, action: str, outcome: TaskOutcome, now: datetime) -> None:

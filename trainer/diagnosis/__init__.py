@@ -8,10 +8,11 @@ models that are fitted to some and judged on others), `actuators` and `open_vent
 sensor must show), `sensitivity` (day runs of the model, and how they depend on everything), `candidates`, `noise`,
 `recalibration`, `design` (errors and candidates in named blocks), `linear` and `search` (a scan of all candidates),
 `rounds` (one cause after the other), `compare` (the best of them beside their own noise) or, where the greenhouse's
-own calibration log taught what is missing even then, `amplitudes`, `history`, `drift` and `change` (what has changed
-since; `parameter_change` asks that of the parameters, `omission` what it lacked from the first day), `estimate`,
-`refit` (size, beginning, confounded causes), `correction` (what stands on unseen days), `wording`, `result`. `rules`
-holds every threshold, `nuisance` what greenhouses show though nothing is missing, `sharing` what one tells others.
+own calibration log taught what is missing even then, `amplitudes`, `history`, `null_gains` and `change` (what has
+changed since; `parameter_change` asks that of the parameters, `omission` what it lacked from the first day),
+`estimate`, `refit` (size, beginning, confounded causes), `confirmation` (the same by free runs), `correction` (what
+stands on unseen days), `wording`, `result`. `rules` holds every threshold, `nuisance` what greenhouses show though
+nothing is missing, `sharing` what one tells others.
 docs/method.md tells why.
 """
 
@@ -21,7 +22,7 @@ from igrow.trainer.diagnosis.nuisance import NuisanceSubspace, discrepancy_of, r
 from igrow.trainer.diagnosis.omission import examine
 from igrow.trainer.diagnosis.result import EXIT_CODES, Diagnosis, Finding
 from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules
-from igrow.trainer.diagnosis.sharing import change_since, learned_from
+from igrow.trainer.diagnosis.sharing import learned_from
 
 __all__ = [
     "DEFAULT",
@@ -30,7 +31,6 @@ __all__ = [
     "Diagnosis",
     "Finding",
     "NuisanceSubspace",
-    "change_since",
     "diagnose",
     "discrepancy_of",
     "examine",

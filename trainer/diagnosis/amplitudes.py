@@ -9,8 +9,11 @@ import numpy as np
 from igrow.core.arrays import Floats
 from igrow.core.effects import EFFECTS
 from igrow.trainer.diagnosis.design import JOINT, Design
-from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, drift, home_drift
+from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, home_drift
 from igrow.trainer.diagnosis.rules import DecisionRules
+
+CO2_SOURCES = frozenset({"soil_respiration", "co2_valve_leak"})
+"""What a growing crop looks like."""
 
 
 def columns(design: Design) -> list[int]:
@@ -24,19 +27,6 @@ def keys(design: Design) -> tuple[str, ...]:
     return (*parameters, *design.block("effect").labels, *design.block("pattern").labels)
 
 
-def rate_keys(design: Design) -> tuple[str, ...]:
-    """Return the keys of everything that may be missing, as a drift has them: an effect has one at all shapes."""
-    parameters = (PARAMETER_PREFIX + name for name in design.block("parameter").labels)
-    return (*parameters, *(one.effect for one in design.candidates), *design.block("pattern").labels)
-
-
-def units(design: Design) -> Floats:
-    """Return the size of a change of rate one, (k,)."""
-    return np.concatenate([
-        drift(design.prior.values, 1.0, design.rules), _typical(design), np.ones(len(design.patterns))
-    ])  # fmt: skip
-
-
 def drift_within(design: Design) -> Floats:
     """Return the standard deviation of the change of everything within some weeks, by physics, (k,)."""
     rules = design.rules
@@ -45,6 +35,22 @@ def drift_within(design: Design) -> Floats:
         rules.effect_drift * _typical(design),
         np.full(len(design.patterns), rules.pattern_drift),
     ])  # fmt: skip
+
+
+def drift_over(design: Design, days: float) -> Floats:
+    """Return the same within so many days, (k,): beyond some weeks as a random walk.
+
+    Args:
+        design: of a later log.
+        days: from the middle of the calibration log to that of the later one.
+    """
+    rules = design.rules
+    sources = [rules.co2_source_drift * (one.effect in CO2_SOURCES) for one in design.candidates]
+    parameters, patterns = np.zeros(len(design.block("parameter"))), np.zeros(len(design.patterns))
+    least = np.concatenate([parameters, sources * _typical(design), patterns])
+    longer = max(days, rules.later_days) / rules.later_days
+    change: Floats = np.maximum(drift_within(design), least) * np.sqrt(longer)
+    return change
 
 
 def omission(names: Sequence[str], rules: DecisionRules) -> Floats:

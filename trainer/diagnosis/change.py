@@ -40,8 +40,8 @@ def changed(design: Design, explained: float, rng: np.random.Generator, *, cause
         needed = max(rules.least_pattern_change, rules.pattern_over_change * gained, explained)
         if net_gain(design, pattern) >= needed and proven_gain(design, pattern) >= rules.least_proven_pattern:
             return replace(nothing, patterns=(pattern,))
-    assert design.history is not None and design.history.drift is not None
-    if cause is None or proven_gain(design, cause) < design.history.drift.needed_gain(cause.effect, rules):
+    assert design.history is not None and design.history.null_gains is not None
+    if cause is None or proven_gain(design, cause) < design.history.null_gains.needed(cause.effect):
         return nothing
     left = max(rules.least_left_by_hour, rules.left_by_hour_share * net_gain(design, cause))
     if pattern is not None and left_by_hour(design, null, cause, rng) >= left:

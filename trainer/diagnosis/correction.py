@@ -14,6 +14,7 @@ from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator.crop import CropStages
 from igrow.trainer.diagnosis import freerun
 from igrow.trainer.diagnosis.candidates import Pattern, pattern_fluxes
+from igrow.trainer.diagnosis.confirmation import confirmed
 from igrow.trainer.diagnosis.estimate import Estimated, normal_quantile
 from igrow.trainer.diagnosis.freerun import LogDays, Stage
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, home_drift
@@ -62,19 +63,28 @@ def correct(
     """
     current = recalibrated = Stage(log.fit(knowledge.prior, knowledge.terms), knowledge.terms)
     kept: list[Estimated] = []
-    for one in found:
+    for place, one in enumerate(found, 1):
+        beside = (*current.terms, *(later.term for later in found[place:]))
+        try:
+            asked = one if knowledge.history is None else confirmed(log, knowledge, beside, one, rules)
+        except DivergenceError:
+            break
+        if asked is None:
+            break
         # Where the effect takes over what recalibration had put into the parameters, the fit starts there.
-        begin = {name: value + one.shift.get(name, 0.0) for name, value in current.posterior.values.items()}
-        terms = (*current.terms, one.term)
+        begin = {name: value + asked.shift.get(name, 0.0) for name, value in current.posterior.values.items()}
+        terms = (*current.terms, asked.term)
         try:
             trial = Stage(log.fit(knowledge.prior, terms, begin), terms)
         except DivergenceError:
-            continue
-        judged = _judged(log, one, current, trial)
+            break
+        judged = _judged(log, asked, current, trial)
         proven = stands if knowledge.history is None else is_proven_change
-        if proven(judged, kept, rules):
-            kept.append(judged)
-            current = trial
+        if not proven(judged, kept, rules):
+            # What was found after it was found beside it.
+            break
+        kept.append(judged)
+        current = trial
     if patterns:
         current = _with_patterns(log, knowledge, current, patterns, longitude, rules)
     stages = {
@@ -96,18 +106,14 @@ def stands(one: Estimated, kept: Sequence[Estimated], rules: DecisionRules) -> b
 
 
 def is_proven_change(one: Estimated, kept: Sequence[Estimated], rules: DecisionRules) -> bool:
-    """Tell whether a change stands, if only by making unseen days likelier; one beside others must do more.
+    """Tell whether a change stands: makes a day ahead better, or single steps of unseen days likelier at no loss.
 
-    Skill alone is too much to ask: over a day parameters within their drift can stand in for a change that single
-    steps show.
+    What comes on few days, as rain does, may show on none of the unseen ones.
     """
-    if stands(one, kept, rules):
-        return True
-    if kept:
-        return _is_large(one, rules) and _adds_to(one, kept, rules)
-    # A few held-out days are no second test of a gain that all others bear out: they must not clearly speak against it.
-    likelier = one.bootstrap_p <= rules.largest_bootstrap_p
-    return _is_large(one, rules) and one.skill >= rules.least_change_skill and likelier
+    if not _is_large(one, rules) or (kept and not _adds_to(one, kept, rules)):
+        return False
+    likelier = one.bootstrap_p <= rules.further_bootstrap_p and one.change_skill >= 0.0
+    return likelier or one.change_skill >= rules.clear_change_skill or one.skill >= rules.clear_skill
 
 
 def _is_large(one: Estimated, rules: DecisionRules) -> bool:
@@ -128,6 +134,14 @@ def may_give_way(kept: Sequence[Estimated]) -> bool:
     return all(EFFECTS[one.effect].kind == "sensor" for one in kept)
 
 
+def explains_as_well(kept: Sequence[Estimated], parameter: ParameterChange, rules: DecisionRules) -> bool:
+    """Tell whether causes explain so much of a log that they may stand in the place of a parameter that leads.
+
+    Where they explain far less they stand in for a part of its change, though unseen days did not bear it out either.
+    """
+    return rules.most_parameter_over_found * sum(one.gain for one in kept) >= parameter.gain
+
+
 def predicts_better(log: LogDays, one: Corrected, other: Corrected, rules: DecisionRules) -> bool:
     """Tell whether a correction predicts days that no fit has seen clearly better than another."""
     before, after = log.run(other.stages["corrected"]), log.run(one.stages["corrected"])
@@ -144,12 +158,15 @@ def same_in_all_regimes(regimes: Mapping[str, Estimate], rules: DecisionRules) -
 
 
 def _judged(log: LogDays, one: Estimated, current: Stage, trial: Stage) -> Estimated:
-    """Return the cause with its size and skill on unseen days."""
-    before, after = log.run(current), log.run(trial)
-    plain = log.run(replace(trial, terms=current.terms))
-    if before is None or after is None or plain is None:
+    """Return the cause with its skill on unseen days, and how large it is on all of them.
+
+    What comes on few days, as rain does, may hardly have come on those that no fit has seen.
+    """
+    before, after, every = log.run(current), log.run(trial), log.unseen()
+    plain, moved = every.run(replace(trial, terms=current.terms)), every.run(trial)
+    if before is None or after is None or plain is None or moved is None:
         return one
-    return replace(one, effect_to_noise=freerun.effect_to_noise(plain, after), skill=freerun.skill(before, after))
+    return replace(one, effect_to_noise=freerun.effect_to_noise(plain, moved), skill=freerun.skill(before, after))
 
 
 def with_parameter(

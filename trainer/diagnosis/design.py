@@ -27,10 +27,10 @@ from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.data.splits import DaySplit
 from igrow.trainer.diagnosis import candidates, linear, noise, possible_air, sensitivity
 from igrow.trainer.diagnosis.candidates import Candidate, EffectColumns, Pattern
-from igrow.trainer.diagnosis.drift import Drift
 from igrow.trainer.diagnosis.knowledge import drift
 from igrow.trainer.diagnosis.linear import DailyGrams, LinearModel
 from igrow.trainer.diagnosis.noise import NoiseFilter, Whitening
+from igrow.trainer.diagnosis.null_gains import NullGains
 from igrow.trainer.diagnosis.recalibration import Averaging, averaging, recalibrate
 from igrow.trainer.diagnosis.rules import HOUR, DecisionRules
 from igrow.trainer.diagnosis.sensitivity import Linearisation
@@ -58,8 +58,8 @@ class History:
     """Of effects and patterns in windows of the calibration log."""
     without: frozenset[str] = frozenset()
     """Effects that are no candidates, though they may have been there before."""
-    drift: Drift | None = None
-    """Of greenhouses; None in the calibration log itself."""
+    null_gains: NullGains | None = None
+    """Of greenhouses in which nothing has changed; None in the calibration log itself."""
 
 
 @dataclass(frozen=True)

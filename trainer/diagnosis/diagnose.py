@@ -25,18 +25,19 @@ from igrow.trainer.diagnosis.correction import (
     Corrected,
     correct,
     corrected_model,
+    explains_as_well,
     may_give_way,
     predicts_better,
     with_parameter,
 )
 from igrow.trainer.diagnosis.crop import LEAVES_AND_LIGHT, has_new_crop, of_one_crop, with_its_drift
 from igrow.trainer.diagnosis.diagnosed_days import newest_weeks, since_calibration
-from igrow.trainer.diagnosis.drift import Drift
 from igrow.trainer.diagnosis.estimate import normal_quantile
 from igrow.trainer.diagnosis.evidence import Evidence
 from igrow.trainer.diagnosis.freerun import HORIZONS, FreeRuns, LogDays, Stage, log_days, mean_absolute_errors
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, knowledge_of
 from igrow.trainer.diagnosis.nuisance import NuisanceSubspace
+from igrow.trainer.diagnosis.null_gains import NullGains
 from igrow.trainer.diagnosis.open_vents import under_open_vents
 from igrow.trainer.diagnosis.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.result import Diagnosis, Finding, Verdict
@@ -58,7 +59,7 @@ def diagnose(
     seed: int = 0,
     rules: DecisionRules = DEFAULT,
     nuisance: NuisanceSubspace | None = None,
-    drift: Drift | None = None,
+    null_gains: NullGains | None = None,
     progress: Progress = silent,
 ) -> Diagnosis:
     """Return the diagnosis of a log.
@@ -71,7 +72,7 @@ def diagnose(
         seed: of the random flips and bootstraps.
         rules: every threshold.
         nuisance: what greenhouses show though nothing is missing (None: what came with the trainer).
-        drift: how greenhouses like it change with time (None: what came with the trainer).
+        null_gains: what a change gains where there is none (None: what came with the trainer).
         progress: is told what is being done, in lines.
 
     Raises:
@@ -86,7 +87,7 @@ def diagnose(
     if log.faults:
         return _data_fault(log, model)
     log.require("a diagnosis", rules.least_days)
-    return _Question(model, frozenset(without), seed, rules, nuisance, drift, progress).answer(log)
+    return _Question(model, frozenset(without), seed, rules, nuisance, null_gains, progress).answer(log)
 
 
 @dataclass(frozen=True)
@@ -98,7 +99,7 @@ class _Question:
     seed: int
     rules: DecisionRules
     nuisance: NuisanceSubspace | None
-    drift: Drift | None
+    null_gains: NullGains | None
     progress: Progress
 
     def answer(self, log: Log, asked: ParameterChange | None = None, rivals: Sequence[ActiveTerm] = ()) -> Diagnosis:
@@ -126,7 +127,7 @@ class _Question:
         hidden = self.without | (frozenset({"co2_drift"}) if off else frozenset()) | of_crop
         of_vents = history.hardly_open(knowledge.history, logged.record, rules)
         hidden |= of_vents
-        search = search_of(days, site, knowledge, hidden, rules, self.nuisance, self.drift)
+        search = search_of(days, site, knowledge, hidden, rules, self.nuisance, self.null_gains)
         progress("searching for causes")
         first, last, found = search.run(rng)
         unseen = hidden_by_missing_weather(first.design.line)
@@ -156,10 +157,11 @@ class _Question:
                 result = with_parameter(days, knowledge, result, parameter, faults, rules)
             elif (told := self._since(parameter, parameter.onset.time, log, notes, faults)) is not None:
                 return told
-        if leads and not nothing_asked and (found or last.patterns):
+        if parameter is not None and leads and not nothing_asked and (found or last.patterns):
             # What the search told beside the parameter stands where unseen days do not bear that out, or less.
             beside = correct(days, knowledge, found, last.patterns, site.longitude, rules)
-            if result.parameter is None or predicts_better(days, beside, result, rules):
+            rivals_it = bool(last.patterns) or explains_as_well(beside.kept, parameter, rules)
+            if rivals_it and (result.parameter is None or predicts_better(days, beside, result, rules)):
                 result, patterns = beside, last.patterns
         verdict, findings = _verdict(completed, result, patterns, rules)
         stages = _stages(result, completed, logged)

@@ -55,6 +55,8 @@ class Estimated:
     effect_to_noise: float = 0.0
     skill: float = 0.0
     """Share of the squared error on unseen days that it removes."""
+    change_skill: float = 0.0
+    """The same of a change, where parameters change as physics alone lets expect."""
 
     @property
     def effect(self) -> str:

@@ -1,10 +1,9 @@
 """A change that time steps alone do not prove: told by fits to free runs of a day, beside all parameters.
 
-What greenhouses show by themselves when nothing has changed lets much pass for drift: a sensor that is off, what a crop
-transpires at night. By physics alone such a change stands out, and so does, in some greenhouses, one that is not
-there. A free run of a day tells these apart: the effects that gain most by physics are fitted beside parameters that
-change by physics, and that which brings the fitted days closest to what was measured must make days better that no
-fit saw, by more than any does where nothing has changed.
+What a calibration carries into another season can look like a sensor that is off, or like what a crop transpires at
+night, as strongly as such a change itself. A free run of a day tells these apart: the effects that gain most are fitted
+beside parameters that change as physics lets expect, and that which brings the fitted days closest to what was measured
+must make days better that no fit saw, by more than any does where nothing has changed.
 """
 
 from __future__ import annotations
@@ -51,7 +50,7 @@ def find(days: LogDays, knowledge: Knowledge, design: Design, rng: np.random.Gen
     Args:
         days: of the log.
         knowledge: of the greenhouse before it.
-        design: of the log, in a greenhouse that changes by physics alone.
+        design: of the log.
         rng: for flips and bootstraps.
     """
     null = linear.fit(design.grams, design.null_model())

@@ -7,7 +7,7 @@ A forecast is judged by its free run, so the parameters that are shipped are tho
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -133,6 +133,10 @@ class LogDays:
             error = shown[name] - record.measured[name][samples]
             errors[name] = np.where(wanted[samples], error, np.nan)
         return FreeRuns(shown, errors, self.split.day[starts])
+
+    def unseen(self) -> LogDays:
+        """Return the log with all of its days held out: what a model does on each of them."""
+        return replace(self, split=replace(self.split, fit=np.zeros_like(self.split.fit)))
 
     def persistence_errors(self, quantities: Iterable[str]) -> dict[str, float]:
         """Return the mean absolute error of yesterday's readings on held-out days, by quantity that has any."""

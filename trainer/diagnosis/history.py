@@ -20,14 +20,14 @@ from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
 from igrow.trainer.data.splits import DaySplit, split_days
 from igrow.trainer.diagnosis import candidates, linear, noise, search, sensitivity
-from igrow.trainer.diagnosis.amplitudes import columns, drift_within, keys, omission, rate_keys, units
+from igrow.trainer.diagnosis.amplitudes import columns, drift_over, drift_within, keys, omission
 from igrow.trainer.diagnosis.candidates import WEEKDAYS
 from igrow.trainer.diagnosis.design import Design, History, of_parts
-from igrow.trainer.diagnosis.drift import Drift, read_drift
 from igrow.trainer.diagnosis.freerun import LogDays
 from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, ActiveTerm, activate, knowledge_of
 from igrow.trainer.diagnosis.linear import DailyGrams, LinearModel
 from igrow.trainer.diagnosis.noise import Whitening
+from igrow.trainer.diagnosis.null_gains import NullGains, read_null_gains
 from igrow.trainer.diagnosis.recalibration import averaging
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.diagnosis.visible_parameters import members
@@ -179,7 +179,11 @@ def applies(known: Discrepancy, plain: Design) -> bool:
 
 
 def expected(
-    known: Discrepancy, plain: Design, misfit: Floats, without: Collection[str] = (), learned: Drift | None = None
+    known: Discrepancy,
+    plain: Design,
+    misfit: Floats,
+    without: Collection[str] = (),
+    null_gains: NullGains | None = None,
 ) -> Design:
     """Return the design of a later log: what is expected of it taken off, under the history's colour.
 
@@ -188,16 +192,16 @@ def expected(
         plain: the log, laid out about the calibrated parameters.
         misfit: (b, r, intervals), from `expected_misfit`, of the log without the causes that have been found in it.
         without: effects that are no candidates.
-        learned: how greenhouses change with time (None: what came with the trainer).
+        null_gains: of greenhouses in which nothing has changed (None: what came with the trainer).
     """
-    learned = learned or read_drift()
+    null_gains = null_gains or read_null_gains()
     balances = averaging(plain.line, plain.interval, plain.rules).balances
     filters = tuple(noise.filter_of(known.filters[balance]) for balance in balances)
-    now = drifted(known, plain, learned)
+    now = drifted(known, plain)
     values = plain.values.copy()
     values[0] += misfit
     design = replace(
-        plain, values=values, history=History(now, misfit, filters, known.own_gains, frozenset(without), learned)
+        plain, values=values, history=History(now, misfit, filters, known.own_gains, frozenset(without), null_gains)
     )
     _, design = solve_jointly(design)
     # Parameters as the rest of the history leaves them, for fits that hold it.
@@ -207,7 +211,7 @@ def expected(
     return replace(design, prior=held)
 
 
-def drifted(known: Discrepancy, plain: Design, learned: Drift) -> Gaussian:
+def drifted(known: Discrepancy, plain: Design) -> Gaussian:
     """Return how far everything may now lie from what is expected: the covariance of the history, and a drift.
 
     What is new in this log has the covariance that it had before any log.
@@ -221,7 +225,7 @@ def drifted(known: Discrepancy, plain: Design, learned: Drift) -> Gaussian:
     assert all(row in seen for row in range(count))
     covariance = np.diag(prior**2)
     covariance[np.ix_(seen, seen)] = known.amplitudes.covariance[np.ix_(rows, rows)]
-    return Gaussian(wanted, np.zeros(len(wanted)), covariance).widened(change_of(known, plain, learned))
+    return Gaussian(wanted, np.zeros(len(wanted)), covariance).widened(change_of(known, plain))
 
 
 def followed(known: Discrepancy, parameters: Collection[str], share: float, deviation: float) -> Discrepancy:
@@ -239,14 +243,10 @@ def followed(known: Discrepancy, parameters: Collection[str], share: float, devi
     return replace(known, amplitudes=moved)
 
 
-def change_of(known: Discrepancy, plain: Design, learned: Drift) -> Floats:
+def change_of(known: Discrepancy, plain: Design) -> Floats:
     """Return the standard deviation of the change of everything from the calibration to a log, (k,)."""
     time = plain.line.record.time
-    days = days_between(known, time[0] + (time[-1] - time[0]) / 2)
-    unit, expected = units(plain), drift_within(plain) / units(plain)
-    rates = [learned.rate(key, rate, days) for key, rate in zip(rate_keys(plain), expected.tolist(), strict=True)]
-    change: Floats = unit * np.array(rates)
-    return change
+    return drift_over(plain, days_between(known, time[0] + (time[-1] - time[0]) / 2))
 
 
 def days_between(known: Discrepancy, time: np.datetime64) -> float:

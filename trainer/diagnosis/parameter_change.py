@@ -40,13 +40,15 @@ class ParameterChange:
     """Parameters that would explain the log as well, itself first."""
     leads: bool
     """It explains the log better than any effect does."""
+    gain: float = 0.0
+    """Log-likelihood that it gains."""
 
 
 def find(design: Design, rng: np.random.Generator) -> ParameterChange | None:
     """Return the parameter that has changed; None where none stands out, or clearly one that nobody can look at.
 
     Args:
-        design: of the log, in a greenhouse that changes by physics alone.
+        design: of the log.
         rng: for the flips.
     """
     assert design.history is not None
@@ -129,6 +131,7 @@ def _told(
         best.p_value,
         (best.parameter, *as_good),
         leads,
+        best.gain,
     )
 
 
@@ -215,6 +218,6 @@ def _range(design: Design, name: str) -> tuple[float, float, float]:
 
 def _needed_gain(design: Design, one: Hypothesis) -> float:
     """Return what a parameter must gain: much more than it did in any greenhouse in which nothing had changed."""
-    assert design.history is not None and design.history.drift is not None
-    usual = design.history.drift.null_gains.get(one.key, 0.0)
+    assert design.history is not None and design.history.null_gains is not None
+    usual = design.history.null_gains.largest.get(one.key, 0.0)
     return max(design.rules.least_parameter_gain, design.rules.parameter_over_null * usual)

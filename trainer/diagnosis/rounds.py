@@ -13,11 +13,11 @@ from igrow.trainer.diagnosis import fitted_change, history, parameter_change
 from igrow.trainer.diagnosis.change import changed
 from igrow.trainer.diagnosis.compare import Round, compare
 from igrow.trainer.diagnosis.design import Design, prepare
-from igrow.trainer.diagnosis.drift import Drift, read_drift
 from igrow.trainer.diagnosis.estimate import Estimated, estimate, with_refitted, within_bounds
 from igrow.trainer.diagnosis.freerun import LogDays
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, activate
 from igrow.trainer.diagnosis.nuisance import NuisanceSubspace, read_nuisance
+from igrow.trainer.diagnosis.null_gains import NullGains
 from igrow.trainer.diagnosis.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.refit import are_identifiable, refit
 from igrow.trainer.diagnosis.rules import HOUR, DecisionRules
@@ -117,8 +117,8 @@ class Change(Search):
     """The log without any cause, before any noise."""
     misfit: Floats
     """What the model is expected to miss in this log."""
-    drift: Drift | None
-    """How greenhouses like it change with time; None: what came with the trainer."""
+    null_gains: NullGains | None
+    """Of greenhouses in which nothing has changed; None: what came with the trainer."""
     _latest: list[tuple[list[ActiveTerm], Design]] = field(default_factory=list)
     """Terms that the log was laid out with last: it is asked in two ways, and laid out once."""
 
@@ -128,22 +128,15 @@ class Change(Search):
         if judged.cause is not None or judged.patterns or not causes:
             return judged
         known = replace(self.knowledge, terms=(*self.knowledge.terms, *(one.term for one in found)))
-        return fitted_change.find(self.days, known, self.by_physics(known.terms), rng) or judged
+        return fitted_change.find(self.days, known, design, rng) or judged
 
     def design(self, terms: Sequence[ActiveTerm], interval: float) -> Design:
         """Return the design of a model with terms, about the calibrated parameters."""
-        return self._expected(terms, self.drift or read_drift())
+        return history.expected(self.history, self._laid_out(list(terms)), self.misfit, self.without, self.null_gains)
 
     def changed_parameter(self, rng: np.random.Generator) -> ParameterChange | None:
         """Return the parameter that has changed where no effect is missing."""
-        return parameter_change.find(self.by_physics(self.knowledge.terms), rng)
-
-    def by_physics(self, terms: Sequence[ActiveTerm]) -> Design:
-        """Return the design of a model with terms in which all else changes by physics alone."""
-        return self._expected(terms, (self.drift or read_drift()).by_physics())
-
-    def _expected(self, terms: Sequence[ActiveTerm], drift: Drift) -> Design:
-        return history.expected(self.history, self._laid_out(list(terms)), self.misfit, self.without, drift)
+        return parameter_change.find(self.resolved(), rng)
 
     def _laid_out(self, terms: list[ActiveTerm]) -> Design:
         if not terms:
@@ -164,7 +157,7 @@ def search_of(
     without: frozenset[str],
     rules: DecisionRules,
     nuisance: NuisanceSubspace | None,
-    drift: Drift | None,
+    null_gains: NullGains | None,
 ) -> Search:
     """Return the search that fits what is known: of changes where the greenhouse's history applies to the log."""
     common = (days, site, knowledge, without, rules, nuisance or read_nuisance())
@@ -174,7 +167,7 @@ def search_of(
     plain = history.laid_out(days, site, known, (), rules)
     if not history.applies(known, plain):
         return Search(*common)
-    return Change(*common, known, plain, history.expected_misfit(known, plain), drift)
+    return Change(*common, known, plain, history.expected_misfit(known, plain), null_gains)
 
 
 def _explained(found: Sequence[Estimated]) -> float:

@@ -65,13 +65,14 @@ class DecisionRules:
     crop_drift: float = _tuned(0.05, "the same of a parameter of the crop")
     new_crop_drift: float = _chosen(0.5, "the same of a crop that the calibration has not seen, or of so much of it")
     effect_drift: float = _tuned(0.02, "change of an effect in the discrepancy, in typical amplitudes")
+    co2_source_drift: float = _tuned(0.1, "the same of a source of CO2, which a growing crop looks like")
     pattern_drift: float = _tuned(0.005, "the same of a pattern, in its units")
+    later_days: float = _chosen(42.0, "days from a calibration to a later log up to which these hold; then as a walk")
     change_onset_price: float = _tuned(12.0, "gain that a beginning of a change must add")
     change_last_days: int = _tuned(5, "days at the end of a log in which no beginning of a change is looked for")
-    change_over_null: float = _tuned(
-        1.3, "times the most that it brought where nothing had changed that a change must bring"
+    clear_change_skill: float = _tuned(
+        0.025, "share of the squared error of unseen days, all else changing by physics, that needs no other proof"
     )
-    least_change_skill: float = _tuned(-0.01, "share that a first change removes: chance makes as much of four days")
     least_fitted_change: float = _tuned(4.0, "gain by physics alone from which on a change is fitted to free runs")
     most_change_fits: int = _chosen(3, "changes that are fitted beside the parameters, those that gain most")
     least_change_fall: float = _fitted(
@@ -96,6 +97,9 @@ class DecisionRules:
     parameter_over_null: float = _tuned(2.0, "times its largest gain where nothing had changed that it must bring")
     parameter_over_effect: float = _tuned(
         1.1, "times the largest gain of an effect at which it goes before all effects"
+    )
+    most_parameter_over_found: float = _tuned(
+        2.5, "times what was found beside it that a parameter may gain, where that is to stand in its place"
     )
 
     # Time steps or hours.

@@ -106,11 +106,6 @@ class Registry:
         """The file of what was learned from the sites that share it."""
         return self.state / "population.json"
 
-    @property
-    def drift(self) -> Path:
-        """The file of how the sites that share it change."""
-        return self.state / "drift.json"
-
     def path(self, text: str | None) -> str | None:
         """Return a path of the file, which is relative to the folder."""
         return None if text is None else str(self.folder / text)

@@ -10,8 +10,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from igrow.core.errors import IgrowError
 from igrow.core.exchange import Place
 from igrow.core.exchange.documents import LARGEST_DOCUMENT, parse_object
@@ -28,10 +26,8 @@ from igrow.trainer.service.site_memory import bundle_in_force, site_folder
 Exchange = Mapping[str, Any]
 """The arguments of `_place`."""
 COLLECTED = "collected.json"
-LEARNED, CHANGE = "learned.json", "change.npz"
-"""What a site's own log said of its parameters and its discrepancy, and of how it changes; no row of the log."""
-LATER_DAYS = 28
-"""Newest days of a log that tell how a greenhouse changes, where a calibration can do without them."""
+LEARNED = "learned.json"
+"""What a site's own log said of its parameters and its discrepancy; no row of the log."""
 REFRESH_BEFORE = timedelta(days=30)
 """Signatures that hold for less than this are made again."""
 
@@ -71,7 +67,6 @@ def recalibrate_site(
     publish: bool,
     force: bool,
     days: int,
-    drift: str | None = None,
 ) -> dict[str, Any]:
     """Diagnose one site, and publish what is better where `publish` says so; an error is a verdict."""
     from igrow.trainer.publishing import publish as publish_bundle  # noqa: PLC0415  (collecting needs no signatures)
@@ -85,7 +80,6 @@ def recalibrate_site(
         now=datetime.fromtimestamp(now, UTC),
         days=days,
         force=force,
-        drift=None if drift is None else Path(drift),
     )
     return turn.to_json()
 
@@ -93,37 +87,24 @@ def recalibrate_site(
 def learn_from_site(file: str, state: str, now: float, *, days: int) -> dict[str, Any]:
     """Fit one site by itself, and keep what that says of it, means and variances in `learned.json`.
 
-    Where the log is long enough the newest four weeks are left out of the fit. If nothing is found in them they tell
-    how the greenhouse has changed, in `change.npz`.
-
     Raises:
         IgrowError: nothing was collected of it, or its log cannot be fitted to.
     """
     from igrow.trainer.calibration import calibrate  # noqa: PLC0415
     from igrow.trainer.data import prepare_log  # noqa: PLC0415  (collecting needs no fits)
-    from igrow.trainer.diagnosis import DEFAULT, change_since, diagnose, learned_from  # noqa: PLC0415
-    from igrow.trainer.diagnosis.drift import read_drift  # noqa: PLC0415
+    from igrow.trainer.diagnosis import learned_from  # noqa: PLC0415
 
     site, moment = load_site(file), datetime.fromtimestamp(now, UTC)
     start, end = (moment - timedelta(days=days)).date(), moment.date() + timedelta(days=2)
     log = Archive(Path(state) / "archive").read(site.name, start, end)
     if len(log.telemetry) == 0:
         raise IgrowError(f"no telemetry of site {site.name} in the last {days} days: nothing was collected of it")
-    prepared = prepare_log(log.telemetry, site, name=site.name)
-    middle, later = prepared.telemetry.time[-1] - np.timedelta64(LATER_DAYS, "D"), None
-    if DEFAULT.learns_history(prepared.days - LATER_DAYS):
-        prepared, later = prepared.select(None, middle), prepared.select(middle)
-    model = calibrate(prepared)
-    learned, change = learned_from(model), None
-    if later is not None and diagnose(later, model).verdict == "nothing":
-        change = change_since(later, model, read_drift().days)
+    learned = learned_from(calibrate(prepare_log(log.telemetry, site, name=site.name)))
     folder = site_folder(Path(state), site.name)
     folder.mkdir(parents=True, exist_ok=True)
     write_whole(folder / LEARNED, json.dumps(asdict(learned)).encode())
-    if change is not None:
-        write_whole(folder / CHANGE, change.to_bytes())
     seen = f"{len(learned.shift)} parameters, effects and patterns were seen in its log"
-    return {"site": site.name, "note": f"{seen}; {'' if change else 'not '}how it changes"}
+    return {"site": site.name, "note": seen}
 
 
 def calibrate_site(

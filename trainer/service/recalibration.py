@@ -49,7 +49,6 @@ def recalibrate(
     now: datetime,
     days: int = DAYS,
     force: bool = False,
-    drift: Path | None = None,
 ) -> Turn:
     """Diagnose one site and publish a better bundle; what happened goes into its history.
 
@@ -64,12 +63,11 @@ def recalibrate(
         now: the time, UTC.
         days: newest days of the log to look at.
         force: run also before the site's pace says so.
-        drift: file of how the fleet's greenhouses change; None: what came with the trainer.
     """
     due = next_run(site, folder)
     if due is not None and now < due and not force:
         return Turn(COMMAND, site.name, now, "waiting", False, f"next at {due:%Y-%m-%d %H:%M} UTC")
-    run = partial(_run, site, archive, folder, publish_bundle, now, days, drift)
+    run = partial(_run, site, archive, folder, publish_bundle, now, days)
     return history.keep(folder, COMMAND, site.name, now, run)
 
 
@@ -80,7 +78,6 @@ def _run(
     publish_bundle: Publish | None,
     now: datetime,
     days: int,
-    drift: Path | None,
 ) -> Turn:
     from igrow.trainer.exporting import read_model  # noqa: PLC0415  (onnx is slow to import)
 
@@ -89,7 +86,7 @@ def _run(
     if len(log.telemetry) == 0:
         raise IgrowError(f"no telemetry of site {site.name} in the last {days} days: nothing was collected of it")
     bundle, unreadable = bundle_in_force(folder, log.reports)
-    found = _diagnose(site, log, bundle, folder / "diagnosis", drift)
+    found = _diagnose(site, log, bundle, folder / "diagnosis")
     notes += unreadable + found.notes
     causes, fall = tuple(one.effect for one in found.findings), relative_gain(found.errors)
 
@@ -117,16 +114,15 @@ def _run(
     return turn(f"published {name}: {why}", published=True)
 
 
-def _diagnose(site: Site, log: SiteLog, bundle: Bundle, target: Path, drift: Path | None) -> Diagnosis:
+def _diagnose(site: Site, log: SiteLog, bundle: Bundle, target: Path) -> Diagnosis:
     """Diagnose a log against a bundle, and write diagnosis and report to `target`."""
     from igrow.trainer.data import prepare_log  # noqa: PLC0415  (scipy is slow to import)
     from igrow.trainer.diagnosis import diagnose  # noqa: PLC0415
-    from igrow.trainer.diagnosis.drift import read_drift  # noqa: PLC0415
     from igrow.trainer.exporting import read_model  # noqa: PLC0415
     from igrow.trainer.report import write_diagnosis  # noqa: PLC0415
 
     prepared = prepare_log(log.telemetry, site, name=site.name)
-    diagnosis = diagnose(prepared, read_model(bundle, site), drift=None if drift is None else read_drift(drift))
+    diagnosis = diagnose(prepared, read_model(bundle, site))
     write_diagnosis(target, diagnosis)
     return diagnosis
 

@@ -1,6 +1,6 @@
-"""What a new greenhouse gains when others of its builder share their discrepancy and how they change.
+"""What a new greenhouse gains when others of its builder share their discrepancy.
 
-`python -m benchmarks.shared_changes [--shared N] [--new N]` draws a builder as `benchmarks.population` does. Each
+`python -m benchmarks.shared_discrepancy [--shared N] [--new N]` draws a builder as `benchmarks.population` does. Each
 greenhouse is calibrated on four weeks; then its crop has grown on and each parameter has drifted a little. N of them
 share what `igrow-trainer fleet learn` keeps of a site. The new ones are diagnosed on the four weeks that follow, once
 with nothing missing and once with something hidden: by what came with the trainer, and by what was shared.
@@ -16,13 +16,11 @@ import numpy as np
 
 from benchmarks.builder import QUANTITIES, SHARED_DAYS, START, asked_for, site_of
 from benchmarks.diagnosis.nurseries import DRIFT
-from igrow.core.arrays import Floats
 from igrow.core.greenhouse import GreenhouseParameters, HiddenEffect, generate_weather, recipe, simulate_many
 from igrow.core.greenhouse.tomato import Crop
 from igrow.trainer.calibration import calibrate
 from igrow.trainer.data import Log, prepare_log
-from igrow.trainer.diagnosis import Diagnosis, change_since, diagnose, drift, learned_from
-from igrow.trainer.diagnosis.drift import Drift, Pair
+from igrow.trainer.diagnosis import Diagnosis, diagnose, learned_from
 from igrow.trainer.fit import FittedModel
 from igrow.trainer.fit.population import Population, learn_population
 
@@ -65,75 +63,43 @@ def told(result: Diagnosis) -> Told:
     return Told(result.verdict, tuple(one.effect for one in result.findings), errors)
 
 
-def share(logs: Iterable[tuple[Log, Log]], days: float) -> tuple[Population, list[Pair]]:
-    """Return what greenhouses share: where they lie, what they miss, and how those change in which nothing is found."""
-    learned, pairs = [], []
-    for number, (first, later) in enumerate(logs, 1):
-        model = calibrate(first)
-        learned.append(learned_from(model))
-        verdict = diagnose(later, model).verdict
-        change = change_since(later, model, days) if verdict == "nothing" else None
-        pairs += [] if change is None else [change]
-        print(f"{number} shared: {verdict}", file=sys.stderr, flush=True)
-    return learn_population(learned), pairs
-
-
-def evidence(pair: Pair, change: Floats) -> float:
-    """Return the log marginal likelihood of a later log over that of no change and full knowledge.
-
-    Args:
-        pair: what the log says.
-        change: standard deviation of every change, (k,).
-    """
-    prior = pair.known + np.diag(change**2)
-    posterior = drift.inverse_of(pair.information + drift.inverse_of(prior))
-    scaled = np.eye(len(prior)) + pair.information @ prior
-    return float(0.5 * pair.score @ posterior @ pair.score - 0.5 * np.linalg.slogdet(scaled)[1])
-
-
-def likelihood(pair: Pair, known: Drift) -> float:
-    """Return the log marginal likelihood of a later log under rates, over that of no change."""
-    rates = [known.rate(key, one, known.days) for key, one in zip(pair.keys, pair.expected.tolist(), strict=True)]
-    return evidence(pair, pair.unit * np.array(rates))
+def share(logs: Iterable[tuple[Log, Log]]) -> Population:
+    """Return what greenhouses share: where they lie, and what models of them miss."""
+    learned = []
+    for number, (first, _) in enumerate(logs, 1):
+        learned.append(learned_from(calibrate(first)))
+        print(f"{number} shared", file=sys.stderr, flush=True)
+    return learn_population(learned)
 
 
 def main() -> None:
     plants = asked_for(__doc__, shared=6, new=4, seed=45_000)
-    new, came = plants.new, drift.read_drift()
-    population, pairs = share(both(plants.shared, [None] * len(plants.shared), plants.seed + 1), came.days)
-    fleet = drift.learn(pairs, came.days, came) if len(pairs) >= drift.LEAST_PAIRS else came
+    new = plants.new
+    population = share(both(plants.shared, [None] * len(plants.shared), plants.seed + 1))
     causes = [CAUSES[number % len(CAUSES)] for number in range(len(new))]
     logs = both([*new, *new], [*(None for _ in new), *causes], plants.seed + 3)
-    found: dict[str, list[tuple[str, Told, float]]] = {"alone": [], "shared": []}
+    found: dict[str, list[tuple[str, Told]]] = {"alone": [], "shared": []}
     for number in range(len(new)):
         models: dict[str, FittedModel] = {
             "alone": calibrate(logs[number][0]), "shared": calibrate(logs[number][0], population=population)
         }  # fmt: skip
         for name, model in models.items():
-            known = came if name == "alone" else fleet
             for cause, place in (("", number), (causes[number], number + len(new))):
-                later = logs[place][1]
-                change = change_since(later, model, came.days) if not cause else None
-                likely = np.nan if change is None else likelihood(change, known)
-                found[name].append((cause, told(diagnose(later, model, drift=known)), likely))
+                found[name].append((cause, told(diagnose(logs[place][1], model))))
         print(f"{number + 1} of {len(new)} new", file=sys.stderr, flush=True)
-    moved = [fleet.rates[key] / came.rates[key] for key in fleet.rates if key in came.rates]
-    print(f"{len(plants.shared)} shared, of {len(pairs)} how they change; {len(new)} new greenhouses")
-    print(f"keys of the population {len(population.mean)}; rates of the fleet over those that came: "
-          f"{np.quantile(moved, 0.1):.2f} to {np.quantile(moved, 0.9):.2f} (80 %)")  # fmt: skip
+    print(f"{len(plants.shared)} shared; {len(new)} new greenhouses; keys of the population {len(population.mean)}")
     print(f"{'mean over later logs':52}{'logs':>6}{'alone':>10}{'shared':>10}")
-    rows: list[tuple[str, Callable[[str, Told, float], float | None]]] = [
-        ("false claims where nothing is missing", lambda c, t, _: None if c else float(t.verdict != "nothing")),
-        ("right cause first", lambda c, t, _: float(t.causes[:1] == (c,)) if c else None),
-        ("another cause first", lambda c, t, _: float(bool(t.causes) and t.causes[0] != c) if c else None),
-        ("log likelihood of a later log, nothing missing", lambda c, _, likely: None if c else likely),
+    rows: list[tuple[str, Callable[[str, Told], float | None]]] = [
+        ("false claims where nothing is missing", lambda c, t: None if c else float(t.verdict != "nothing")),
+        ("right cause first", lambda c, t: float(t.causes[:1] == (c,)) if c else None),
+        ("another cause first", lambda c, t: float(bool(t.causes) and t.causes[0] != c) if c else None),
     ]
     cells: list[tuple[str, list[list[float]]]] = [
         (what, [[one for case in found[name] if (one := value(*case)) is not None] for name in found])
         for what, value in rows
     ]
     for quantity in QUANTITIES:
-        errors = [[one.errors[quantity] for cause, one, _ in found[name] if not cause] for name in found]
+        errors = [[one.errors[quantity] for cause, one in found[name] if not cause] for name in found]
         cells.append((f"error a day ahead, {quantity}", errors))
     for what, values in cells:
         print(f"{what:52}{len(values[0]):6}" + "".join(f"{np.mean(one):10.3g}" for one in values))

@@ -1,0 +1,37 @@
+"""What a change must gain: more than where nothing has changed, each greenhouse judged by the others."""
+
+from __future__ import annotations
+
+from benchmarks.diagnosis import null_gains as learning
+from benchmarks.diagnosis.null_gains import Gained
+from igrow.core.effects import EFFECTS
+from igrow.trainer.diagnosis.null_gains import NullGains, read_null_gains
+
+
+def test_a_change_must_gain_more_than_it_did_where_nothing_had_changed() -> None:
+    known = NullGains({"co2_drift": 20.0, "lamp_heat": 1.0}, least=9.0)
+    assert known.needed("co2_drift") == 20.0
+    assert known.needed("lamp_heat") == known.needed("rain_cooling") == 9.0
+
+
+def test_what_came_with_the_trainer_knows_effects_and_parameters() -> None:
+    known = read_null_gains()
+    assert known.least >= learning.LEAST
+    assert {name for name in known.largest if not name.startswith("parameter:")} <= set(EFFECTS)
+    assert "parameter:transmissivity" in known.largest
+
+
+def test_a_greenhouse_is_judged_by_the_gains_of_the_others() -> None:
+    found = [
+        Gained("one", "nothing", {"co2_drift": 30.0, "lamp_heat": 2.0}, {}),
+        Gained("one", "noise", {"co2_drift": 12.0}, {}),
+        Gained("two", "nothing", {"lamp_heat": 10.0, "co2_drift": 9.0}, {}),
+    ]
+    alone = learning.of_others(found, "one", 8.0)
+    assert alone.largest == {"lamp_heat": 10.0, "co2_drift": 9.0}
+    assert all(learning.is_asked(one, learning.of_others(found, one.greenhouse, 8.0)) for one in found)
+    # What gains less than a change must at least is not asked, nor what the others have gained too.
+    assert not learning.is_asked(found[1], learning.of_others(found, "one", 13.0))
+    assert not learning.is_asked(
+        Gained("three", "nothing", {"co2_drift": 29.0}, {}), learning.of_others(found, "", 8.0)
+    )

@@ -1,0 +1,37 @@
+"""What effects and parameters gain in greenhouses in which nothing has changed: a change must gain more than that.
+
+A calibration that is carried into another season misses something of every greenhouse, and what it misses looks like
+some effects more than like others. How much each of them gains by that alone is learned from later logs of virtual
+greenhouses with nothing missing, in several seasons.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from igrow.trainer.diagnosis.rules import came_with_the_trainer
+
+FILE = "learned/null_gains.json"
+
+
+@dataclass(frozen=True)
+class NullGains:
+    """Log-likelihoods in nats that are gained where nothing has changed."""
+
+    largest: Mapping[str, float]
+    """In any such log, of an effect and of a parameter (``parameter:name``)."""
+    least: float = 8.0
+    """What any change must gain: of such logs none or nearly none is given a name then, each by the gains of others."""
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    """The command that learned it, its date and seeds."""
+
+    def needed(self, effect: str) -> float:
+        """Return what a change must gain: more than it did in any greenhouse in which nothing had changed."""
+        return max(self.least, self.largest.get(effect, 0.0))
+
+
+def read_null_gains() -> NullGains:
+    """Return what came with the trainer."""
+    return NullGains(**came_with_the_trainer(FILE))
