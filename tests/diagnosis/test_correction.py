@@ -15,6 +15,7 @@ from igrow.trainer.diagnosis.candidates import Candidate, Pattern
 from igrow.trainer.diagnosis.correction import (
     Corrected,
     corrected_model,
+    explains_as_well,
     is_proven_change,
     may_give_way,
     same_in_all_regimes,
@@ -199,3 +200,13 @@ def test_a_parameter_takes_the_place_of_a_sensors_fault_where_unseen_days_ask_fo
         assert told.parameter.share.value == pytest.approx(-0.5)
     assert told.kept == (() if named else causes)
     assert told.stages["corrected"].terms == (() if named else stages["corrected"].terms)
+
+
+def test_of_a_parameter_that_explains_far_more_a_cause_is_a_part() -> None:
+    """Half as much air through the vents was told as a sensor that is off, at a third of the gain."""
+    share = Estimate(-0.4, -0.5, -0.3, "1")
+    change = ParameterChange("ventilation", share, None, 0.001, ("ventilation",), leads=True, gain=80.0)
+    assert explains_as_well([cause(gain=40.0)], change, DEFAULT)
+    assert explains_as_well([cause(gain=20.0), cause(gain=20.0)], change, DEFAULT)
+    assert not explains_as_well([cause(gain=20.0)], change, DEFAULT)
+    assert not explains_as_well([], change, DEFAULT)

@@ -1,0 +1,61 @@
+"""A change asked once more of free runs: its size, its skill, and refusal where steps and runs do not agree."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from igrow.core.bundle import Estimate
+from igrow.trainer.data import prepare_log
+from igrow.trainer.diagnosis import DEFAULT, confirmation
+from igrow.trainer.diagnosis.confirmation import confirmed
+from igrow.trainer.diagnosis.estimate import Estimated
+from igrow.trainer.diagnosis.freerun import log_days
+from igrow.trainer.diagnosis.knowledge import ActiveTerm, knowledge_of
+from tests.diagnosis.conftest import model_in_force
+from tests.virtual_log import SITE, virtual_log
+
+
+def change(size: float, onset: np.datetime64 | None = None) -> Estimated:
+    """A sensor that is off, as time steps tell it."""
+    hypothesis = cast(Any, SimpleNamespace(effect="air_temperature_offset"))
+    term = ActiveTerm("air_temperature_offset", size, {}, onset)
+    return Estimated(hypothesis, term, Estimate(size, 0.5 * size, 1.5 * size, "K"), 30.0, None, (term.effect,))
+
+
+@pytest.mark.parametrize("size", [0.4, 2.5])
+def test_the_size_is_between_that_of_steps_and_that_of_runs(size: float) -> None:
+    telemetry = virtual_log(16, seed=3, step=900.0)
+    columns = dict(telemetry.columns) | {"air_temperature": telemetry.columns["air_temperature"] + 1.0}
+    model = model_in_force()
+    log = log_days(prepare_log(replace(telemetry, columns=columns), SITE), model)
+    found = confirmed(log, knowledge_of(model, SITE, DEFAULT), (), change(size), DEFAULT)
+    assert found is not None
+    by_runs = found.term.amplitude**2 / size
+    assert by_runs == pytest.approx(1.0, abs=0.3)
+    assert found.change_skill > DEFAULT.clear_change_skill
+    # What is known of it keeps its share.
+    assert (found.amplitude.low, found.amplitude.high) == pytest.approx(
+        (0.5 * found.term.amplitude, 1.5 * found.term.amplitude)
+    )
+
+
+@pytest.mark.parametrize(("by_runs", "told"), [(0.9, True), (0.2, False), (5.0, False), (-1.0, False), (0.0, False)])
+def test_where_steps_and_runs_tell_another_size_nothing_is_told(
+    by_runs: float, told: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(confirmation, "_by_runs", lambda *_: by_runs)
+    log = cast(Any, SimpleNamespace(fit=lambda *_: None, run=lambda _: None))
+    found = confirmed(log, knowledge_of(model_in_force(), SITE, DEFAULT), (), change(1.0), DEFAULT)
+    assert (found is not None) is told
+
+
+def test_of_what_began_within_the_log_runs_tell_no_size() -> None:
+    began = np.datetime64("2020-02-08")
+    log, prior = cast(Any, None), cast(Any, None)
+    assert confirmation._by_runs(log, prior, (), change(1.0, began).term) is None
+    assert confirmation._by_runs(log, prior, (change(1.0, began).term,), change(1.0).term) is None
