@@ -22,6 +22,7 @@ from igrow.trainer.diagnosis.compare import Round
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.freerun import LogDays
 from igrow.trainer.diagnosis.knowledge import Knowledge, activate, home_drift
+from igrow.trainer.diagnosis.linear import Fit
 from igrow.trainer.diagnosis.omission import DAY, fit_together
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.fit.climate import fit_climate
@@ -57,10 +58,56 @@ def find(days: LogDays, knowledge: Knowledge, design: Design, rng: np.random.Gen
     found = closest(days, knowledge, design, promising(design, rng), rng)
     if found is None or found.fall < design.rules.least_change_fall:
         return None
+    return _by_fits(design, null, found, rng)
+
+
+def _by_fits(design: Design, null: Fit, found: Fitted, rng: np.random.Generator) -> Round:
+    """Return the round of a cause of which the fits say what unseen days say: single steps say less."""
     told = change.round_of(design, null, found.hypothesis, rng)
     assert told.cause is not None
-    # What unseen days say of it is said by the fits: within a drift that they do not allow for, single steps say less.
     return replace(told, cause=replace(told.cause, bootstrap_p=found.bootstrap_p))
+
+
+def settled(days: LogDays, knowledge: Knowledge, design: Design, told: Round, rng: np.random.Generator) -> Round:
+    """Return a round whose cause free runs tell as well, where time steps cannot tell it from others.
+
+    Where runs tell another of these, that is the cause if it gains what it must, or makes unseen days better by as much
+    as one must that only fits tell; else there is none.
+
+    Args:
+        days: of the log.
+        knowledge: of the greenhouse before it.
+        design: of the log.
+        told: a round with a cause.
+        rng: for flips and bootstraps.
+    """
+    assert told.cause is not None and design.history is not None and design.history.null_gains is not None
+    first, null = told.cause.hypothesis, linear.fit(design.grams, design.null_model())
+    # Of what began within the log there is no one size to fit.
+    near = [] if first.term.onset is not None else rivals(design, null, first, rng)
+    found = closest(days, knowledge, design, [first, *near], rng) if near else None
+    if found is None or found.hypothesis.effect == first.effect:
+        return told
+    other = found.hypothesis
+    if change.proven_gain(design, other) >= design.history.null_gains.needed(other.effect):
+        return change.round_of(design, null, other, rng)
+    if found.fall >= design.rules.least_change_fall:
+        return _by_fits(design, null, found, rng)
+    return Round(design, null, null, None, ())
+
+
+def rivals(design: Design, null: Fit, first: Hypothesis, rng: np.random.Generator) -> list[Hypothesis]:
+    """Return the hypotheses that gain nearly as much as the first, or more, those that gain most."""
+    assert design.history is not None
+    rules, gain = design.rules, change.net_gain(design, first)
+    least = gain - max(rules.confounded_gain, rules.confounded_share * gain)
+    others = (
+        one
+        for one in search.score_candidates(design, null, [None], rng)
+        if one.effect != first.effect and one.effect not in design.history.without
+    )
+    near = [one for one in others if change.net_gain(design, one) >= least]
+    return sorted(near, key=lambda one: change.net_gain(design, one), reverse=True)[: rules.most_change_fits - 1]
 
 
 def promising(design: Design, rng: np.random.Generator) -> list[Hypothesis]:

@@ -123,11 +123,13 @@ class Change(Search):
     """Terms that the log was laid out with last: it is asked in two ways, and laid out once."""
 
     def judge(self, design: Design, found: Sequence[Estimated], rng: np.random.Generator, *, causes: bool) -> Round:
-        """Return what one round finds; where time steps tell nothing, fits to free runs are asked."""
+        """Return what one round finds; where time steps tell nothing, or not which, fits to free runs are asked."""
         judged = changed(design, _explained(found), rng, causes=causes)
-        if judged.cause is not None or judged.patterns or not causes:
+        if judged.patterns or not causes:
             return judged
         known = replace(self.knowledge, terms=(*self.knowledge.terms, *(one.term for one in found)))
+        if judged.cause is not None:
+            return fitted_change.settled(self.days, known, design, judged, rng)
         return fitted_change.find(self.days, known, design, rng) or judged
 
     def design(self, terms: Sequence[ActiveTerm], interval: float) -> Design:
