@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from igrow.trainer.data import Log
-from igrow.trainer.diagnosis import DEFAULT, fitted_change, linear, rounds
+from igrow.trainer.diagnosis import DEFAULT, change, fitted_change, linear, rounds
 from igrow.trainer.diagnosis.candidates import Candidate
-from igrow.trainer.diagnosis.compare import Round
+from igrow.trainer.diagnosis.compare import Contender, Round
 from igrow.trainer.diagnosis.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, knowledge_of
 from igrow.trainer.diagnosis.linear import Term
@@ -98,3 +98,37 @@ def test_beside_a_cause_that_was_found_before_fits_are_asked_with_it(monkeypatch
     assert search.judge(design, found, rng, causes=True).cause is None
     assert search.judge(design, found, rng, causes=False).cause is None
     assert asked == [known.terms, (*known.terms, term)]
+
+
+@pytest.mark.parametrize(
+    ("closest", "proven", "fall", "named"),
+    [
+        ("first", 20.0, 0.0, "first"),
+        ("other", 20.0, 0.0, "other"),
+        ("other", 9.0, 0.2, "other"),
+        ("other", 9.0, 0.01, ""),
+    ],
+)
+def test_of_causes_that_gain_about_the_same_that_is_told_which_free_runs_tell(
+    closest: str, proven: float, fall: float, named: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It must gain what it must itself, or make unseen days as much better as what only fits tell."""
+    plain = with_parameters(Truth({}, {}), 1)
+    assert plain.history is not None
+    design = replace(plain, history=replace(plain.history, null_gains=NullGains({"other": 10.0})))
+    null = linear.fit(design.grams, design.null_model())
+    first, other = hypothesis("first", 1.0), hypothesis("other", 1.0)
+    told = Round(design, null, null, contender(first), ())
+    fitted = fitted_change.Fitted({"first": first, "other": other}[closest], fall, 0.1)
+    monkeypatch.setattr(fitted_change, "rivals", lambda *_: [other])
+    monkeypatch.setattr(fitted_change, "closest", lambda *_: fitted)
+    monkeypatch.setattr(change, "proven_gain", lambda *_: proven)
+    monkeypatch.setattr(change, "round_of", lambda design, null, one, _: Round(design, null, null, contender(one), ()))
+    found = fitted_change.settled(cast(Any, None), cast(Any, None), design, told, np.random.default_rng(0))
+    assert ("" if found.cause is None else found.cause.hypothesis.effect) == named
+    if named == "other" and proven < 10.0:
+        assert found.cause is not None and found.cause.bootstrap_p == 0.1
+
+
+def contender(one: Hypothesis) -> Contender:
+    return Contender(one, one.gain, cast(Any, None), 0.3)
