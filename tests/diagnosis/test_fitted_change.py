@@ -132,3 +132,11 @@ def test_of_causes_that_gain_about_the_same_that_is_told_which_free_runs_tell(
 
 def contender(one: Hypothesis) -> Contender:
     return Contender(one, one.gain, cast(Any, None), 0.3)
+
+
+def test_a_run_without_a_finite_error_makes_no_day_better() -> None:
+    """Not a number compares as neither less nor more, and passed every bound."""
+    for before, after in ((1.0, np.nan), (1.0, np.inf), (np.inf, np.inf), (np.nan, 1.0)):
+        errors = np.array([[[before, 1.0], [after, 0.5]]])
+        assert fitted_change._fall(errors) == -np.inf
+    assert fitted_change._fall(np.array([[[1.0, 1.0], [0.5, 0.5]]])) == pytest.approx(0.5)

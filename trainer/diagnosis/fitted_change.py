@@ -156,7 +156,9 @@ def closest(
 
 def _by_day(record: Record, rows: Mask, before: Model, after: Model) -> Floats:
     """Return the sums of absolute errors a day ahead of both models by the day on which a run starts, (q, 2, days)."""
-    old, new = (errors_of(record, free_runs(record, *one), (DAY,), rows) for one in (before, after))
+    # A run that leaves all bounds counts as no better; what it computes on its way is no news.
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        old, new = (errors_of(record, free_runs(record, *one), (DAY,), rows) for one in (before, after))
     days = {key: np.unique(one.day, return_inverse=True)[1] for key, one in old.items()}
     sums = [
         [np.bincount(day, np.nansum(np.abs(one[key].error), axis=0)) for one in (old, new)] for key, day in days.items()
@@ -168,10 +170,11 @@ def _fall(errors: Floats) -> Floats:
     """Return the share of the errors of days (q, 2, ..., days) that goes, the mean of all quantities, (...)."""
     if not len(errors):
         return np.zeros(errors.shape[2:-1])
-    # Of days that are drawn but not measured nothing falls.
+    # Of days that are drawn but not measured nothing falls; of a run without a finite error neither.
     before, after = np.moveaxis(np.maximum(errors.sum(axis=-1), _UNMEASURED), 1, 0)
-    left: Floats = np.mean(after / before, axis=0)
-    return 1.0 - left
+    with np.errstate(invalid="ignore"):
+        left: Floats = np.mean(after / before, axis=0)
+    return np.where(np.isfinite(left), 1.0 - left, -np.inf)
 
 
 def _fit(record: Record, rows: Mask, prior: Gaussian, known: ActiveEffects, one: Hypothesis) -> Model:
