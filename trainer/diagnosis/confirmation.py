@@ -14,7 +14,7 @@ from igrow.core.effects import EFFECTS
 from igrow.trainer.diagnosis import freerun
 from igrow.trainer.diagnosis.estimate import Estimated
 from igrow.trainer.diagnosis.freerun import LogDays, Stage
-from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, activate, home_drift
+from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, activate
 from igrow.trainer.diagnosis.omission import fit_together
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.fit.gaussian import Gaussian
@@ -35,7 +35,7 @@ def confirmed(
     Raises:
         DivergenceError: the model runs out of all bounds with it.
     """
-    prior = knowledge.posterior.widened(home_drift(knowledge.posterior.values, rules))
+    prior = knowledge.by_physics(rules)
     size = _by_runs(log, prior, beside, one.term)
     if size is not None:
         both = size * one.term.amplitude

@@ -17,7 +17,7 @@ from igrow.trainer.diagnosis.candidates import Pattern, pattern_fluxes
 from igrow.trainer.diagnosis.confirmation import confirmed
 from igrow.trainer.diagnosis.estimate import Estimated, normal_quantile
 from igrow.trainer.diagnosis.freerun import LogDays, Stage
-from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, home_drift
+from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge
 from igrow.trainer.diagnosis.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.refit import REGIMES
 from igrow.trainer.diagnosis.result import Finding
@@ -193,7 +193,7 @@ def with_parameter(
     """
     known, recalibrated = knowledge.posterior, result.stages["recalibrated"]
     changed = np.array([name in members(parameter.parameter) for name in known.names])
-    by_physics = known.widened(home_drift(known.values, rules))
+    by_physics = knowledge.by_physics(rules)
     faults = (*recalibrated.terms, *rivals)
     try:
         without, faulty, alone, beside = (

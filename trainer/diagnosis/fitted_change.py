@@ -21,7 +21,7 @@ from igrow.trainer.diagnosis.candidates import Candidate
 from igrow.trainer.diagnosis.compare import Round
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.freerun import LogDays
-from igrow.trainer.diagnosis.knowledge import Knowledge, activate, home_drift
+from igrow.trainer.diagnosis.knowledge import Knowledge, activate
 from igrow.trainer.diagnosis.linear import Fit
 from igrow.trainer.diagnosis.omission import DAY, fit_together
 from igrow.trainer.diagnosis.search import Hypothesis
@@ -131,7 +131,7 @@ def closest(
     # Of what began within the log there is no one size beside which another could be fitted.
     if not hypotheses or any(np.ndim(value) for effect in known.values() for value in effect.values()):
         return None
-    prior = knowledge.posterior.widened(home_drift(knowledge.posterior.values, design.rules))
+    prior = knowledge.by_physics(design.rules)
     try:
         without: Model = (fit_climate([(record, fitted)], prior, known).values, known)
     except DivergenceError:

@@ -64,6 +64,10 @@ class Knowledge:
     history: Discrepancy | None = None
     """The same with its covariance: causes are then changes since the calibration; None where none is to be asked."""
 
+    def by_physics(self, rules: DecisionRules) -> Gaussian:
+        """Return where the parameters may lie if they have changed since as physics alone lets expect."""
+        return self.posterior.widened(home_drift(self.posterior.values, rules))
+
 
 def knowledge_of(model: FittedModel, site: Site, rules: DecisionRules) -> Knowledge:
     """Return what a model says of a site."""
