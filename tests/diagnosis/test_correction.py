@@ -82,6 +82,7 @@ def test_beside_another_a_cause_must_do_more(values: dict[str, float], stays: bo
     ("values", "stays"),
     [
         ({"change_skill": 0.03, "bootstrap_p": 0.9}, True),
+        ({"skill": -0.02, "change_skill": 0.2, "bootstrap_p": 0.0}, False),
         ({"skill": 0.04, "change_skill": -0.1, "bootstrap_p": 0.9}, True),
         ({"skill": 0.02, "change_skill": 0.0, "bootstrap_p": 0.1}, True),
         ({"skill": 0.02, "change_skill": 0.0, "bootstrap_p": 0.4}, False),

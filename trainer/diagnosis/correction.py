@@ -108,9 +108,10 @@ def stands(one: Estimated, kept: Sequence[Estimated], rules: DecisionRules) -> b
 def is_proven_change(one: Estimated, kept: Sequence[Estimated], rules: DecisionRules) -> bool:
     """Tell whether a change stands: makes a day ahead better, or single steps of unseen days likelier at no loss.
 
-    What comes on few days, as rain does, may show on none of the unseen ones.
+    What comes on few days, as rain does, may show on none of the unseen ones. No change stands that makes the model
+    worse that is shipped with it.
     """
-    if not _is_large(one, rules) or (kept and not _adds_to(one, kept, rules)):
+    if not _is_large(one, rules) or (kept and not _adds_to(one, kept, rules)) or one.skill < rules.least_change_skill:
         return False
     likelier = one.bootstrap_p <= rules.further_bootstrap_p and one.change_skill >= 0.0
     return likelier or one.change_skill >= rules.clear_change_skill or one.skill >= rules.clear_skill

@@ -70,6 +70,7 @@ class DecisionRules:
     later_days: float = _chosen(42.0, "days from a calibration to a later log up to which these hold; then as a walk")
     change_onset_price: float = _tuned(12.0, "gain that a beginning of a change must add")
     change_last_days: int = _tuned(5, "days at the end of a log in which no beginning of a change is looked for")
+    least_change_skill: float = _tuned(-0.01, "share that a change removes at least: chance makes as much of four days")
     clear_change_skill: float = _tuned(
         0.025, "share of the squared error of unseen days, all else changing by physics, that needs no other proof"
     )
