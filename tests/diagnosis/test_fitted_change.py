@@ -89,7 +89,7 @@ def test_beside_a_cause_that_was_found_before_fits_are_asked_with_it(monkeypatch
     known = knowledge_of(model_in_force(), SITE, DEFAULT)
     unasked = cast(Any, None)
     search = rounds.Change(
-        unasked, SITE, known, frozenset(), DEFAULT, unasked, unasked, design, np.zeros(0), NullGains({})
+        unasked, SITE, known, frozenset(), DEFAULT, unasked, unasked, design, np.zeros(0), NullGains({}, 8.0)
     )
     term = ActiveTerm("co2_offset", 80.0, {})
     found = [cast(Any, SimpleNamespace(term=term, gain=50.0))]
@@ -115,7 +115,7 @@ def test_of_causes_that_gain_about_the_same_that_is_told_which_free_runs_tell(
     """It must gain what it must itself, or make unseen days as much better as what only fits tell."""
     plain = with_parameters(Truth({}, {}), 1)
     assert plain.history is not None
-    design = replace(plain, history=replace(plain.history, null_gains=NullGains({"other": 10.0})))
+    design = replace(plain, history=replace(plain.history, null_gains=NullGains({"other": 10.0}, 8.0)))
     null = linear.fit(design.grams, design.null_model())
     first, other = hypothesis("first", 1.0), hypothesis("other", 1.0)
     told = Round(design, null, null, contender(first), ())

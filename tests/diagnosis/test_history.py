@@ -22,7 +22,7 @@ from tests.virtual_log import SITE, virtual_log
 
 RNG_SEED = 3
 PATTERN = "heat:cold weather"
-BARE = NullGains({})
+BARE = NullGains({}, 8.0)
 """Nothing was learned."""
 
 

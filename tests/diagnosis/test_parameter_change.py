@@ -69,7 +69,7 @@ def with_parameters(truth: Truth, seed: int, *, names: Sequence[str] = NAMES, **
         np.zeros_like(design.values[0]),
         (PLAIN,) * BALANCES,
         {},
-        null_gains=NullGains(gains),
+        null_gains=NullGains(gains, 8.0),
     )
     _, solved = history.solve_jointly(replace(design, history=known))
     return solved

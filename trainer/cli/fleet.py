@@ -42,8 +42,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         one.add_argument("fleet", type=Path, help="folder with fleet.yaml and sites/")
         one.add_argument("--site", action="append", default=[], metavar="NAME", help="only this one; may be repeated")
     status.add_argument("--page", type=Path, metavar="FOLDER", help="write the page and the reports into this folder")
-    for one, days in ((diagnose, DAYS), (recalibrate, DAYS), (calibrate, DAYS), (learn, DAYS)):
-        one.add_argument("--days", type=int, default=days, help=f"newest days of the log (default {days})")
+    for one in (diagnose, recalibrate, calibrate, learn):
+        one.add_argument("--days", type=int, default=DAYS, help=f"newest days of the log (default {DAYS})")
     collect.add_argument("--take-over", action="store_true", help="go on where another archive has collected so far")
     recalibrate.add_argument("--force", action="store_true", help="also the sites that are not due")
     publish.add_argument("--again", action="store_true", help="publish each site's bundle again, as after a new key")

@@ -65,23 +65,20 @@ def correct(
     kept: list[Estimated] = []
     for place, one in enumerate(found, 1):
         beside = (*current.terms, *(later.term for later in found[place:]))
+        # Where the effect takes over what recalibration had put into the parameters, the fit starts there.
+        begin = {name: value + one.shift.get(name, 0.0) for name, value in current.posterior.values.items()}
+        # What was found after a cause that does not stand was found beside it, and is not told either.
         try:
             asked = one if knowledge.history is None else confirmed(log, knowledge, beside, one, rules)
-        except DivergenceError:
-            break
-        if asked is None:
-            break
-        # Where the effect takes over what recalibration had put into the parameters, the fit starts there.
-        begin = {name: value + asked.shift.get(name, 0.0) for name, value in current.posterior.values.items()}
-        terms = (*current.terms, asked.term)
-        try:
+            if asked is None:
+                break
+            terms = (*current.terms, asked.term)
             trial = Stage(log.fit(knowledge.prior, terms, begin), terms)
         except DivergenceError:
             break
         judged = _judged(log, asked, current, trial)
         proven = stands if knowledge.history is None else is_proven_change
         if not proven(judged, kept, rules):
-            # What was found after it was found beside it.
             break
         kept.append(judged)
         current = trial
@@ -163,7 +160,7 @@ def _judged(log: LogDays, one: Estimated, current: Stage, trial: Stage) -> Estim
 
     What comes on few days, as rain does, may hardly have come on those that no fit has seen.
     """
-    before, after, every = log.run(current), log.run(trial), log.unseen()
+    before, after, every = log.run(current), log.run(trial), log.all_held_out()
     plain, moved = every.run(replace(trial, terms=current.terms)), every.run(trial)
     if before is None or after is None or plain is None or moved is None:
         return one

@@ -126,7 +126,7 @@ def _confounded(
     design: Design, null: Fit, hypothesis: Hypothesis, gain: float, rng: np.random.Generator
 ) -> tuple[str, ...]:
     """Return the effects that would do as well in the place of a cause of this gain, itself first."""
-    margin = max(design.rules.confounded_gain, design.rules.confounded_share * gain)
+    margin = design.rules.confounded_within(gain)
     onsets = search.onset_days(design) if hypothesis.term.onset is not None else [None]
     scored = search.score_candidates(design, null, onsets, rng)
     hidden = frozenset[str]() if design.history is None else design.history.without

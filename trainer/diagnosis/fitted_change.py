@@ -100,7 +100,7 @@ def rivals(design: Design, null: Fit, first: Hypothesis, rng: np.random.Generato
     """Return the hypotheses that gain nearly as much as the first, or more, those that gain most."""
     assert design.history is not None
     rules, gain = design.rules, change.net_gain(design, first)
-    least = gain - max(rules.confounded_gain, rules.confounded_share * gain)
+    least = gain - rules.confounded_within(gain)
     others = (
         one
         for one in search.score_candidates(design, null, [None], rng)

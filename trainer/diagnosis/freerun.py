@@ -134,8 +134,8 @@ class LogDays:
             errors[name] = np.where(wanted[samples], error, np.nan)
         return FreeRuns(shown, errors, self.split.day[starts])
 
-    def unseen(self) -> LogDays:
-        """Return the log with all of its days held out: what a model does on each of them."""
+    def all_held_out(self) -> LogDays:
+        """Return the log with all of its days held out, to run a model on each of them."""
         return replace(self, split=replace(self.split, fit=np.zeros_like(self.split.fit)))
 
     def persistence_errors(self, quantities: Iterable[str]) -> dict[str, float]:

@@ -225,7 +225,7 @@ def drifted(known: Discrepancy, plain: Design) -> Gaussian:
     assert all(row in seen for row in range(count))
     covariance = np.diag(prior**2)
     covariance[np.ix_(seen, seen)] = known.amplitudes.covariance[np.ix_(rows, rows)]
-    return Gaussian(wanted, np.zeros(len(wanted)), covariance).widened(change_of(known, plain))
+    return Gaussian(wanted, np.zeros(len(wanted)), covariance).widened(drift_over(plain, days_between(known, plain)))
 
 
 def followed(known: Discrepancy, parameters: Collection[str], share: float, deviation: float) -> Discrepancy:
@@ -243,15 +243,11 @@ def followed(known: Discrepancy, parameters: Collection[str], share: float, devi
     return replace(known, amplitudes=moved)
 
 
-def change_of(known: Discrepancy, plain: Design) -> Floats:
-    """Return the standard deviation of the change of everything from the calibration to a log, (k,)."""
+def days_between(known: Discrepancy, plain: Design) -> float:
+    """Return the days from the middle of the calibration log to that of a later one."""
     time = plain.line.record.time
-    return drift_over(plain, days_between(known, time[0] + (time[-1] - time[0]) / 2))
-
-
-def days_between(known: Discrepancy, time: np.datetime64) -> float:
-    """Return the days from the middle of the calibration log to a time."""
-    return float((time - known.middle).astype("timedelta64[s]").astype(np.float64) / 86_400.0)
+    middle = time[0] + (time[-1] - time[0]) / 2
+    return float((middle - known.middle).astype("timedelta64[s]").astype(np.float64) / 86_400.0)
 
 
 def own_gains(design: Design) -> dict[str, float]:

@@ -22,7 +22,7 @@ class NullGains:
 
     largest: Mapping[str, float]
     """In any such log, of an effect and of a parameter (``parameter:name``)."""
-    least: float = 8.0
+    least: float
     """What any change must gain: of such logs none or nearly none is given a name then, each by the gains of others."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
     """The command that learned it, its date and seeds."""

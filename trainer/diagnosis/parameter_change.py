@@ -101,7 +101,7 @@ def _told(
         rng: for the flips.
     """
     rules, onsets = design.rules, search.onset_days(design)
-    margin = max(rules.confounded_gain, rules.confounded_share * best.gain)
+    margin = rules.confounded_within(best.gain)
     if max(net.values()) > net[best.parameter] + margin:
         # One that nobody can look at explains it clearly better.
         return None

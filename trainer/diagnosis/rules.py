@@ -74,7 +74,7 @@ class DecisionRules:
     clear_change_skill: float = _tuned(
         0.025, "share of the squared error of unseen days, all else changing by physics, that needs no other proof"
     )
-    least_fitted_change: float = _tuned(4.0, "gain by physics alone from which on a change is fitted to free runs")
+    least_fitted_change: float = _tuned(4.0, "gain from which on a change is fitted to free runs")
     most_change_fits: int = _chosen(3, "changes that are fitted beside the parameters, those that gain most")
     least_change_fall: float = _fitted(
         "share of the error of unseen days that such a change must remove: more than any where nothing had changed"
@@ -94,7 +94,7 @@ class DecisionRules:
     )
     least_leading_change: float = _chosen(0.1, "share of its value by which a parameter that leads must have changed")
     least_other_change: float = _chosen(0.2, "the same of one that explains no more than an effect does")
-    least_parameter_gain: float = _tuned(20.0, "gain that its change must bring, all else changing by physics alone")
+    least_parameter_gain: float = _tuned(20.0, "gain that its change must bring")
     parameter_over_null: float = _tuned(2.0, "times its largest gain where nothing had changed that it must bring")
     parameter_over_effect: float = _tuned(
         1.1, "times the largest gain of an effect at which it goes before all effects"
@@ -152,7 +152,9 @@ class DecisionRules:
     refit_settled: float = _chosen(0.1, "move of every size, in its standard error, at which the alternations end")
 
     # Regimes: a cause is the same in all of them.
-    regime_share: float = _chosen(0.25, "least ratio of a cause's sizes in two regimes")
+    regime_share: float = _chosen(
+        0.25, "least ratio of a cause's sizes in two regimes, or by time steps and by free runs"
+    )
     regime_information: float = _chosen(0.02, "share of the information from which on a regime has a size")
     daylight: float = _chosen(20.0, "global radiation in W m-2 above which it is day")
     vents_open: float = _chosen(2.0, "sum of both vents in % from which on they are open")
@@ -183,6 +185,10 @@ class DecisionRules:
     def learns_history(self, days: float) -> bool:
         """Tell whether a calibration log of so many days is to teach what is missing in this greenhouse."""
         return self.history and days >= self.least_history_days
+
+    def confounded_within(self, gain: float) -> float:
+        """Return how much less than a cause of this gain another may gain that fits as well."""
+        return max(self.confounded_gain, self.confounded_share * gain)
 
     def least_parameter_change(self, *, leads: bool) -> float:
         """Return the share of its value by which a parameter must have changed to be named."""
