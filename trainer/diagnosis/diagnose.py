@@ -35,7 +35,7 @@ from igrow.trainer.diagnosis.diagnosed_days import newest_weeks, since_calibrati
 from igrow.trainer.diagnosis.estimate import normal_quantile
 from igrow.trainer.diagnosis.evidence import Evidence
 from igrow.trainer.diagnosis.freerun import HORIZONS, FreeRuns, LogDays, Stage, log_days, mean_absolute_errors
-from igrow.trainer.diagnosis.knowledge import ActiveTerm, knowledge_of
+from igrow.trainer.diagnosis.knowledge import VENTS, ActiveTerm, knowledge_of
 from igrow.trainer.diagnosis.nuisance import NuisanceSubspace
 from igrow.trainer.diagnosis.null_gains import NullGains
 from igrow.trainer.diagnosis.open_vents import under_open_vents
@@ -119,14 +119,16 @@ class _Question:
         log = newest_weeks(since, knowledge, rules)
         progress("completing the log")
         logged, rng = log_days(log, model), np.random.default_rng(self.seed)
+        of_vents = frozenset[str]()
+        if history.vents_hardly_open(knowledge.history, logged.record, rules):
+            of_vents, rules = VENTS, replace(rules, vent_drift=rules.narrow_vent_drift)
+            knowledge = knowledge_of(model, site, rules)
         completed = complete(log, logged, model, knowledge, rules)
         days, opened = completed.days, under_open_vents(logged.record, rules)
         off = opened is not None and opened.is_offset(rules)
         # Of a crop that may be another by now nothing is asked, nor of the light, which its leaves take up.
         of_crop = LEAVES_AND_LIGHT if rules.crop_drift > self.rules.crop_drift else frozenset[str]()
-        hidden = self.without | (frozenset({"co2_drift"}) if off else frozenset()) | of_crop
-        of_vents = history.hardly_open(knowledge.history, logged.record, rules)
-        hidden |= of_vents
+        hidden = self.without | (frozenset({"co2_drift"}) if off else frozenset()) | of_crop | of_vents
         search = search_of(days, site, knowledge, hidden, rules, self.nuisance, self.null_gains)
         progress("searching for causes")
         first, last, found = search.run(rng)
@@ -183,7 +185,7 @@ class _Question:
             *((opened.sentence,) if opened is not None and off else ()),
         )
         possible = {name for one in findings for name in one.confounded}
-        not_asked = {*first.design.untestable, *of_crop, *of_vents}
+        not_asked = {*first.design.untestable, *of_crop}
         return Diagnosis(
             site=site.name,
             verdict=verdict,

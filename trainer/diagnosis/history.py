@@ -14,7 +14,6 @@ from dataclasses import replace
 import numpy as np
 
 from igrow.core.arrays import Floats
-from igrow.core.effects import EFFECTS
 from igrow.core.simulator.hybrid.climate import ActiveEffects
 from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
@@ -30,7 +29,6 @@ from igrow.trainer.diagnosis.noise import Whitening
 from igrow.trainer.diagnosis.null_gains import NullGains, read_null_gains
 from igrow.trainer.diagnosis.recalibration import averaging
 from igrow.trainer.diagnosis.rules import DecisionRules
-from igrow.trainer.diagnosis.visible_parameters import members
 from igrow.trainer.fit.climate import site_prior
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
@@ -77,15 +75,12 @@ def opening_of(record: Record) -> float:
     return float(sum(record.inputs[row].mean() for row in ("vent_lee", "vent_wind")))
 
 
-def hardly_open(known: Discrepancy | None, record: Record, rules: DecisionRules) -> frozenset[str]:
-    """Return the parameters and effects of vents where these stand open much less than in the calibration log.
+def vents_hardly_open(known: Discrepancy | None, record: Record, rules: DecisionRules) -> bool:
+    """Tell whether the vents stand open much less than in the calibration log.
 
     A law that wide openings taught says little of narrow ones: what changes then is its error, or the vents'.
     """
-    if known is None or opening_of(record) >= rules.least_opening_share * known.opening:
-        return frozenset()
-    law = {*members("ventilation"), "vent_curvature", "vent_windward_ratio"}
-    return frozenset(law) | {name for name, one in EFFECTS.items() if {"vent_lee", "vent_wind"} & set(one.drivers)}
+    return known is not None and opening_of(record) < rules.least_opening_share * known.opening
 
 
 def jointly(

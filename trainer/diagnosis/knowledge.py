@@ -32,6 +32,8 @@ CROP = frozenset({
     "assimilation_maximum", "assimilation_light", "assimilation_co2", "respiration",
 })  # fmt: skip
 """Parameters that change as the crop does."""
+VENTS = frozenset({"vent_wind", "vent_stack", "vent_curvature", "vent_windward_ratio"})
+"""Parameters of the law of what goes through the vents, at the openings that taught it."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +107,8 @@ def drift(mean: Mapping[str, float], share: float, rules: DecisionRules) -> Floa
 
 def home_drift(mean: Mapping[str, float], rules: DecisionRules) -> Floats:
     """Return the change to expect of every parameter of a greenhouse since its calibration, (p,): the crop grows."""
-    share = np.array([rules.crop_drift if name in CROP else rules.wall_drift for name in mean])
+    of_its_kind = {**dict.fromkeys(CROP, rules.crop_drift), **dict.fromkeys(VENTS, rules.vent_drift)}
+    share = np.array([of_its_kind.get(name, rules.wall_drift) for name in mean])
     changes: Floats = share * drift(mean, 1.0, rules)
     return changes
 

@@ -63,6 +63,8 @@ class DecisionRules:
     )
     wall_drift: float = _tuned(0.015, "relative change of a parameter within some weeks, by physics")
     crop_drift: float = _tuned(0.05, "the same of a parameter of the crop")
+    vent_drift: float = _tuned(0.015, "the same of a parameter of the vents' law")
+    narrow_vent_drift: float = _chosen(0.25, "the same where the vents stand open much less than it was learned from")
     new_crop_drift: float = _chosen(0.5, "the same of a crop that the calibration has not seen, or of so much of it")
     effect_drift: float = _tuned(0.02, "change of an effect in the discrepancy, in typical amplitudes")
     co2_source_drift: float = _tuned(0.1, "the same of a source of CO2, which a growing crop looks like")
@@ -70,9 +72,11 @@ class DecisionRules:
     later_days: float = _chosen(42.0, "days from a calibration to a later log up to which these hold; then as a walk")
     change_onset_price: float = _tuned(12.0, "gain that a beginning of a change must add")
     change_last_days: int = _tuned(5, "days at the end of a log in which no beginning of a change is looked for")
-    least_change_skill: float = _tuned(-0.01, "share that a change removes at least: chance makes as much of four days")
     clear_change_skill: float = _tuned(
-        0.025, "share of the squared error of unseen days, all else changing by physics, that needs no other proof"
+        0.03, "share of the squared error of unseen days that a change must remove, all else changing by physics"
+    )
+    least_change_skill: float = _tuned(
+        -0.02, "share that the shipped model gains at least with a change in it: chance makes as much"
     )
     least_fitted_change: float = _tuned(4.0, "gain from which on a change is fitted to free runs")
     most_change_fits: int = _chosen(3, "changes that are fitted beside the parameters, those that gain most")
