@@ -49,7 +49,7 @@ def test_where_steps_and_runs_tell_another_size_nothing_is_told(
     by_runs: float, told: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(confirmation, "_by_runs", lambda *_: by_runs)
-    log = cast(Any, SimpleNamespace(fit=lambda *_: None, run=lambda _: None))
+    log = cast(Any, SimpleNamespace(fit=lambda *_: None, folds=lambda: ()))
     found = confirmed(log, knowledge_of(model_in_force(), SITE, DEFAULT), (), change(1.0), DEFAULT)
     assert (found is not None) is told
 

@@ -82,15 +82,17 @@ def test_beside_another_a_cause_must_do_more(values: dict[str, float], stays: bo
     ("values", "stays"),
     [
         ({"change_skill": 0.03, "bootstrap_p": 0.9}, True),
-        ({"skill": -0.02, "change_skill": 0.2, "bootstrap_p": 0.0}, False),
-        ({"skill": 0.04, "change_skill": -0.1, "bootstrap_p": 0.9}, True),
-        ({"skill": 0.02, "change_skill": 0.0, "bootstrap_p": 0.1}, True),
-        ({"skill": 0.02, "change_skill": 0.0, "bootstrap_p": 0.4}, False),
-        ({"skill": 0.02, "change_skill": -0.01, "bootstrap_p": 0.1}, False),
+        ({"change_skill": 0.02, "bootstrap_p": 0.0}, False),
+        # Less than this is chance.
+        ({"skill": -0.01, "change_skill": 0.2, "bootstrap_p": 0.9}, True),
+        ({"skill": -0.03, "change_skill": 0.2, "bootstrap_p": 0.0}, False),
+        ({"skill": 0.04, "change_skill": -0.1, "bootstrap_p": 0.9}, False),
         ({"change_skill": 0.1, "bootstrap_p": 0.1, "effect_to_noise": 0.1}, False),
     ],
 )
-def test_a_change_must_not_make_unseen_days_worse(values: dict[str, float], stays: bool) -> None:
+def test_a_change_must_make_unseen_days_better_and_the_shipped_model_no_worse(
+    values: dict[str, float], stays: bool
+) -> None:
     assert is_proven_change(cause(**values), [], DEFAULT) is stays
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any, cast
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,8 @@ from igrow.core.simulator.hybrid.nominal import nominal
 from igrow.trainer.data import prepare_log
 from igrow.trainer.data.splits import split_days
 from igrow.trainer.diagnosis import freerun, sensitivity
-from igrow.trainer.diagnosis.freerun import FreeRuns, LogDays
+from igrow.trainer.diagnosis.freerun import FreeRuns, LogDays, Stage
+from igrow.trainer.diagnosis.knowledge import ActiveTerm
 from igrow.trainer.fit import Gaussian
 from tests.virtual_log import SITE, virtual_log
 
@@ -67,3 +70,33 @@ def test_the_posterior_tells_how_parameters_hang_together(moved: tuple[dict[str,
     place = [found.names.index(name) for name in ("assimilation_maximum", "assimilation_light")]
     # What the canopy takes up at most and in weak light show in the same hours.
     assert abs(found.correlation[place[0], place[1]]) > 0.2
+
+
+class DaysOfTwoFolds:
+    """A log of which the first days are predicted well with a cause, and the others better by half."""
+
+    def __init__(self, fall: float | None, *others: float | None) -> None:
+        self.fall, self.others = fall, others
+
+    def folds(self) -> list[DaysOfTwoFolds]:
+        return [self, *(DaysOfTwoFolds(one) for one in self.others)]
+
+    def fit(self, prior: Gaussian, _terms: object, start: object) -> Gaussian:
+        assert start == prior.values
+        return prior
+
+    def run(self, stage: Stage) -> FreeRuns | None:
+        if self.fall is None:
+            return None
+        left = 1.0 - self.fall * bool(stage.terms)
+        return runs([[np.sqrt(left)] * 2] * 2)
+
+
+@pytest.mark.parametrize(
+    ("falls", "skill"), [((-0.1, 0.5), 0.2), ((-0.1, None), -0.1), ((None, 0.5), 0.5), ((None, None), None)]
+)
+def test_skill_is_asked_of_all_days(falls: tuple[float | None, ...], skill: float | None) -> None:
+    prior = Gaussian.independent({"transmissivity": 0.7}, {"transmissivity": 0.1})
+    before, after = Stage(prior, ()), Stage(prior, (ActiveTerm("co2_offset", 10.0, {}),))
+    found = freerun.cross_validated_skill(cast(Any, DaysOfTwoFolds(*falls)), prior, before, after)
+    assert found == (None if skill is None else pytest.approx(skill))

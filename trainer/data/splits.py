@@ -44,11 +44,20 @@ def split_days(record: Record, longitude: float) -> DaySplit:
     day = sun.solar_day(record.time, longitude)
     day -= day[0]
     days = int(day[-1]) + 1
+    return DaySplit(day, ~_held_out(days))
+
+
+def _held_out(days: int) -> Mask:
     phase = np.arange(days) % PERIOD
     held = (phase >= _FIRST) & (phase < _FIRST + HELD_OUT)
-    if days < PERIOD:
-        held[:] = False
-    return DaySplit(day, ~held)
+    return held & (days >= PERIOD)
+
+
+def folds(split: DaySplit) -> tuple[DaySplit, ...]:
+    """Return the splits of a cross-validation, the given one of `split_days` first: each day is held out in one."""
+    held = (np.roll(_held_out(split.days + PERIOD), HELD_OUT * turn)[PERIOD:] for turn in range(PERIOD // HELD_OUT))
+    turned = [DaySplit(split.day, ~one) for one in held]
+    return (split, *(turned if split.fit.all() else turned[1:]))
 
 
 def weeks(time: Times) -> Integers:

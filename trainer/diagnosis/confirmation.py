@@ -11,9 +11,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from igrow.core.effects import EFFECTS
-from igrow.trainer.diagnosis import freerun
 from igrow.trainer.diagnosis.estimate import Estimated
-from igrow.trainer.diagnosis.freerun import LogDays, Stage
+from igrow.trainer.diagnosis.freerun import LogDays, Stage, cross_validated_skill
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, activate
 from igrow.trainer.diagnosis.omission import fit_together
 from igrow.trainer.diagnosis.rules import DecisionRules
@@ -44,9 +43,9 @@ def confirmed(
             return None
         # Neither is better than the other, and they err for different reasons.
         one = _at(one, math.copysign(math.sqrt(both), size))
-    terms = (*beside, one.term)
-    plain, named = (log.run(Stage(log.fit(prior, some), some)) for some in (tuple(beside), terms))
-    return one if plain is None or named is None else replace(one, change_skill=freerun.skill(plain, named))
+    without, named = (Stage(log.fit(prior, terms), terms) for terms in (tuple(beside), (*beside, one.term)))
+    skill = cross_validated_skill(log, prior, without, named)
+    return one if skill is None else replace(one, change_skill=skill)
 
 
 def _by_runs(log: LogDays, prior: Gaussian, beside: Sequence[ActiveTerm], term: ActiveTerm) -> float | None:

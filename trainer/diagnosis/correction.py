@@ -16,7 +16,7 @@ from igrow.trainer.diagnosis import freerun
 from igrow.trainer.diagnosis.candidates import Pattern, pattern_fluxes
 from igrow.trainer.diagnosis.confirmation import confirmed
 from igrow.trainer.diagnosis.estimate import Estimated, normal_quantile
-from igrow.trainer.diagnosis.freerun import LogDays, Stage
+from igrow.trainer.diagnosis.freerun import LogDays, Stage, cross_validated_skill
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge
 from igrow.trainer.diagnosis.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.refit import REGIMES
@@ -74,9 +74,9 @@ def correct(
                 break
             terms = (*current.terms, asked.term)
             trial = Stage(log.fit(knowledge.prior, terms, begin), terms)
+            judged = _judged(log, knowledge, asked, current, trial)
         except DivergenceError:
             break
-        judged = _judged(log, asked, current, trial)
         proven = stands if knowledge.history is None else is_proven_change
         if not proven(judged, kept, rules):
             break
@@ -103,15 +103,10 @@ def stands(one: Estimated, kept: Sequence[Estimated], rules: DecisionRules) -> b
 
 
 def is_proven_change(one: Estimated, kept: Sequence[Estimated], rules: DecisionRules) -> bool:
-    """Tell whether a change stands: makes a day ahead better, or single steps of unseen days likelier at no loss.
-
-    What comes on few days, as rain does, may show on none of the unseen ones. No change stands that makes the model
-    worse that is shipped with it.
-    """
-    if not _is_large(one, rules) or (kept and not _adds_to(one, kept, rules)) or one.skill < rules.least_change_skill:
+    """Tell whether a change stands: makes a day ahead better, and the model that is shipped no worse."""
+    if not _is_large(one, rules) or (kept and not _adds_to(one, kept, rules)):
         return False
-    likelier = one.bootstrap_p <= rules.further_bootstrap_p and one.change_skill >= 0.0
-    return likelier or one.change_skill >= rules.clear_change_skill or one.skill >= rules.clear_skill
+    return one.change_skill >= rules.clear_change_skill and one.skill >= rules.least_change_skill
 
 
 def _is_large(one: Estimated, rules: DecisionRules) -> bool:
@@ -155,16 +150,21 @@ def same_in_all_regimes(regimes: Mapping[str, Estimate], rules: DecisionRules) -
     return all(a * b > 0.0 and min(a / b, b / a) >= rules.regime_share for a, b in pairs)
 
 
-def _judged(log: LogDays, one: Estimated, current: Stage, trial: Stage) -> Estimated:
+def _judged(log: LogDays, knowledge: Knowledge, one: Estimated, current: Stage, trial: Stage) -> Estimated:
     """Return the cause with its skill on unseen days, and how large it is on all of them.
 
     What comes on few days, as rain does, may hardly have come on those that no fit has seen.
     """
-    before, after, every = log.run(current), log.run(trial), log.all_held_out()
+    every = log.all_held_out()
     plain, moved = every.run(replace(trial, terms=current.terms)), every.run(trial)
-    if before is None or after is None or plain is None or moved is None:
+    if knowledge.history is not None:
+        skill = cross_validated_skill(log, knowledge.prior, current, trial)
+    else:
+        before, after = log.run(current), log.run(trial)
+        skill = None if before is None or after is None else freerun.skill(before, after)
+    if skill is None or plain is None or moved is None:
         return one
-    return replace(one, effect_to_noise=freerun.effect_to_noise(plain, moved), skill=freerun.skill(before, after))
+    return replace(one, effect_to_noise=freerun.effect_to_noise(plain, moved), skill=skill)
 
 
 def with_parameter(

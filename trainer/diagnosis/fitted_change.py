@@ -147,11 +147,29 @@ def closest(
             largest, best = closer, (one, model)
     if best is None:
         return None
-    unseen = _by_day(record, ~fitted, without, best[1])
-    if not unseen.size:
+    folds = [_by_day(record, ~fitted, without, best[1]), *_by_other_days(days, prior, known, without, best)]
+    # A quantity may not have been measured on the days of a fold: it is left out.
+    most = max(map(len, folds))
+    if not most:
         return None
+    unseen = np.concatenate([one for one in folds if len(one) == most], axis=-1)
     drawn = rng.integers(0, unseen.shape[-1], size=(design.rules.bootstrap_draws, unseen.shape[-1]))
     return Fitted(best[0], float(_fall(unseen)), float(np.mean(_fall(unseen[..., drawn]) <= 0.0)))
+
+
+def _by_other_days(
+    days: LogDays, prior: Gaussian, known: ActiveEffects, without: Model, best: tuple[Hypothesis, Model]
+) -> list[Floats]:
+    """Return the same of days that both models were fitted to, each by models that are fitted to others."""
+    found = []
+    for fold in days.folds()[1:]:
+        rows = fold.split.fit_rows
+        try:
+            plain = fit_climate([(fold.record, rows)], prior, known, start=without[0]).values
+            found.append(_by_day(fold.record, ~rows, (plain, known), _fit(fold.record, rows, prior, known, *best)))
+        except DivergenceError:
+            continue
+    return found
 
 
 def _by_day(record: Record, rows: Mask, before: Model, after: Model) -> Floats:
@@ -177,11 +195,15 @@ def _fall(errors: Floats) -> Floats:
     return np.where(np.isfinite(left), 1.0 - left, -np.inf)
 
 
-def _fit(record: Record, rows: Mask, prior: Gaussian, known: ActiveEffects, one: Hypothesis) -> Model:
-    """Return parameters and the size of an effect, fitted together to free runs."""
+def _fit(
+    record: Record, rows: Mask, prior: Gaussian, known: ActiveEffects, one: Hypothesis, start: Model | None = None
+) -> Model:
+    """Return parameters and the size of an effect, fitted together to free runs; where a fit has been, from there."""
     assert isinstance(one.cause, Candidate)
     size, shape = EFFECTS[one.effect].amplitude, one.cause.values
+    name = f"{one.effect}:{size.name}"
+    begin = None if start is None else {**start[0], name: start[1][one.effect][size.name]}
     expected = {one.effect: float(np.clip(one.amplitude, size.low, size.high))}
-    fitted = fit_together(record, rows, prior, expected, {**known, one.effect: dict(shape)})
-    sizes = {size.name: fitted.values[f"{one.effect}:{size.name}"], **shape}
+    fitted = fit_together(record, rows, prior, expected, {**known, one.effect: dict(shape)}, begin)
+    sizes = {size.name: fitted.values[name], **shape}
     return fitted.marginal(prior.names).values, {**known, one.effect: sizes}

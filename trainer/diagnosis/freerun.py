@@ -15,7 +15,7 @@ from igrow.core.arrays import Floats, Integers
 from igrow.core.simulator.hybrid import measurement
 from igrow.core.simulator.hybrid.record import Record, complete_starts, free_run, observe
 from igrow.trainer.data.log import Log
-from igrow.trainer.data.splits import DaySplit, split_days
+from igrow.trainer.data.splits import DaySplit, folds, split_days
 from igrow.trainer.diagnosis import sensitivity
 from igrow.trainer.diagnosis.candidates import Pattern
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, activate, clipped
@@ -138,6 +138,10 @@ class LogDays:
         """Return the log with all of its days held out, to run a model on each of them."""
         return replace(self, split=replace(self.split, fit=np.zeros_like(self.split.fit)))
 
+    def folds(self) -> tuple[LogDays, ...]:
+        """Return the log with each of its days held out once, these first."""
+        return tuple(replace(self, split=one) for one in folds(self.split))
+
     def persistence_errors(self, quantities: Iterable[str]) -> dict[str, float]:
         """Return the mean absolute error of yesterday's readings on held-out days, by quantity that has any."""
         rows = round(86_400.0 / self.record.step)
@@ -177,6 +181,32 @@ def effect_to_noise(plain: FreeRuns, corrected: FreeRuns) -> float:
 def skill(before: FreeRuns, after: FreeRuns) -> float:
     """Return the fall of the squared error over its mean before, mean over quantities and days."""
     return float(skill_by_day(before, after).mean())
+
+
+def cross_validated_skill(log: LogDays, prior: Gaussian, before: Stage, after: Stage) -> float | None:
+    """Return the skill on all days, each predicted by models that were fitted to others; None where no run fits.
+
+    What comes on few days shows on some of them, and the chance of a few unseen days counts less.
+
+    Args:
+        log: whose fit days both stages were fitted to.
+        prior: that they were fitted under.
+        before: one of them.
+        after: the other.
+
+    Raises:
+        DivergenceError: a model runs out of all bounds.
+    """
+    falls = []
+    for number, fold in enumerate(log.folds()):
+        fitted = (
+            one if number == 0 else replace(one, posterior=fold.fit(prior, one.terms, one.posterior.values))
+            for one in (before, after)
+        )
+        old, new = (fold.run(one) for one in fitted)
+        if old is not None and new is not None:
+            falls.append(skill_by_day(old, new))
+    return float(np.concatenate(falls).mean()) if falls else None
 
 
 def skill_by_day(before: FreeRuns, after: FreeRuns) -> Floats:
