@@ -104,7 +104,8 @@ def test_beside_a_cause_that_was_found_before_fits_are_asked_with_it(monkeypatch
     ("closest", "proven", "fall", "named"),
     [
         ("first", 20.0, 0.0, "first"),
-        ("other", 20.0, 0.0, "other"),
+        ("other", 20.0, 0.01, "other"),
+        ("other", 20.0, -0.01, "first"),
         ("other", 9.0, 0.2, "other"),
         ("other", 9.0, 0.01, ""),
     ],

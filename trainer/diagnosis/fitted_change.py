@@ -86,7 +86,8 @@ def settled(days: LogDays, knowledge: Knowledge, design: Design, told: Round, rn
     # Of what began within the log there is no one size to fit.
     near = [] if first.term.onset is not None else rivals(design, null, first, rng)
     found = closest(days, knowledge, design, [first, *near], rng) if near else None
-    if found is None or found.hypothesis.effect == first.effect:
+    # What makes days worse that no fit saw is no rival.
+    if found is None or found.hypothesis.effect == first.effect or found.fall <= 0.0:
         return told
     other = found.hypothesis
     if change.proven_gain(design, other) >= design.history.null_gains.needed(other.effect):
