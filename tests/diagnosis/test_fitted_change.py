@@ -19,6 +19,7 @@ from igrow.trainer.diagnosis.linear import Term
 from igrow.trainer.diagnosis.null_gains import NullGains
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.fit import evaluation
+from igrow.trainer.fit.solver import DivergenceError
 from tests.diagnosis.conftest import model_in_force
 from tests.diagnosis.synthetic_design import Truth
 from tests.diagnosis.test_parameter_change import with_parameters
@@ -59,6 +60,17 @@ def test_what_no_unseen_day_bears_out_is_not_told(quiet_log: Log, monkeypatch: p
         return measured(*arguments) if np.array_equal(arguments[3], asked) else {}
 
     monkeypatch.setattr(fitted_change, "errors_of", errors_of)
+    assert closest(shown) is None
+
+
+def test_what_a_model_cannot_run_with_on_other_days_is_not_told(
+    quiet_log: Log, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def diverges(*_: Any) -> Any:
+        raise DivergenceError("the model runs out of all bounds")
+
+    shown = quiet_log.with_columns({"air_humidity": quiet_log.telemetry["air_humidity"] + 6.0})
+    monkeypatch.setattr(fitted_change, "_by_other_days", diverges)
     assert closest(shown) is None
 
 

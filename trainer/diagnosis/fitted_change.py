@@ -148,7 +148,10 @@ def closest(
             largest, best = closer, (one, model)
     if best is None:
         return None
-    folds = [_by_day(record, ~fitted, without, best[1]), *_by_other_days(days, prior, known, without, best)]
+    try:
+        folds = [_by_day(record, ~fitted, without, best[1]), *_by_other_days(days, prior, known, without, best)]
+    except DivergenceError:
+        return None
     # A quantity may not have been measured on the days of a fold: it is left out.
     most = max(map(len, folds))
     if not most:
@@ -161,15 +164,12 @@ def closest(
 def _by_other_days(
     days: LogDays, prior: Gaussian, known: ActiveEffects, without: Model, best: tuple[Hypothesis, Model]
 ) -> list[Floats]:
-    """Return the same of days that both models were fitted to, each by models that are fitted to others."""
+    """Return the sums of `_by_day` on days that both were fitted to, each by models that are fitted to others."""
     found = []
     for fold in days.folds()[1:]:
         rows = fold.split.fit_rows
-        try:
-            plain = fit_climate([(fold.record, rows)], prior, known, start=without[0]).values
-            found.append(_by_day(fold.record, ~rows, (plain, known), _fit(fold.record, rows, prior, known, *best)))
-        except DivergenceError:
-            continue
+        plain = fit_climate([(fold.record, rows)], prior, known, start=without[0]).values
+        found.append(_by_day(fold.record, ~rows, (plain, known), _fit(fold.record, rows, prior, known, *best)))
     return found
 
 

@@ -184,9 +184,10 @@ def skill(before: FreeRuns, after: FreeRuns) -> float:
 
 
 def cross_validated_skill(log: LogDays, prior: Gaussian, before: Stage, after: Stage) -> float | None:
-    """Return the skill on all days, each predicted by models that were fitted to others; None where no run fits.
+    """Return the skill on all days, each by parameters that were fitted to others; None where no run fits.
 
-    What comes on few days shows on some of them, and the chance of a few unseen days counts less.
+    What comes on few days shows on some of them, and the chance of a few unseen days counts less. Which terms the
+    stages have, and their sizes, stay as the log's fit days told them: only its own held-out days are new to these.
 
     Args:
         log: whose fit days both stages were fitted to.
