@@ -20,7 +20,7 @@ from igrow.trainer.diagnosis import change, linear, search
 from igrow.trainer.diagnosis.candidates import Candidate
 from igrow.trainer.diagnosis.compare import Round
 from igrow.trainer.diagnosis.design import Design
-from igrow.trainer.diagnosis.freerun import LogDays
+from igrow.trainer.diagnosis.freerun import TURN_EVALUATIONS, LogDays
 from igrow.trainer.diagnosis.knowledge import Knowledge, activate
 from igrow.trainer.diagnosis.linear import Fit
 from igrow.trainer.diagnosis.omission import DAY, fit_together
@@ -28,7 +28,7 @@ from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.fit.climate import fit_climate
 from igrow.trainer.fit.evaluation import Model, errors_of, free_runs
 from igrow.trainer.fit.gaussian import Gaussian
-from igrow.trainer.fit.solver import DivergenceError
+from igrow.trainer.fit.solver import EVALUATIONS, DivergenceError
 
 _UNMEASURED = 1e-12
 """Stands for the error of days without a measurement."""
@@ -168,7 +168,7 @@ def _by_other_days(
     found = []
     for fold in days.folds()[1:]:
         rows = fold.split.fit_rows
-        plain = fit_climate([(fold.record, rows)], prior, known, start=without[0]).values
+        plain = fit_climate([(fold.record, rows)], prior, known, start=without[0], evaluations=TURN_EVALUATIONS).values
         found.append(_by_day(fold.record, ~rows, (plain, known), _fit(fold.record, rows, prior, known, *best)))
     return found
 
@@ -204,7 +204,9 @@ def _fit(
     size, shape = EFFECTS[one.effect].amplitude, one.cause.values
     name = f"{one.effect}:{size.name}"
     begin = None if start is None else {**start[0], name: start[1][one.effect][size.name]}
+    points = EVALUATIONS if start is None else TURN_EVALUATIONS
     expected = {one.effect: float(np.clip(one.amplitude, size.low, size.high))}
-    fitted = fit_together(record, rows, prior, expected, {**known, one.effect: dict(shape)}, begin)
+    active = {**known, one.effect: dict(shape)}
+    fitted = fit_together(record, rows, prior, expected, active, begin, evaluations=points)
     sizes = {size.name: fitted.values[name], **shape}
     return fitted.marginal(prior.names).values, {**known, one.effect: sizes}

@@ -6,7 +6,7 @@ A forecast is judged by its free run, so the parameters that are shipped are tho
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -33,6 +33,8 @@ SCALES = np.array([ERROR_SCALES[name] for name in measurement.PREDICTED])[:, Non
 """Of errors by balance, (3, 1, 1)."""
 EVALUATIONS = 20
 """Points that a fit may try."""
+TURN_EVALUATIONS = 3
+"""Those of a fit to other days, which begins where one has ended: more of them move a skill by less than .002."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +76,7 @@ class LogDays:
         terms: Sequence[ActiveTerm],
         start: Mapping[str, float] | None = None,
         added: Mapping[str, Floats] | None = None,
+        evaluations: int = EVALUATIONS,
     ) -> Gaussian:
         """Return the posterior of the parameters, fitted to the fit days beside terms.
 
@@ -82,6 +85,7 @@ class LogDays:
             terms: active, held.
             start: where to begin, by name (None: the prior's mean).
             added: further fluxes by channel, (n,).
+            evaluations: points that each method of the search may try.
 
         Raises:
             DivergenceError: the model runs out of all bounds where the fit begins.
@@ -104,7 +108,7 @@ class LogDays:
 
         weight = record.step / CORRELATION_TIME
         return solver.solve(
-            residuals, jacobian, prior, low, high, weights=weight, robust=ROBUST, start=begin, evaluations=EVALUATIONS
+            residuals, jacobian, prior, low, high, weights=weight, robust=ROBUST, start=begin, evaluations=evaluations
         ).posterior
 
     def run(self, stage: Stage, horizon: str = "24_h") -> FreeRuns | None:
@@ -154,6 +158,10 @@ class LogDays:
         return errors
 
 
+Resize = Callable[[LogDays, Stage], tuple[ActiveTerm, ...]]
+"""Returns the terms of a stage at the sizes that the fit days of a log tell."""
+
+
 def log_days(log: Log, model: FittedModel) -> LogDays:
     """Return the record of a log as a model reads it, split into days, with its runs."""
     shift = log.best_shift(model.posterior.values) if model.alignment is None else model.alignment
@@ -183,31 +191,40 @@ def skill(before: FreeRuns, after: FreeRuns) -> float:
     return float(skill_by_day(before, after).mean())
 
 
-def cross_validated_skill(log: LogDays, prior: Gaussian, before: Stage, after: Stage) -> float | None:
-    """Return the skill on all days, each by parameters that were fitted to others; None where no run fits.
+def cross_validated_skill(
+    log: LogDays, prior: Gaussian, before: Stage, after: Stage, sized: Resize | None = None
+) -> float | None:
+    """Return the skill on all days, each by models that were fitted to others; None where no run fits.
 
     What comes on few days shows on some of them, and the chance of a few unseen days counts less. Which terms the
-    stages have, and their sizes, stay as the log's fit days told them: only its own held-out days are new to these.
+    stages have stays as the log's fit days told it: only its own held-out days are new to that.
 
     Args:
         log: whose fit days both stages were fitted to.
         prior: that they were fitted under.
         before: one of them.
         after: the other.
+        sized: returns the terms of `after` at the sizes that the fit days of a turn tell (None: they stay).
 
     Raises:
         DivergenceError: a model runs out of all bounds.
     """
     falls = []
     for number, fold in enumerate(log.folds()):
-        fitted = (
-            one if number == 0 else replace(one, posterior=fold.fit(prior, one.terms, one.posterior.values))
-            for one in (before, after)
-        )
-        old, new = (fold.run(one) for one in fitted)
+        if number:
+            resized = after if sized is None else replace(after, terms=sized(fold, after))
+            turn = [_in_turn(fold, prior, before), _in_turn(fold, prior, resized)]
+        else:
+            turn = [before, after]
+        old, new = (fold.run(one) for one in turn)
         if old is not None and new is not None:
             falls.append(skill_by_day(old, new))
     return float(np.concatenate(falls).mean()) if falls else None
+
+
+def _in_turn(fold: LogDays, prior: Gaussian, one: Stage) -> Stage:
+    fitted = fold.fit(prior, one.terms, one.posterior.values, evaluations=TURN_EVALUATIONS)
+    return replace(one, posterior=fitted)
 
 
 def skill_by_day(before: FreeRuns, after: FreeRuns) -> Floats:

@@ -32,6 +32,8 @@ Answer = TypeVar("Answer")
 
 DIFFERENCE = 0.05
 """Finite difference of a parameter, in standard deviations of its prior."""
+EVALUATIONS = 60
+"""Points that a search may try by each of its two methods."""
 _COST_TOLERANCE = 1e-5
 """Relative fall of the cost at which a search ends."""
 _STEP_TOLERANCE = 1e-3
@@ -72,7 +74,7 @@ def solve(
     weights: Floats | float = 1.0,
     robust: float = np.inf,
     start: Floats | None = None,
-    evaluations: int = 60,
+    evaluations: int = EVALUATIONS,
     progress: Callable[[int, Floats], None] | None = None,
 ) -> Solution:
     """Return the minimum.
@@ -86,7 +88,7 @@ def solve(
         weights: independent errors that each one counts for, (n,); 0 leaves it out, and it may then be NaN.
         robust: size of an error from which on it counts linearly.
         start: where the search begins, (p,); None: at the prior's mean.
-        evaluations: points to try, at most.
+        evaluations: points that each method may try.
         progress: is told the number of each step, and the errors there, (n,).
 
     Raises:
