@@ -11,7 +11,7 @@ from igrow.core.simulator.hybrid.nominal import nominal
 from igrow.trainer.data import prepare_log
 from igrow.trainer.data.splits import split_days
 from igrow.trainer.diagnosis import freerun, sensitivity
-from igrow.trainer.diagnosis.freerun import FreeRuns, LogDays, Stage
+from igrow.trainer.diagnosis.freerun import FreeRuns, LogDays, Refittable, Stage
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
 from igrow.trainer.fit import Gaussian
 from tests.virtual_log import SITE, virtual_log
@@ -81,8 +81,8 @@ class DaysOfTwoFolds:
     def folds(self) -> list[DaysOfTwoFolds]:
         return [self, *(DaysOfTwoFolds(one) for one in self.others)]
 
-    def fit(self, prior: Gaussian, _terms: object, start: object) -> Gaussian:
-        assert start == prior.values
+    def fit(self, prior: Gaussian, _terms: object, start: object, added: object, evaluations: int) -> Gaussian:
+        assert start == prior.values and not added and evaluations < freerun.EVALUATIONS
         return prior
 
     def run(self, stage: Stage) -> FreeRuns | None:
@@ -97,6 +97,6 @@ class DaysOfTwoFolds:
 )
 def test_skill_is_asked_of_all_days(falls: tuple[float | None, ...], skill: float | None) -> None:
     prior = Gaussian.independent({"transmissivity": 0.7}, {"transmissivity": 0.1})
-    before, after = Stage(prior, ()), Stage(prior, (ActiveTerm("co2_offset", 10.0, {}),))
-    found = freerun.cross_validated_skill(cast(Any, DaysOfTwoFolds(*falls)), prior, before, after)
+    before, after = (Refittable(Stage(prior, terms), prior) for terms in ((), (ActiveTerm("co2_offset", 10.0, {}),)))
+    found = freerun.cross_validated_skill(cast(Any, DaysOfTwoFolds(*falls)), before, after)
     assert found == (None if skill is None else pytest.approx(skill))

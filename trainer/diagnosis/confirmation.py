@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from igrow.core.effects import EFFECTS
 from igrow.trainer.diagnosis.estimate import Estimated
-from igrow.trainer.diagnosis.freerun import TURN_EVALUATIONS, LogDays, Stage, cross_validated_skill
+from igrow.trainer.diagnosis.freerun import TURN_EVALUATIONS, LogDays, Refittable, Stage, cross_validated_skill
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, activate
 from igrow.trainer.diagnosis.omission import fit_together
 from igrow.trainer.diagnosis.rules import DecisionRules
@@ -51,7 +51,7 @@ def confirmed(
         size = _by_runs(fold, prior, others, last, stage.posterior.values)
         return (*others, last if size is None else replace(last, amplitude=size))
 
-    skill = cross_validated_skill(log, prior, without, named, sized)
+    skill = cross_validated_skill(log, Refittable(without, prior), Refittable(named, prior, sized))
     return one if skill is None else replace(one, change_skill=skill)
 
 

@@ -16,7 +16,7 @@ from igrow.trainer.diagnosis import freerun
 from igrow.trainer.diagnosis.candidates import Pattern, pattern_fluxes
 from igrow.trainer.diagnosis.confirmation import confirmed
 from igrow.trainer.diagnosis.estimate import Estimated, normal_quantile
-from igrow.trainer.diagnosis.freerun import LogDays, Stage, cross_validated_skill
+from igrow.trainer.diagnosis.freerun import LogDays, Refittable, Stage, cross_validated_skill
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge
 from igrow.trainer.diagnosis.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.refit import REGIMES
@@ -158,7 +158,8 @@ def _judged(log: LogDays, knowledge: Knowledge, one: Estimated, current: Stage, 
     every = log.all_held_out()
     plain, moved = every.run(replace(trial, terms=current.terms)), every.run(trial)
     if knowledge.history is not None:
-        skill = cross_validated_skill(log, knowledge.prior, current, trial)
+        prior = knowledge.prior
+        skill = cross_validated_skill(log, Refittable(current, prior), Refittable(trial, prior))
     else:
         before, after = log.run(current), log.run(trial)
         skill = None if before is None or after is None else freerun.skill(before, after)
@@ -195,7 +196,7 @@ def with_parameter(
     faults = (*recalibrated.terms, *rivals)
     try:
         without, faulty, alone, beside = (
-            Stage(log.fit(prior, terms), terms)
+            Refittable(Stage(log.fit(prior, terms), terms), prior)
             for prior, terms in (
                 (by_physics, recalibrated.terms),
                 (by_physics, faults),
@@ -203,17 +204,19 @@ def with_parameter(
                 (knowledge.prior.widened_along(known.mean * changed), recalibrated.terms),
             )
         )
+        over_none = cross_validated_skill(log, without, alone)
+        over_faults = cross_validated_skill(log, faulty, alone) if rivals else over_none
+        shipped = cross_validated_skill(log, Refittable(recalibrated, knowledge.prior), beside)
     except DivergenceError:
         return result
-    old, rival, new, before, after = (log.run(one) for one in (without, faulty, alone, recalibrated, beside))
-    if old is None or rival is None or new is None or before is None or after is None:
+    if over_none is None or over_faults is None or shipped is None:
         return result if rivals else replace(result, parameter=parameter)
-    if min(freerun.skill(old, new), freerun.skill(rival, new)) < rules.least_skill:
+    if min(over_none, over_faults) < rules.least_skill:
         return result
-    fitted = _sized(parameter, known, alone.posterior, rules)
+    fitted = _sized(parameter, known, alone.stage.posterior, rules)
     if fitted is None:
         return result
-    corrected = beside if freerun.skill(before, after) >= 0.0 else recalibrated
+    corrected = beside.stage if shipped >= 0.0 else recalibrated
     return replace(result, stages={**result.stages, "corrected": corrected}, kept=(), parameter=fitted)
 
 

@@ -158,8 +158,26 @@ class LogDays:
         return errors
 
 
-Resize = Callable[[LogDays, Stage], tuple[ActiveTerm, ...]]
-"""Returns the terms of a stage at the sizes that the fit days of a log tell."""
+@dataclass(frozen=True)
+class Refittable:
+    """A stage, and how it is fitted to other days."""
+
+    stage: Stage
+    prior: Gaussian
+    """That its parameters were fitted under."""
+    sized: Callable[[LogDays, Stage], tuple[ActiveTerm, ...]] | None = None
+    """Returns the stage's terms at the sizes that the fit days of a log tell; None: they stay."""
+
+    def refitted(self, log: LogDays) -> Stage:
+        """Return the stage fitted to the fit days of a log, from where it is.
+
+        Raises:
+            DivergenceError: the model runs out of all bounds.
+        """
+        terms = self.stage.terms if self.sized is None else self.sized(log, self.stage)
+        start, added = self.stage.posterior.values, self.stage.added
+        fitted = log.fit(self.prior, terms, start, added, evaluations=TURN_EVALUATIONS)
+        return replace(self.stage, posterior=fitted, terms=terms)
 
 
 def log_days(log: Log, model: FittedModel) -> LogDays:
@@ -191,40 +209,26 @@ def skill(before: FreeRuns, after: FreeRuns) -> float:
     return float(skill_by_day(before, after).mean())
 
 
-def cross_validated_skill(
-    log: LogDays, prior: Gaussian, before: Stage, after: Stage, sized: Resize | None = None
-) -> float | None:
+def cross_validated_skill(log: LogDays, before: Refittable, after: Refittable) -> float | None:
     """Return the skill on all days, each by models that were fitted to others; None where no run fits.
 
     What comes on few days shows on some of them, and the chance of a few unseen days counts less. Which terms the
     stages have stays as the log's fit days told it: only its own held-out days are new to that.
 
     Args:
-        log: whose fit days both stages were fitted to.
-        prior: that they were fitted under.
+        log: whose fit days both were fitted to.
         before: one of them.
         after: the other.
-        sized: returns the terms of `after` at the sizes that the fit days of a turn tell (None: they stay).
 
     Raises:
         DivergenceError: a model runs out of all bounds.
     """
     falls = []
     for number, fold in enumerate(log.folds()):
-        if number:
-            resized = after if sized is None else replace(after, terms=sized(fold, after))
-            turn = [_in_turn(fold, prior, before), _in_turn(fold, prior, resized)]
-        else:
-            turn = [before, after]
-        old, new = (fold.run(one) for one in turn)
+        old, new = (fold.run(one.refitted(fold) if number else one.stage) for one in (before, after))
         if old is not None and new is not None:
             falls.append(skill_by_day(old, new))
     return float(np.concatenate(falls).mean()) if falls else None
-
-
-def _in_turn(fold: LogDays, prior: Gaussian, one: Stage) -> Stage:
-    fitted = fold.fit(prior, one.terms, one.posterior.values, evaluations=TURN_EVALUATIONS)
-    return replace(one, posterior=fitted)
 
 
 def skill_by_day(before: FreeRuns, after: FreeRuns) -> Floats:
