@@ -9,8 +9,9 @@ import pytest
 
 from igrow.core.bundle import Estimate
 from igrow.core.effects import EFFECTS
-from igrow.trainer.diagnosis import compare
+from igrow.trainer.diagnosis import compare, linear, search
 from igrow.trainer.diagnosis.candidates import Candidate
+from igrow.trainer.diagnosis.compare import Contender, Profile, Round
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.estimate import Estimated, estimate, normal_quantile, with_refitted, within_bounds
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
@@ -61,6 +62,20 @@ def test_a_cause_that_looks_the_same_is_confounded_with_it_and_one_that_does_not
     (column,) = design.columns("effect:co2_valve_leak")
     twins = with_column(design, "effect:soil_respiration", design.values[column])
     assert set(estimated(twins).confounded) == {"co2_valve_leak", "soil_respiration"}
+
+
+def test_what_gains_next_to_nothing_is_not_as_good_as_a_cause_that_gains_little() -> None:
+    # A gain of some five nats, and a tenth of one: these lie within six.
+    design, rng = in_fitted_noise(make_design(Truth({"lamp_heat": 0.11}, {}), seed=3)), np.random.default_rng(0)
+    null = linear.fit(design.grams, design.null_model())
+    scored = search.score_candidates(design, null, [None], rng)
+    (cause,) = (one for one in scored if one.effect == "lamp_heat")
+    assert DEFAULT.least_fitted_change < cause.gain < DEFAULT.confounded_gain
+    assert [one.effect for one in scored if 0.0 < one.gain < DEFAULT.least_fitted_change]
+    named = linear.fit(design.grams, null.model.with_term(cause.term))
+    profiled = Profile(named.model, (), (), design.whitening, -named.day_losses, 0.0)
+    found = estimate(Round(design, null, named, Contender(cause, cause.gain, profiled, 0.0), ()), rng)
+    assert found is not None and found.confounded == ("lamp_heat",)
 
 
 def test_the_interval_of_a_beginning_holds_it() -> None:

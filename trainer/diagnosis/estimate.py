@@ -125,12 +125,15 @@ def reach(rules: DecisionRules) -> float:
 def _confounded(
     design: Design, null: Fit, hypothesis: Hypothesis, gain: float, rng: np.random.Generator
 ) -> tuple[str, ...]:
-    """Return the effects that would do as well in the place of a cause of this gain, itself first."""
-    margin = design.rules.confounded_within(gain)
+    """Return the effects that would do as well in the place of a cause of this gain, itself first.
+
+    Of a cause that only fits to free runs tell, what gains too little to be fitted is as good by nothing.
+    """
+    least = max(gain - design.rules.confounded_within(gain), design.rules.least_fitted_change)
     onsets = search.onset_days(design) if hypothesis.term.onset is not None else [None]
     scored = search.score_candidates(design, null, onsets, rng)
     hidden = frozenset[str]() if design.history is None else design.history.without
-    as_good = [one.effect for one in scored if one.gain >= gain - margin and one.effect not in hidden]
+    as_good = [one.effect for one in scored if one.gain >= least and one.effect not in hidden]
     return (hypothesis.effect, *(name for name in as_good if name != hypothesis.effect))
 
 
