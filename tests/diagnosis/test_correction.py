@@ -83,6 +83,9 @@ def test_beside_another_a_cause_must_do_more(values: dict[str, float], stays: bo
     [
         ({"change_skill": 0.03, "bootstrap_p": 0.9}, True),
         ({"change_skill": 0.02, "bootstrap_p": 0.0}, False),
+        ({"change_skill": 0.02, "over_null": 2.0}, False),
+        ({"change_skill": 0.02, "over_null": 3.0}, True),
+        ({"change_skill": 0.005, "over_null": 3.0}, False),
         # Less than this is chance.
         ({"skill": -0.01, "change_skill": 0.2, "bootstrap_p": 0.9}, True),
         ({"skill": -0.03, "change_skill": 0.2, "bootstrap_p": 0.0}, False),
@@ -159,7 +162,11 @@ class DaysThatErr:
     def __init__(self, plain: float, freed: float, faulty: float) -> None:
         self.errors = plain, freed, faulty
 
-    def fit(self, prior: Gaussian, _terms: Sequence[ActiveTerm]) -> Gaussian:
+    def folds(self) -> tuple[DaysThatErr, ...]:
+        """All days are like these."""
+        return self, self
+
+    def fit(self, prior: Gaussian, _terms: Sequence[ActiveTerm], *_start: object, **_evaluations: int) -> Gaussian:
         """Half of the light comes through the cover, where that may be."""
         here = np.array([name == "transmissivity" for name in prior.names])
         return prior.moved(prior.mean * (1.0 - 0.5 * here)) if self._is_free(prior) else prior

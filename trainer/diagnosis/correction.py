@@ -106,7 +106,9 @@ def is_proven_change(one: Estimated, kept: Sequence[Estimated], rules: DecisionR
     """Tell whether a change stands: makes a day ahead better, and the model that is shipped no worse."""
     if not _is_large(one, rules) or (kept and not _adds_to(one, kept, rules)):
         return False
-    return one.change_skill >= rules.clear_change_skill and one.skill >= rules.least_change_skill
+    far_beyond_null = one.over_null >= rules.far_over_null
+    enough = rules.least_skill if far_beyond_null else rules.clear_change_skill
+    return one.change_skill >= enough and one.skill >= rules.least_change_skill
 
 
 def _is_large(one: Estimated, rules: DecisionRules) -> bool:

@@ -9,7 +9,7 @@ from scipy.stats import chi2, norm
 
 from igrow.core.bundle import Estimate
 from igrow.core.effects import EFFECTS
-from igrow.trainer.diagnosis import linear, search
+from igrow.trainer.diagnosis import change, linear, search
 from igrow.trainer.diagnosis.candidates import Candidate
 from igrow.trainer.diagnosis.compare import Round
 from igrow.trainer.diagnosis.design import Design
@@ -57,6 +57,8 @@ class Estimated:
     """Share of the squared error on unseen days that it removes."""
     change_skill: float = 0.0
     """The same of a change, where parameters change as physics alone lets expect."""
+    over_null: float = 0.0
+    """Gain of a change over what it must gain: more than it did wherever nothing had changed."""
 
     @property
     def effect(self) -> str:
@@ -75,7 +77,8 @@ def estimate(found: Round, rng: np.random.Generator) -> Estimated | None:
     onset = onset_interval(design, null, hypothesis.term)
     shape = _shape(design, null, hypothesis)
     count = len(design.block("parameter"))
-    change = found.named.solution.coefficients[:count] - null.solution.coefficients[:count]
+    shift = found.named.solution.coefficients[:count] - null.solution.coefficients[:count]
+    known = None if design.history is None else design.history.null_gains
     return Estimated(
         hypothesis,
         ActiveTerm(hypothesis.effect, amplitude, shape, None if onset is None else onset.time),
@@ -84,7 +87,8 @@ def estimate(found: Round, rng: np.random.Generator) -> Estimated | None:
         onset,
         _confounded(design, null, hypothesis, gain, rng),
         found.cause.bootstrap_p,
-        dict(zip(design.prior.names, change.tolist(), strict=True)),
+        dict(zip(design.prior.names, shift.tolist(), strict=True)),
+        over_null=0.0 if known is None else change.proven_gain(design, hypothesis) / known.needed(hypothesis.effect),
     )
 
 

@@ -75,6 +75,7 @@ class DecisionRules:
     clear_change_skill: float = _tuned(
         0.03, "share of the squared error of unseen days that a change must remove, all else changing by physics"
     )
+    far_over_null: float = _tuned(2.5, "times what a change must gain from which on `least_skill` is enough of it")
     least_change_skill: float = _tuned(
         -0.02, "share that the shipped model gains at least with a change in it: chance makes as much"
     )
