@@ -7,17 +7,16 @@ and then follow what is missing: a day ahead is nearly as good without its name.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from igrow.core.effects import EFFECTS
 from igrow.trainer.diagnosis.estimate import Estimated
-from igrow.trainer.diagnosis.freerun import TURN_EVALUATIONS, LogDays, Refittable, Stage, cross_validated_skill
+from igrow.trainer.diagnosis.freerun import LogDays, Refittable, Stage, cross_validated_skill
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, activate
 from igrow.trainer.diagnosis.omission import fit_together
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.fit.gaussian import Gaussian
-from igrow.trainer.fit.solver import EVALUATIONS
 
 
 def confirmed(
@@ -45,36 +44,20 @@ def confirmed(
         # Neither is better than the other, and they err for different reasons.
         one = _at(one, math.copysign(math.sqrt(both), size))
     without, named = (Stage(log.fit(prior, terms), terms) for terms in (tuple(beside), (*beside, one.term)))
-
-    def sized(fold: LogDays, stage: Stage) -> tuple[ActiveTerm, ...]:
-        *others, last = stage.terms
-        size = _by_runs(fold, prior, others, last, stage.posterior.values)
-        return (*others, last if size is None else replace(last, amplitude=size))
-
-    skill = cross_validated_skill(log, Refittable(without, prior), Refittable(named, prior, sized))
+    skill = cross_validated_skill(log, Refittable(without, prior), Refittable(named, prior, sized=True))
     return one if skill is None else replace(one, change_skill=skill)
 
 
-def _by_runs(
-    log: LogDays,
-    prior: Gaussian,
-    beside: Sequence[ActiveTerm],
-    term: ActiveTerm,
-    start: Mapping[str, float] | None = None,
-) -> float | None:
+def _by_runs(log: LogDays, prior: Gaussian, beside: Sequence[ActiveTerm], term: ActiveTerm) -> float | None:
     """Return the size that the free runs of the fitted days ask for; None where something began within the log.
 
-    Of that there is no one size. Where a fit to other days has been the search is short.
+    Of that there is no one size.
     """
     if any(one.onset is not None for one in (*beside, term)):
         return None
     name = f"{term.effect}:{EFFECTS[term.effect].amplitude.name}"
     known = {**activate(log.record, beside), term.effect: dict(term.shape)}
-    begin = None if start is None else {**start, name: term.amplitude}
-    points = EVALUATIONS if start is None else TURN_EVALUATIONS
-    fitted = fit_together(
-        log.record, log.split.fit_rows, prior, {term.effect: term.amplitude}, known, begin, evaluations=points
-    )
+    fitted = fit_together(log.record, log.split.fit_rows, prior, {term.effect: term.amplitude}, known)
     return fitted.values[name]
 
 

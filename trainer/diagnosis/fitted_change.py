@@ -14,21 +14,20 @@ import numpy as np
 
 from igrow.core.arrays import Floats, Mask
 from igrow.core.effects import EFFECTS
-from igrow.core.simulator.hybrid.climate import ActiveEffects
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.diagnosis import change, linear, search
 from igrow.trainer.diagnosis.candidates import Candidate
 from igrow.trainer.diagnosis.compare import Round
 from igrow.trainer.diagnosis.design import Design
-from igrow.trainer.diagnosis.freerun import TURN_EVALUATIONS, LogDays
-from igrow.trainer.diagnosis.knowledge import Knowledge, activate
+from igrow.trainer.diagnosis.freerun import LogDays, Refittable, Stage
+from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, activate
 from igrow.trainer.diagnosis.linear import Fit
 from igrow.trainer.diagnosis.omission import DAY, fit_together
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.fit.climate import fit_climate
-from igrow.trainer.fit.evaluation import Model, errors_of, free_runs
+from igrow.trainer.fit.evaluation import errors_of, free_runs
 from igrow.trainer.fit.gaussian import Gaussian
-from igrow.trainer.fit.solver import EVALUATIONS, DivergenceError
+from igrow.trainer.fit.solver import DivergenceError
 
 _UNMEASURED = 1e-12
 """Stands for the error of days without a measurement."""
@@ -127,31 +126,33 @@ def closest(
     days: LogDays, knowledge: Knowledge, design: Design, hypotheses: list[Hypothesis], rng: np.random.Generator
 ) -> Fitted | None:
     """Return the hypothesis that brings the fitted days closest to what was measured, and its fall on unseen days."""
-    record, fitted = days.record, days.split.fit_rows
-    known = activate(record, knowledge.terms)
+    record, terms = days.record, knowledge.terms
+    known = activate(record, terms)
     # Of what began within the log there is no one size beside which another could be fitted.
     if not hypotheses or any(np.ndim(value) for effect in known.values() for value in effect.values()):
         return None
     prior = knowledge.by_physics(design.rules)
     try:
-        without: Model = (fit_climate([(record, fitted)], prior, known).values, known)
+        without = Stage(fit_climate([(record, days.split.fit_rows)], prior, known), terms)
     except DivergenceError:
         return None
-    best: tuple[Hypothesis, Model] | None = None
+    best: tuple[Hypothesis, Stage] | None = None
     largest = 0.0
     for one in hypotheses:
         try:
-            model = _fit(record, fitted, prior, known, one)
+            stage = _fit(days, prior, terms, one)
         except DivergenceError:
             continue
-        if (closer := float(_fall(_by_day(record, fitted, without, model)))) > largest:
-            largest, best = closer, (one, model)
+        if (closer := float(_fall(_by_day(record, days.split.fit_rows, without, stage)))) > largest:
+            largest, best = closer, (one, stage)
     if best is None:
         return None
     try:
-        folds = [_by_day(record, ~fitted, without, best[1]), *_by_other_days(days, prior, known, without, best)]
+        plain, named = Refittable(without, prior).turns(days), Refittable(best[1], prior, sized=True).turns(days)
     except DivergenceError:
         return None
+    turns = zip(days.folds(), plain, named, strict=True)
+    folds = [_by_day(record, ~fold.split.fit_rows, *both) for fold, *both in turns]
     # A quantity may not have been measured on the days of a fold: it is left out.
     most = max(map(len, folds))
     if not most:
@@ -161,23 +162,12 @@ def closest(
     return Fitted(best[0], float(_fall(unseen)), float(np.mean(_fall(unseen[..., drawn]) <= 0.0)))
 
 
-def _by_other_days(
-    days: LogDays, prior: Gaussian, known: ActiveEffects, without: Model, best: tuple[Hypothesis, Model]
-) -> list[Floats]:
-    """Return the sums of `_by_day` on days that both were fitted to, each by models that are fitted to others."""
-    found = []
-    for fold in days.folds()[1:]:
-        rows = fold.split.fit_rows
-        plain = fit_climate([(fold.record, rows)], prior, known, start=without[0], evaluations=TURN_EVALUATIONS).values
-        found.append(_by_day(fold.record, ~rows, (plain, known), _fit(fold.record, rows, prior, known, *best)))
-    return found
-
-
-def _by_day(record: Record, rows: Mask, before: Model, after: Model) -> Floats:
-    """Return the sums of absolute errors a day ahead of both models by the day on which a run starts, (q, 2, days)."""
+def _by_day(record: Record, rows: Mask, *stages: Stage) -> Floats:
+    """Return the sums of absolute errors a day ahead of two models by the day on which a run starts, (q, 2, days)."""
+    models = [(one.posterior.values, activate(record, one.terms)) for one in stages]
     # A run that leaves all bounds counts as no better; what it computes on its way is no news.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        old, new = (errors_of(record, free_runs(record, *one), (DAY,), rows) for one in (before, after))
+        old, new = (errors_of(record, free_runs(record, *one), (DAY,), rows) for one in models)
     days = {key: np.unique(one.day, return_inverse=True)[1] for key, one in old.items()}
     sums = [
         [np.bincount(day, np.nansum(np.abs(one[key].error), axis=0)) for one in (old, new)] for key, day in days.items()
@@ -196,17 +186,12 @@ def _fall(errors: Floats) -> Floats:
     return np.where(np.isfinite(left), 1.0 - left, -np.inf)
 
 
-def _fit(
-    record: Record, rows: Mask, prior: Gaussian, known: ActiveEffects, one: Hypothesis, start: Model | None = None
-) -> Model:
-    """Return parameters and the size of an effect, fitted together to free runs; where a fit has been, from there."""
+def _fit(days: LogDays, prior: Gaussian, terms: tuple[ActiveTerm, ...], one: Hypothesis) -> Stage:
+    """Return parameters and the size of an effect, fitted together to free runs of the fit days."""
     assert isinstance(one.cause, Candidate)
-    size, shape = EFFECTS[one.effect].amplitude, one.cause.values
-    name = f"{one.effect}:{size.name}"
-    begin = None if start is None else {**start[0], name: start[1][one.effect][size.name]}
-    points = EVALUATIONS if start is None else TURN_EVALUATIONS
+    size, shape = EFFECTS[one.effect].amplitude, dict(one.cause.values)
     expected = {one.effect: float(np.clip(one.amplitude, size.low, size.high))}
-    active = {**known, one.effect: dict(shape)}
-    fitted = fit_together(record, rows, prior, expected, active, begin, evaluations=points)
-    sizes = {size.name: fitted.values[name], **shape}
-    return fitted.marginal(prior.names).values, {**known, one.effect: sizes}
+    active = {**activate(days.record, terms), one.effect: shape}
+    fitted = fit_together(days.record, days.split.fit_rows, prior, expected, active)
+    found = ActiveTerm(one.effect, fitted.values[f"{one.effect}:{size.name}"], shape)
+    return Stage(fitted.marginal(prior.names), (*terms, found))

@@ -6,12 +6,13 @@ A forecast is judged by its free run, so the parameters that are shipped are tho
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from igrow.core.arrays import Floats, Integers
+from igrow.core.effects import EFFECTS
 from igrow.core.simulator.hybrid import measurement
 from igrow.core.simulator.hybrid.record import Record, complete_starts, free_run, observe
 from igrow.trainer.data.log import Log
@@ -33,8 +34,8 @@ SCALES = np.array([ERROR_SCALES[name] for name in measurement.PREDICTED])[:, Non
 """Of errors by balance, (3, 1, 1)."""
 EVALUATIONS = 20
 """Points that a fit may try."""
-TURN_EVALUATIONS = 3
-"""Those of a fit to other days, which begins where one has ended: more of them move a skill by less than .002."""
+_SIZE_DIFFERENCE = 0.05
+"""Of a term's size, as a share of it."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,6 @@ class LogDays:
         terms: Sequence[ActiveTerm],
         start: Mapping[str, float] | None = None,
         added: Mapping[str, Floats] | None = None,
-        evaluations: int = EVALUATIONS,
     ) -> Gaussian:
         """Return the posterior of the parameters, fitted to the fit days beside terms.
 
@@ -85,7 +85,6 @@ class LogDays:
             terms: active, held.
             start: where to begin, by name (None: the prior's mean).
             added: further fluxes by channel, (n,).
-            evaluations: points that each method of the search may try.
 
         Raises:
             DivergenceError: the model runs out of all bounds where the fit begins.
@@ -108,7 +107,7 @@ class LogDays:
 
         weight = record.step / CORRELATION_TIME
         return solver.solve(
-            residuals, jacobian, prior, low, high, weights=weight, robust=ROBUST, start=begin, evaluations=evaluations
+            residuals, jacobian, prior, low, high, weights=weight, robust=ROBUST, start=begin, evaluations=EVALUATIONS
         ).posterior
 
     def run(self, stage: Stage, horizon: str = "24_h") -> FreeRuns | None:
@@ -165,19 +164,45 @@ class Refittable:
     stage: Stage
     prior: Gaussian
     """That its parameters were fitted under."""
-    sized: Callable[[LogDays, Stage], tuple[ActiveTerm, ...]] | None = None
-    """Returns the stage's terms at the sizes that the fit days of a log tell; None: they stay."""
+    sized: bool = False
+    """The size of its last term was fitted too."""
 
-    def refitted(self, log: LogDays) -> Stage:
-        """Return the stage fitted to the fit days of a log, from where it is.
+    def turns(self, log: LogDays) -> list[Stage]:
+        """Return the stage, and as it is fitted to the fit days of each further fold of the log that it was fitted to.
+
+        From one turn to the next little moves: a Gauss-Newton step, with slopes where all of them begin, is enough.
 
         Raises:
             DivergenceError: the model runs out of all bounds.
         """
-        terms = self.stage.terms if self.sized is None else self.sized(log, self.stage)
-        start, added = self.stage.posterior.values, self.stage.added
-        fitted = log.fit(self.prior, terms, start, added, evaluations=TURN_EVALUATIONS)
-        return replace(self.stage, posterior=fitted, terms=terms)
+        record, runs, terms = log.record, log.runs, self.stage.terms
+        prior, start = self.prior, self.stage.posterior.mean
+        low, high = bounds(prior.names)
+        line = self._along(log, terms)
+        slopes = sensitivity.parameter_sensitivities(line, prior.names, prior.standard_deviation)
+        if self.sized:
+            *others, last = terms
+            size = EFFECTS[last.effect].amplitude
+            nearby = replace(last, amplitude=(1.0 + _SIZE_DIFFERENCE) * last.amplitude)
+            moved = (self._along(log, [*others, nearby]).errors - line.errors) / (_SIZE_DIFFERENCE * last.amplitude)
+            slopes = np.concatenate([slopes, moved[None]])
+            # So wide that the days alone tell it.
+            prior = prior.beside(last.effect, last.amplitude, size.high - size.low)
+            start, low, high = np.append(start, last.amplitude), np.append(low, size.low), np.append(high, size.high)
+        errors, steep = (line.errors / SCALES).ravel(), (slopes / SCALES).reshape(len(slopes), -1).T
+        weight, found = record.step / CORRELATION_TIME, [self.stage]
+        for fold in log.folds()[1:]:
+            counted = (runs.weight & fold.split.fit[runs.day][None, :, None]).ravel()
+            point = solver.step(errors[counted], steep[counted], prior, low, high, start, weights=weight, robust=ROBUST)
+            turned = self.stage.posterior.moved(point[: len(self.prior.names)])
+            own = (*terms[:-1], replace(terms[-1], amplitude=float(point[-1]))) if self.sized else terms
+            found.append(replace(self.stage, posterior=turned, terms=own))
+        return found
+
+    def _along(self, log: LogDays, terms: Sequence[ActiveTerm]) -> Linearisation:
+        stage = self.stage
+        effects = activate(log.record, terms)
+        return sensitivity.linearise(log.record, log.runs, stage.posterior.values, effects, stage.added)
 
 
 def log_days(log: Log, model: FittedModel) -> LogDays:
@@ -223,9 +248,9 @@ def cross_validated_skill(log: LogDays, before: Refittable, after: Refittable) -
     Raises:
         DivergenceError: a model runs out of all bounds.
     """
-    falls = []
+    falls, both = [], [one.turns(log) for one in (before, after)]
     for number, fold in enumerate(log.folds()):
-        old, new = (fold.run(one.refitted(fold) if number else one.stage) for one in (before, after))
+        old, new = (fold.run(stage) for stage in (turns[number] for turns in both))
         if old is not None and new is not None:
             falls.append(skill_by_day(old, new))
     return float(np.concatenate(falls).mean()) if falls else None

@@ -29,7 +29,6 @@ from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.estimate import normal_quantile
 from igrow.trainer.diagnosis.linear import LinearModel, Term
 from igrow.trainer.diagnosis.rules import DecisionRules
-from igrow.trainer.fit import solver
 from igrow.trainer.fit.climate import fit_climate
 from igrow.trainer.fit.evaluation import Model, held_out_errors
 from igrow.trainer.fit.gaussian import Gaussian
@@ -132,7 +131,6 @@ def fit_together(
     sizes: Mapping[str, float],
     active: ActiveEffects,
     start: Mapping[str, float] | None = None,
-    evaluations: int = solver.EVALUATIONS,
 ) -> Gaussian:
     """Return parameters and the `sizes` expected of effects, fitted together; other arguments as `fit_climate`'s."""
     effects = [EFFECTS[name] for name in sizes]
@@ -142,7 +140,7 @@ def fit_together(
         np.append(prior.mean, list(sizes.values())),
         block_diag(prior.covariance, np.diag((WIDE * typical) ** 2)),
     )
-    return fit_climate([(record, rows)], joint, active, start=start, evaluations=evaluations)
+    return fit_climate([(record, rows)], joint, active, start=start)
 
 
 def _promising(gains: Mapping[str, float], rules: DecisionRules) -> list[Effect]:

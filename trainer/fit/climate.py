@@ -21,7 +21,7 @@ from igrow.core.site import Site
 from igrow.trainer.fit.evaluation import starts_within
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.scales import CORRELATION_TIME, ERROR_SCALES, ROBUST
-from igrow.trainer.fit.solver import EVALUATIONS, DivergenceError, by_differences, covariance, solve
+from igrow.trainer.fit.solver import DivergenceError, by_differences, covariance, solve
 from igrow.trainer.progress import Progress, silent
 
 RUN_HOURS, EVERY_HOURS = 24.0, 8.0
@@ -65,7 +65,6 @@ def fit_climate(
     effects: ActiveEffects | None = None,
     *,
     start: Mapping[str, float] | None = None,
-    evaluations: int = EVALUATIONS,
     progress: Progress = silent,
 ) -> Gaussian:
     """Return the posterior of the parameters.
@@ -75,7 +74,6 @@ def fit_climate(
         prior: of all parameters; one of an effect, to be fitted with them, is called ``effect:parameter``.
         effects: the active effects, held but for such parameters.
         start: where to begin, by name; what it lacks begins at the prior's mean.
-        evaluations: points that each method of the search may try.
         progress: is told of each step in a line.
 
     Raises:
@@ -108,10 +106,7 @@ def fit_climate(
     weights = counted * (_SAMPLE / CORRELATION_TIME)
     begin = np.array([{**prior.values, **(start or {})}[name] for name in prior.names])
     try:
-        found = solve(
-            residuals, jacobian, prior, low, high,
-            weights=weights, robust=ROBUST, start=begin, evaluations=evaluations, progress=tell,
-        )  # fmt: skip
+        found = solve(residuals, jacobian, prior, low, high, weights=weights, robust=ROBUST, start=begin, progress=tell)
     except DivergenceError:
         raise DivergenceError(
             "the simulator runs out of all bounds on this log before anything is fitted: look whether vents, pipes, "

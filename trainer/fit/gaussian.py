@@ -69,6 +69,12 @@ class Gaussian:
         rows = [self.names.index(name) for name in names]
         return Gaussian(tuple(names), self.mean[rows], self.covariance[np.ix_(rows, rows)])
 
+    def beside(self, name: str, mean: float, deviation: float) -> Gaussian:
+        """Return the distribution with a further parameter that hangs together with none."""
+        covariance = np.zeros((len(self.names) + 1,) * 2)
+        covariance[:-1, :-1], covariance[-1, -1] = self.covariance, deviation**2
+        return Gaussian((*self.names, name), np.append(self.mean, mean), covariance)
+
     def moved(self, mean: Floats) -> Gaussian:
         """Return the same spread about another mean, (p,)."""
         return Gaussian(self.names, mean, self.covariance)

@@ -15,7 +15,7 @@ from functools import lru_cache
 from typing import TypeVar
 
 import numpy as np
-from scipy.optimize import OptimizeResult, least_squares
+from scipy.optimize import OptimizeResult, least_squares, lsq_linear
 
 from igrow.core.arrays import Floats
 from igrow.core.errors import IgrowError
@@ -32,8 +32,6 @@ Answer = TypeVar("Answer")
 
 DIFFERENCE = 0.05
 """Finite difference of a parameter, in standard deviations of its prior."""
-EVALUATIONS = 60
-"""Points that a search may try by each of its two methods."""
 _COST_TOLERANCE = 1e-5
 """Relative fall of the cost at which a search ends."""
 _STEP_TOLERANCE = 1e-3
@@ -74,7 +72,7 @@ def solve(
     weights: Floats | float = 1.0,
     robust: float = np.inf,
     start: Floats | None = None,
-    evaluations: int = EVALUATIONS,
+    evaluations: int = 60,
     progress: Callable[[int, Floats], None] | None = None,
 ) -> Solution:
     """Return the minimum.
@@ -151,16 +149,44 @@ def solve(
     return Solution(posterior, errors, slope, float(found.cost))
 
 
+def step(
+    residuals: Floats,
+    jacobian: Floats,
+    prior: Gaussian,
+    low: Floats,
+    high: Floats,
+    start: Floats,
+    *,
+    weights: Floats | float = 1.0,
+    robust: float = np.inf,
+) -> Floats:
+    """Return where one Gauss-Newton step within the bounds leads, (p,); other arguments as `solve`'s.
+
+    Args:
+        residuals: where it begins, (n,).
+        jacobian: there, (n, p).
+        prior: of the parameters.
+        low: least values, (p,).
+        high: largest values, (p,).
+        start: where it begins, (p,); within the bounds.
+        weights: independent errors that each one counts for.
+        robust: size of an error from which on it counts linearly.
+    """
+    slope, errors, scale = _weighted(residuals, jacobian, prior, weights, robust)
+    white = prior.whitening
+    slopes, apart = np.concatenate([slope, white * scale]), np.append(errors, white @ (start - prior.mean))
+    # A triangle in place of many rows: the same sum of squares.
+    orthogonal, triangle = np.linalg.qr(slopes)
+    edges = (low - start) / scale, (high - start) / scale
+    found = lsq_linear(triangle, -(orthogonal.T @ apart), bounds=edges)
+    return np.asarray(np.clip(start + scale * found.x, low, high))
+
+
 def covariance(
     residuals: Floats, jacobian: Floats, prior: Gaussian, *, weights: Floats | float = 1.0, robust: float = np.inf
 ) -> Floats:
     """Return the covariance of the posterior about a point, (p, p); arguments as `solve`'s, at that point."""
-    count = len(residuals)
-    weight = np.broadcast_to(np.asarray(weights, dtype=np.float64), count)
-    size = np.abs(_counted(residuals, (weight > 0.0).astype(np.float64)))
-    kept = weight * np.where(size > robust, robust / np.maximum(size, 1e-12), 1.0)
-    scale = prior.standard_deviation
-    slope = _counted(jacobian.T, kept).T * scale
+    slope, _, scale = _weighted(residuals, jacobian, prior, weights, robust)
     white = prior.whitening * scale
     inverse: Floats = np.linalg.inv(slope.T @ slope + white.T @ white) * np.outer(scale, scale)
     return 0.5 * (inverse + inverse.T)
@@ -205,6 +231,17 @@ def _has_arrived(found: OptimizeResult) -> bool:
     slope, gradient = found.jac[:, free], found.grad[free]
     fall = 0.5 * float(gradient @ np.linalg.lstsq(slope.T @ slope, gradient, rcond=None)[0])
     return fall <= _ARRIVED * float(found.cost)
+
+
+def _weighted(
+    residuals: Floats, jacobian: Floats, prior: Gaussian, weights: Floats | float, robust: float
+) -> tuple[Floats, Floats, Floats]:
+    """Return slopes in standard deviations of the prior, (n, p), and errors, (n,), as they count; and these, (p,)."""
+    weight = np.broadcast_to(np.asarray(weights, dtype=np.float64), len(residuals))
+    size = np.abs(_counted(residuals, (weight > 0.0).astype(np.float64)))
+    kept = weight * np.where(size > robust, robust / np.maximum(size, 1e-12), 1.0)
+    scale = prior.standard_deviation
+    return _counted(jacobian.T, kept).T * scale, _counted(residuals, kept), scale
 
 
 def _counted(values: Floats, weight: Floats) -> Floats:
