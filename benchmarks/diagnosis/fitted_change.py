@@ -37,7 +37,7 @@ class Told:
     greenhouse: str
     group: str
     effect: str
-    """That which comes closest; empty for none."""
+    """That which takes most off unseen days; empty for none."""
     fall: float
     """Share of the error of unseen days that it removes."""
 
@@ -54,7 +54,8 @@ def told(job: tuple[Reference, Case, Telemetry]) -> Told:
     judged = changed(design, 0.0, rng)
     if judged.cause is not None or judged.patterns:
         return Told(site.name, case.group, "", 0.0)
-    found = fitted_change.closest(days, knowledge, design, fitted_change.promising(design, rng), rng)
+    asked = fitted_change.promising(design, rng)
+    found = fitted_change.best(fitted_change.fitted(days, knowledge, design, asked))
     return (
         Told(site.name, case.group, "", 0.0)
         if found is None

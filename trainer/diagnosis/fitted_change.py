@@ -2,12 +2,13 @@
 
 What a calibration carries into another season can look like a sensor that is off, or like what a crop transpires at
 night, as strongly as such a change itself. A free run of a day tells these apart: the effects that gain most are fitted
-beside parameters that change as physics lets expect, and that which brings the fitted days closest to what was measured
-must make days better that no fit saw, by more than any does where nothing has changed.
+beside parameters that change as physics lets expect, and that which takes most off the error of days that no fit saw
+must take more than any does where nothing has changed.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,6 +24,7 @@ from igrow.trainer.diagnosis.freerun import LogDays, Refittable, Stage
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, activate
 from igrow.trainer.diagnosis.linear import Fit
 from igrow.trainer.diagnosis.omission import DAY, fit_together
+from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.fit.climate import fit_climate
 from igrow.trainer.fit.evaluation import errors_of, free_runs
@@ -38,10 +40,13 @@ class Fitted:
     """A hypothesis that was fitted to free runs."""
 
     hypothesis: Hypothesis
-    fall: float
-    """Share of the error a day ahead that goes on days that no fit saw, the mean of all quantities."""
-    bootstrap_p: float
-    """Probability, over these days, that it does not fall."""
+    errors: Floats
+    """Sums of absolute errors a day ahead without and with it on days that no fit saw, (q, 2, days)."""
+
+    @property
+    def fall(self) -> float:
+        """Share of the error that goes, the mean of all quantities."""
+        return float(_fall(self.errors))
 
 
 def find(days: LogDays, knowledge: Knowledge, design: Design, rng: np.random.Generator) -> Round | None:
@@ -54,24 +59,30 @@ def find(days: LogDays, knowledge: Knowledge, design: Design, rng: np.random.Gen
         rng: for flips and bootstraps.
     """
     null = linear.fit(design.grams, design.null_model())
-    found = closest(days, knowledge, design, promising(design, rng), rng)
+    found = best(fitted(days, knowledge, design, promising(design, rng)))
     if found is None or found.fall < design.rules.least_change_fall:
         return None
     return _by_fits(design, null, found, rng)
+
+
+def best(found: Sequence[Fitted]) -> Fitted | None:
+    """Return the hypothesis that takes most off unseen days; None for none."""
+    return max(found, key=lambda one: one.fall, default=None)
 
 
 def _by_fits(design: Design, null: Fit, found: Fitted, rng: np.random.Generator) -> Round:
     """Return the round of a cause of which the fits say what unseen days say: single steps say less."""
     told = change.round_of(design, null, found.hypothesis, rng)
     assert told.cause is not None
-    return replace(told, cause=replace(told.cause, bootstrap_p=found.bootstrap_p))
+    (falls,) = _drawn([found], design.rules, rng)
+    return replace(told, cause=replace(told.cause, bootstrap_p=float(np.mean(falls <= 0.0))))
 
 
 def settled(days: LogDays, knowledge: Knowledge, design: Design, told: Round, rng: np.random.Generator) -> Round:
     """Return a round whose cause free runs tell as well, where time steps cannot tell it from others.
 
-    Where runs tell another of these, that is the cause if it gains what it must, or makes unseen days better by as much
-    as one must that only fits tell; else there is none.
+    Where another of these surely makes unseen days better than it does, that is the cause if it gains what it must, or
+    makes unseen days better by as much as one must that only fits tell; else there is none.
 
     Args:
         days: of the log.
@@ -81,18 +92,24 @@ def settled(days: LogDays, knowledge: Knowledge, design: Design, told: Round, rn
         rng: for flips and bootstraps.
     """
     assert told.cause is not None and design.history is not None and design.history.null_gains is not None
-    first, null = told.cause.hypothesis, linear.fit(design.grams, design.null_model())
+    rules, null = design.rules, linear.fit(design.grams, design.null_model())
+    first = told.cause.hypothesis
     # Of what began within the log there is no one size to fit.
     near = [] if first.term.onset is not None else rivals(design, null, first, rng)
-    found = closest(days, knowledge, design, [first, *near], rng) if near else None
+    found = fitted(days, knowledge, design, [first, *near]) if near else []
+    own = next((one for one in found if one.hypothesis.effect == first.effect), None)
+    rival = best(found)
     # What makes days worse that no fit saw is no rival.
-    if found is None or found.hypothesis.effect == first.effect or found.fall <= 0.0:
+    if own is None or rival is None or rival is own or rival.fall <= 0.0:
         return told
-    other = found.hypothesis
+    falls = _drawn([own, rival], rules, rng)
+    if np.mean(falls[1] > falls[0]) < rules.confidence:
+        return told
+    other = rival.hypothesis
     if change.proven_gain(design, other) >= design.history.null_gains.needed(other.effect):
         return change.round_of(design, null, other, rng)
-    if found.fall >= design.rules.least_change_fall:
-        return _by_fits(design, null, found, rng)
+    if rival.fall >= rules.least_change_fall:
+        return _by_fits(design, null, rival, rng)
     return Round(design, null, null, None, ())
 
 
@@ -122,44 +139,38 @@ def promising(design: Design, rng: np.random.Generator) -> list[Hypothesis]:
     ]
 
 
-def closest(
-    days: LogDays, knowledge: Knowledge, design: Design, hypotheses: list[Hypothesis], rng: np.random.Generator
-) -> Fitted | None:
-    """Return the hypothesis that brings the fitted days closest to what was measured, and its fall on unseen days."""
+def fitted(days: LogDays, knowledge: Knowledge, design: Design, hypotheses: Sequence[Hypothesis]) -> list[Fitted]:
+    """Return the hypotheses that can be fitted, with what is left on all days, each by models fitted to others."""
     record, terms = days.record, knowledge.terms
     known = activate(record, terms)
     # Of what began within the log there is no one size beside which another could be fitted.
     if not hypotheses or any(np.ndim(value) for effect in known.values() for value in effect.values()):
-        return None
+        return []
     prior = knowledge.by_physics(design.rules)
     try:
-        without = Stage(fit_climate([(record, days.split.fit_rows)], prior, known), terms)
+        plain = Stage(fit_climate([(record, days.split.fit_rows)], prior, known), terms)
+        without = Refittable(plain, prior).turns(days)
     except DivergenceError:
-        return None
-    best: tuple[Hypothesis, Stage] | None = None
-    largest = 0.0
+        return []
+    found = []
     for one in hypotheses:
         try:
-            stage = _fit(days, prior, terms, one)
+            named = Refittable(_fit(days, prior, terms, one), prior, sized=True).turns(days)
         except DivergenceError:
             continue
-        if (closer := float(_fall(_by_day(record, days.split.fit_rows, without, stage)))) > largest:
-            largest, best = closer, (one, stage)
-    if best is None:
-        return None
-    try:
-        plain, named = Refittable(without, prior).turns(days), Refittable(best[1], prior, sized=True).turns(days)
-    except DivergenceError:
-        return None
-    turns = zip(days.folds(), plain, named, strict=True)
-    folds = [_by_day(record, ~fold.split.fit_rows, *both) for fold, *both in turns]
-    # A quantity may not have been measured on the days of a fold: it is left out.
-    most = max(map(len, folds))
-    if not most:
-        return None
-    unseen = np.concatenate([one for one in folds if len(one) == most], axis=-1)
-    drawn = rng.integers(0, unseen.shape[-1], size=(design.rules.bootstrap_draws, unseen.shape[-1]))
-    return Fitted(best[0], float(_fall(unseen)), float(np.mean(_fall(unseen[..., drawn]) <= 0.0)))
+        turns = zip(days.folds(), without, named, strict=True)
+        folds = [_by_day(record, ~fold.split.fit_rows, *both) for fold, *both in turns]
+        # A quantity may not have been measured on the days of a fold: it is left out.
+        if most := max(map(len, folds)):
+            found.append(Fitted(one, np.concatenate([errors for errors in folds if len(errors) == most], axis=-1)))
+    return found
+
+
+def _drawn(found: Sequence[Fitted], rules: DecisionRules, rng: np.random.Generator) -> Floats:
+    """Return the falls of hypotheses on bootstrap draws of days, the same days for all, (h, draws)."""
+    count = found[0].errors.shape[-1]
+    days = rng.integers(0, count, size=(rules.bootstrap_draws, count))
+    return np.stack([_fall(one.errors[..., days]) for one in found])
 
 
 def _by_day(record: Record, rows: Mask, *stages: Stage) -> Floats:
