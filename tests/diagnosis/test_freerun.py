@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -13,6 +14,7 @@ from igrow.trainer.data.splits import split_days
 from igrow.trainer.diagnosis import freerun, sensitivity
 from igrow.trainer.diagnosis.freerun import FreeRuns, LogDays, Refittable, Stage
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
+from igrow.trainer.diagnosis.omission import fit_together
 from igrow.trainer.fit import Gaussian
 from tests.virtual_log import SITE, virtual_log
 
@@ -81,10 +83,6 @@ class DaysOfTwoFolds:
     def folds(self) -> list[DaysOfTwoFolds]:
         return [self, *(DaysOfTwoFolds(one) for one in self.others)]
 
-    def fit(self, prior: Gaussian, _terms: object, start: object, added: object, evaluations: int) -> Gaussian:
-        assert start == prior.values and not added and evaluations < freerun.EVALUATIONS
-        return prior
-
     def run(self, stage: Stage) -> FreeRuns | None:
         if self.fall is None:
             return None
@@ -97,6 +95,29 @@ class DaysOfTwoFolds:
 )
 def test_skill_is_asked_of_all_days(falls: tuple[float | None, ...], skill: float | None) -> None:
     prior = Gaussian.independent({"transmissivity": 0.7}, {"transmissivity": 0.1})
-    before, after = (Refittable(Stage(prior, terms), prior) for terms in ((), (ActiveTerm("co2_offset", 10.0, {}),)))
+    before, after = (
+        cast(Any, SimpleNamespace(turns=lambda _, stage=stage: [stage] * len(falls)))
+        for stage in (Stage(prior, ()), Stage(prior, (ActiveTerm("co2_offset", 10.0, {}),)))
+    )
     found = freerun.cross_validated_skill(cast(Any, DaysOfTwoFolds(*falls)), before, after)
     assert found == (None if skill is None else pytest.approx(skill))
+
+
+def test_a_turn_is_fitted_by_one_step_nearly_as_by_a_whole_search() -> None:
+    known = nominal(SITE)
+    log = virtual_log(16, seed=8, step=900.0, parameters=known | {"leakage_wind": 1.2 * known["leakage_wind"]})
+    shown = prepare_log(log.with_columns({"air_co2": log["air_co2"] + 60.0}), SITE).record(0.0)
+    split = split_days(shown, SITE.longitude)
+    prior = Gaussian.independent(known, {name: 0.08 * abs(value) + 1e-9 for name, value in known.items()})
+    days = LogDays(shown, split, sensitivity.day_runs(shown, split.day))
+    told = (ActiveTerm("co2_offset", 40.0, {}),)
+    own, *turns = Refittable(Stage(days.fit(prior, told), told), prior).turns(days)
+    assert len(turns) == len(days.folds()) - 1 and own.terms == told
+    for fold, turn in zip(days.folds()[1:], turns, strict=True):
+        searched = fold.fit(prior, told)
+        apart = (turn.posterior.mean - searched.mean) / prior.standard_deviation
+        assert np.abs(apart).max() < 0.1 and turn.terms == told
+    # The size that was told is too small; each turn's own days tell it as a search from afar does.
+    for fold, turn in zip(days.folds()[1:], Refittable(own, prior, sized=True).turns(days)[1:], strict=True):
+        together = fit_together(shown, fold.split.fit_rows, prior, {"co2_offset": 0.0}, {"co2_offset": {}})
+        assert turn.terms[0].amplitude == pytest.approx(together.values["co2_offset:offset"], rel=0.05)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from igrow.trainer.fit.gaussian import Gaussian
-from igrow.trainer.fit.solver import DivergenceError, by_differences, covariance, remembered, solve
+from igrow.trainer.fit.solver import DivergenceError, by_differences, covariance, remembered, solve, step
 
 NAMES = ("a", "b", "c")
 FAR = np.full(3, 1e9)
@@ -102,6 +102,23 @@ def test_a_curved_problem_is_solved_from_afar_by_finite_differences() -> None:
     np.testing.assert_allclose(jacobian(np.array([2.0, 3.0])), [[-40.0, 10.0], [-1.0, 0.0]], atol=1e-3)
     found = solve(lambda point: batch(point[None])[0], jacobian, prior, -FAR[:2], FAR[:2], evaluations=200)
     np.testing.assert_allclose(found.posterior.mean, 1.0, atol=1e-3)
+
+
+def test_one_step_solves_what_is_linear_within_bounds_and_counts_outliers_as_the_search_does() -> None:
+    prior, (design, measured) = known(), linear()
+    weights, start = np.linspace(0.1, 2.0, 40), np.array([1.0, 5e-4, 0.0])
+
+    def both(high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        found = solve(lambda x: design @ x - measured, lambda _: design, prior, -FAR, high, weights=weights)
+        return step(design @ start - measured, design, prior, -FAR, high, start, weights=weights), found.posterior.mean
+
+    for high in (FAR, np.array([2.1, 1e9, 1e9])):
+        stepped, searched = both(high)
+        np.testing.assert_allclose(stepped, searched, rtol=1e-5)
+    numbers, wide = np.array([0.1, -0.3, 0.2, 0.4, -0.1, 30.0]), Gaussian(("a",), np.zeros(1), np.array([[1e8]]))
+    place = np.array([0.46])
+    stays = step(numbers - place, -np.ones((6, 1)), wide, -FAR[:1], FAR[:1], place, robust=2.0)
+    assert stays[0] == pytest.approx(0.46, abs=1e-2)
 
 
 def test_a_difference_at_the_upper_bound_goes_inwards() -> None:
