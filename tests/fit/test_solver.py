@@ -121,6 +121,13 @@ def test_one_step_solves_what_is_linear_within_bounds_and_counts_outliers_as_the
     assert stays[0] == pytest.approx(0.46, abs=1e-2)
 
 
+def test_what_runs_out_of_all_bounds_a_little_further_on_stays_in_a_step() -> None:
+    prior = Gaussian.independent({"a": 0.0, "b": 0.0}, {"a": 1.0, "b": 1.0})
+    slopes = np.stack([np.full(20, np.nan), np.ones(20)], axis=1)
+    point = step(np.full(20, -3.0), slopes, prior, -FAR[:2], FAR[:2], np.zeros(2))
+    np.testing.assert_allclose(point, [0.0, 3.0 * 20 / 21])
+
+
 def test_a_difference_at_the_upper_bound_goes_inwards() -> None:
     tried: list[np.ndarray] = []
 

@@ -111,10 +111,7 @@ def solve(
     def slopes(moved: Floats) -> Floats:
         nonlocal latest, steps
         point = begin + scale * moved
-        slope = jacobian(point)
-        # What runs out of all bounds a little further on stays where it is in this step.
-        runs = np.isfinite(slope[weight > 0.0]).all(axis=0)
-        latest = point, residuals(point), np.where(runs, slope, 0.0)
+        latest = point, residuals(point), _running(jacobian(point), weight)
         if progress is not None:
             progress(steps, latest[1])
         steps += 1
@@ -172,7 +169,8 @@ def step(
         weights: independent errors that each one counts for.
         robust: size of an error from which on it counts linearly.
     """
-    slope, errors, scale = _weighted(residuals, jacobian, prior, weights, robust)
+    weight = np.broadcast_to(np.asarray(weights, dtype=np.float64), len(residuals))
+    slope, errors, scale = _weighted(residuals, _running(jacobian, weight), prior, weight, robust)
     white = prior.whitening
     slopes, apart = np.concatenate([slope, white * scale]), np.append(errors, white @ (start - prior.mean))
     # A triangle in place of many rows: the same sum of squares.
@@ -231,6 +229,11 @@ def _has_arrived(found: OptimizeResult) -> bool:
     slope, gradient = found.jac[:, free], found.grad[free]
     fall = 0.5 * float(gradient @ np.linalg.lstsq(slope.T @ slope, gradient, rcond=None)[0])
     return fall <= _ARRIVED * float(found.cost)
+
+
+def _running(jacobian: Floats, weight: Floats) -> Floats:
+    """Return slopes (n, p), 0 of what runs out of all bounds a little further on: it stays where it is in a step."""
+    return np.where(np.isfinite(jacobian[weight > 0.0]).all(axis=0), jacobian, 0.0)
 
 
 def _weighted(
