@@ -1,33 +1,39 @@
 """Learn what a change that only fits tell must take off the error of unseen days: more than where there is none.
 
 Asked of the same logs in which nothing is missing that teach what a change must gain (`null-gains`), where the time
-steps tell nothing. No case of a benchmark has these seeds.
+steps tell nothing. An effect must exceed `OVER_NULL` times what it took off in any of these logs. Above that stands what
+every change must take off: the least with which none of these logs gets a name, each greenhouse judged by what the
+others lost. No case of a benchmark has these seeds.
 """
 
 from __future__ import annotations
 
+import json
 import sys
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 
 from benchmarks.diagnosis.cases import Case
 from benchmarks.diagnosis.logs import Reference
-from benchmarks.diagnosis.null_gains import SEEDS, unchanged
-from benchmarks.diagnosis.rules import RULES, write_rules
+from benchmarks.diagnosis.null_gains import SEEDS, largest, unchanged
 from benchmarks.jobs import Jobs
 from benchmarks.provenance import provenance
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import prepare_log
-from igrow.trainer.diagnosis import DEFAULT, fitted_change
+from igrow.trainer.diagnosis import DEFAULT, fitted_change, null_gains
 from igrow.trainer.diagnosis.change import changed
 from igrow.trainer.diagnosis.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import knowledge_of
+from igrow.trainer.diagnosis.null_gains import NullGains
 from igrow.trainer.diagnosis.rounds import Change, search_of
 
 COMMAND = "python -m benchmarks.diagnosis fitted-change"
 OVER_NULL = 1.3
-"""Times the most that goes where nothing has changed."""
+"""Times the most that an effect takes off where nothing has changed."""
 
 
 @dataclass(frozen=True)
@@ -36,10 +42,8 @@ class Told:
 
     greenhouse: str
     group: str
-    effect: str
-    """That which takes most off unseen days; empty for none."""
-    fall: float
-    """Share of the error of unseen days that it removes."""
+    falls: dict[str, float]
+    """Share of the error of unseen days that each effect takes off, of those that were fitted; the largest first."""
 
 
 def told(job: tuple[Reference, Case, Telemetry]) -> Told:
@@ -53,27 +57,41 @@ def told(job: tuple[Reference, Case, Telemetry]) -> Told:
     design = search.resolved()
     judged = changed(design, 0.0, rng)
     if judged.cause is not None or judged.patterns:
-        return Told(site.name, case.group, "", 0.0)
-    asked = fitted_change.promising(design, rng)
-    found = fitted_change.best(fitted_change.fitted(days, knowledge, design, asked))
-    return (
-        Told(site.name, case.group, "", 0.0)
-        if found is None
-        else Told(site.name, case.group, found.hypothesis.effect, found.fall)
-    )
+        return Told(site.name, case.group, {})
+    found = fitted_change.fitted(days, knowledge, design, fitted_change.promising(design, rng))
+    ranked = sorted(found, key=lambda one: -one.fall)
+    return Told(site.name, case.group, {one.hypothesis.effect: one.fall for one in ranked})
+
+
+def of_each(found: Sequence[Told]) -> dict[str, float]:
+    """Return what each effect must exceed by itself."""
+    taken = largest([{effect: OVER_NULL * fall for effect, fall in one.falls.items()} for one in found])
+    return {effect: fall for effect, fall in taken.items() if fall > 0.0}
+
+
+def least_fall(found: Sequence[Told]) -> float:
+    """Return the least that every change must take off, so that no log gets a name by what others take off."""
+    told = [0.0]
+    for one in found:
+        by_others = of_each([other for other in found if other.greenhouse != one.greenhouse])
+        effect, fall = next(iter(one.falls.items()), ("", 0.0))
+        if fall >= by_others.get(effect, 0.0):
+            told.append(fall)
+    return round(max(told) + 0.0005, 3)
 
 
 def main(processes: int) -> int:
-    """Write the bound into the package."""
+    """Write the bounds into the package."""
     found: list[Told] = []
     with Jobs("diagnosis fitted-change", processes) as jobs:
         for one in jobs.each(told, unchanged(jobs)):
             found.append(one)
             print(f"{len(found)}: {one}", file=sys.stderr, flush=True)
-    for one in sorted(found, key=lambda one: -one.fall):
-        if one.effect:
-            print(f"{one.greenhouse:24} {one.group:8} {one.effect:32} {100.0 * one.fall:5.1f} %")
-    least = round(OVER_NULL * max(one.fall for one in found), 3)
-    write_rules(RULES, {"least_change_fall": least}, provenance(COMMAND, dict(SEEDS)))
-    print(f"{len(found)} logs; least fall {least:g}; wrote {RULES}")
+    for one in sorted(found, key=lambda one: -max(one.falls.values(), default=0.0)):
+        for effect, fall in one.falls.items():
+            print(f"{one.greenhouse:24} {one.group:8} {effect:32} {100.0 * fall:5.1f} %")
+    learned = NullGains(of_each(found), least_fall(found), provenance(COMMAND, dict(SEEDS)))
+    path = Path(str(files("igrow.trainer.diagnosis"))) / null_gains.FALLS_FILE
+    path.write_text(json.dumps(asdict(learned), indent=1) + "\n", encoding="utf-8")
+    print(f"{len(found)} logs; least fall {learned.least:g}; wrote {path}")
     return 0

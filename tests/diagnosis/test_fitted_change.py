@@ -16,7 +16,7 @@ from igrow.trainer.diagnosis.compare import Contender, Round
 from igrow.trainer.diagnosis.freerun import LogDays, Refittable, log_days
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, knowledge_of
 from igrow.trainer.diagnosis.linear import Term
-from igrow.trainer.diagnosis.null_gains import NullGains
+from igrow.trainer.diagnosis.null_gains import NullGains, read_null_falls
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.fit import evaluation
 from igrow.trainer.fit.solver import DivergenceError
@@ -43,12 +43,12 @@ def test_the_effect_that_takes_most_off_unseen_days_is_told(quiet_log: Log) -> N
     found = told(quiet_log.with_columns({"air_humidity": shown}))
     assert found is not None
     assert found.hypothesis.effect == "humidity_offset"
-    assert found.fall > DEFAULT.least_change_fall
+    assert found.fall > read_null_falls().needed("humidity_offset")
 
 
 def test_where_nothing_has_changed_no_fit_takes_that_much(quiet_log: Log) -> None:
     found = told(quiet_log)
-    assert found is None or found.fall < DEFAULT.least_change_fall
+    assert found is None or found.fall < read_null_falls().needed(found.hypothesis.effect)
 
 
 def test_what_no_unseen_day_bears_out_is_not_told(quiet_log: Log, monkeypatch: pytest.MonkeyPatch) -> None:

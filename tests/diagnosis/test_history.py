@@ -119,17 +119,6 @@ def test_a_change_beyond_the_history_is_named_and_its_own_gain_is_taken_off() ->
     assert changed(own, 0.0, np.random.default_rng(RNG_SEED)).cause is None
 
 
-def test_what_gains_most_but_less_than_it_must_hides_nothing_that_gains_enough() -> None:
-    truth = Truth({"lamp_heat": 0.5, "rain_cooling": 0.3}, {})
-    design = with_history(make_design(truth, seed=5), 0.01)
-    assert design.history is not None
-    usual = NullGains({"lamp_heat": 1000.0}, 8.0)
-    for null_gains, named in ((BARE, "lamp_heat"), (usual, "rain_cooling")):
-        asked = replace(design, history=replace(design.history, null_gains=null_gains))
-        judged = changed(asked, 0.0, np.random.default_rng(RNG_SEED))
-        assert judged.cause is not None and judged.cause.hypothesis.effect == named
-
-
 def test_nothing_is_named_where_nothing_has_changed() -> None:
     for seed in range(5):
         design = with_history(make_design(seed=10 + seed), 0.05)

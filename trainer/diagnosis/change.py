@@ -32,20 +32,16 @@ def changed(design: Design, explained: float, rng: np.random.Generator, *, cause
     """
     rules, null = design.rules, linear.fit(design.grams, design.null_model())
     onsets = search.onset_days(design)
-    assert design.history is not None and design.history.null_gains is not None
-    must = design.history.null_gains.needed
-    scored = search.score_candidates(design, null, onsets, rng) if causes else []
-    largest = best(design, scored)
-    # What gains more than any other, but not what it must, hides none that does.
-    cause = best(design, [one for one in scored if proven_gain(design, one) >= must(one.effect)])
+    cause = best(design, search.score_candidates(design, null, onsets, rng)) if causes else None
     pattern = best(design, search.score_patterns(design, null, onsets[:: rules.pattern_onset_stride], rng))
     nothing = Round(design, null, null, None, ())
     if pattern is not None:
-        gained = 0.0 if largest is None else net_gain(design, largest)
+        gained = 0.0 if cause is None else net_gain(design, cause)
         needed = max(rules.least_pattern_change, rules.pattern_over_change * gained, explained)
         if net_gain(design, pattern) >= needed and proven_gain(design, pattern) >= rules.least_proven_pattern:
             return replace(nothing, patterns=(pattern,))
-    if cause is None:
+    assert design.history is not None and design.history.null_gains is not None
+    if cause is None or proven_gain(design, cause) < design.history.null_gains.needed(cause.effect):
         return nothing
     left = max(rules.least_left_by_hour, rules.left_by_hour_share * net_gain(design, cause))
     if pattern is not None and left_by_hour(design, null, cause, rng) >= left:

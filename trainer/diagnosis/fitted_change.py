@@ -3,7 +3,7 @@
 What a calibration carries into another season can look like a sensor that is off, or like what a crop transpires at
 night, as strongly as such a change itself. A free run of a day tells these apart: the effects that gain most are fitted
 beside parameters that change as physics lets expect, and that which takes most off the error of days that no fit saw
-must take more than any does where nothing has changed.
+must take more than it does wherever nothing has changed.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.freerun import LogDays, Refittable, Stage
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, activate
 from igrow.trainer.diagnosis.linear import Fit
+from igrow.trainer.diagnosis.null_gains import read_null_falls
 from igrow.trainer.diagnosis.omission import DAY, fit_together
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.diagnosis.search import Hypothesis
@@ -60,7 +61,7 @@ def find(days: LogDays, knowledge: Knowledge, design: Design, rng: np.random.Gen
     """
     null = linear.fit(design.grams, design.null_model())
     found = best(fitted(days, knowledge, design, promising(design, rng)))
-    if found is None or found.fall < design.rules.least_change_fall:
+    if found is None or found.fall < read_null_falls().needed(found.hypothesis.effect):
         return None
     return _by_fits(design, null, found, rng)
 
@@ -108,7 +109,7 @@ def settled(days: LogDays, knowledge: Knowledge, design: Design, told: Round, rn
     other = rival.hypothesis
     if change.proven_gain(design, other) >= design.history.null_gains.needed(other.effect):
         return change.round_of(design, null, other, rng)
-    if rival.fall >= rules.least_change_fall:
+    if rival.fall >= read_null_falls().needed(other.effect):
         return _by_fits(design, null, rival, rng)
     return Round(design, null, null, None, ())
 

@@ -1,8 +1,8 @@
 """What effects and parameters gain in greenhouses in which nothing has changed: a change must gain more than that.
 
 A calibration that is carried into another season misses something of every greenhouse, and what it misses looks like
-some effects more than like others. How much each of them gains by that alone is learned from later logs of virtual
-greenhouses with nothing missing, in several seasons.
+some effects more than like others. How much each of them gains by that alone, and what it takes off the error of unseen
+days, is learned from later logs of virtual greenhouses with nothing missing, in several seasons.
 """
 
 from __future__ import annotations
@@ -14,14 +14,15 @@ from typing import Any
 from igrow.trainer.diagnosis.rules import came_with_the_trainer
 
 FILE = "learned/null_gains.json"
+FALLS_FILE = "learned/null_falls.json"
 
 
 @dataclass(frozen=True)
 class NullGains:
-    """Log-likelihoods in nats that are gained where nothing has changed."""
+    """What is gained where nothing has changed: log-likelihoods in nats, or shares of the error of unseen days."""
 
     largest: Mapping[str, float]
-    """In any such log, of an effect and of a parameter (``parameter:name``)."""
+    """In any such log, of an effect and of a parameter (``parameter:name``); of shares 1.3 times that."""
     least: float
     """What any change must gain: of such logs none or nearly none is given a name then, each by the gains of others."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
@@ -33,5 +34,10 @@ class NullGains:
 
 
 def read_null_gains() -> NullGains:
-    """Return what came with the trainer."""
+    """Return the log-likelihoods that came with the trainer."""
     return NullGains(**came_with_the_trainer(FILE))
+
+
+def read_null_falls() -> NullGains:
+    """Return the shares that came with the trainer: of the error a day ahead that fits of an effect take off."""
+    return NullGains(**came_with_the_trainer(FALLS_FILE))

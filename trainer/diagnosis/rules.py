@@ -81,9 +81,6 @@ class DecisionRules:
     )
     least_fitted_change: float = _tuned(4.0, "gain from which on a change is fitted to free runs")
     most_change_fits: int = _chosen(3, "changes that are fitted beside the parameters, those that gain most")
-    least_change_fall: float = _fitted(
-        "share of the error of unseen days that such a change must remove: more than any where nothing had changed"
-    )
     least_pattern_change: float = _tuned(60.0, "the same of a pattern: greenhouses drift with the weather")
     least_proven_pattern: float = _tuned(20.0, "of it, what the scatter of day scores must bear out")
     pattern_over_change: float = _tuned(1.5, "times a change's gain at which a pattern replaces it")
