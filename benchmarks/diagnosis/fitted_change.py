@@ -1,14 +1,15 @@
 """Learn what a change that only fits tell must take off the error of unseen days: more than where there is none.
 
 Asked of the same logs in which nothing is missing that teach what a change must gain (`null-gains`), where the time
-steps tell nothing. An effect must exceed `OVER_NULL` times what it took off in any of these logs. Above that stands what
-every change must take off: the least with which none of these logs gets a name, each greenhouse judged by what the
-others lost. No case of a benchmark has these seeds.
+steps tell nothing. An effect must exceed `OVER_NULL` times what it took off in any of these logs. Above that stands
+what every change must take off: the least with which none of these logs gets a name, each greenhouse judged by the
+others. No case of a benchmark has these seeds.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -77,7 +78,7 @@ def least_fall(found: Sequence[Told]) -> float:
         effect, fall = next(iter(one.falls.items()), ("", 0.0))
         if fall >= by_others.get(effect, 0.0):
             told.append(fall)
-    return round(max(told) + 0.0005, 3)
+    return (math.floor(1000.0 * max(told)) + 1.0) / 1000.0
 
 
 def main(processes: int) -> int:

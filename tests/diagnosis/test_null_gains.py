@@ -2,16 +2,35 @@
 
 from __future__ import annotations
 
+from benchmarks.diagnosis import fitted_change as falls
 from benchmarks.diagnosis import null_gains as learning
+from benchmarks.diagnosis.fitted_change import Told
 from benchmarks.diagnosis.null_gains import Gained
 from igrow.core.effects import EFFECTS
-from igrow.trainer.diagnosis.null_gains import NullGains, read_null_gains
+from igrow.trainer.diagnosis.null_gains import NullGains, read_null_falls, read_null_gains
 
 
 def test_a_change_must_gain_more_than_it_did_where_nothing_had_changed() -> None:
     known = NullGains({"co2_drift": 20.0, "lamp_heat": 1.0}, least=9.0)
     assert known.needed("co2_drift") == 20.0
     assert known.needed("lamp_heat") == known.needed("rain_cooling") == 9.0
+
+
+def test_a_fall_is_judged_by_the_others_too_and_by_its_own_effect() -> None:
+    found = [
+        Told("one", "nothing", {"lamp_heat": 0.0402}),
+        Told("one", "nothing", {"lamp_heat": 0.02}),
+        Told("two", "noise", {"lamp_heat": 0.03, "rain_cooling": 0.02}),
+        Told("two", "nothing", {"rain_cooling": -0.01}),
+        Told("three", "nothing", {}),
+    ]
+    assert falls.of_each(found) == {"lamp_heat": 0.0523, "rain_cooling": 0.026}
+    # The other greenhouse's 0.03 would have let it pass; the second's was no more than what the first one lost.
+    assert falls.least_fall(found) == 0.041
+    assert falls.least_fall(found[1:]) == 0.031
+    known = read_null_falls()
+    assert known.needed("soil_respiration") > known.needed("lamp_heat") >= known.least > 0.01
+    assert set(known.largest) <= set(EFFECTS)
 
 
 def test_what_came_with_the_trainer_knows_effects_and_parameters() -> None:
