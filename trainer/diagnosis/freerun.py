@@ -34,8 +34,6 @@ SCALES = np.array([ERROR_SCALES[name] for name in measurement.PREDICTED])[:, Non
 """Of errors by balance, (3, 1, 1)."""
 EVALUATIONS = 20
 """Points that a fit may try."""
-_SIZE_DIFFERENCE = 0.05
-"""Of a term's size, as a share of it."""
 
 
 @dataclass(frozen=True)
@@ -183,8 +181,10 @@ class Refittable:
         if self.sized:
             *others, last = terms
             size = EFFECTS[last.effect].amplitude
-            nearby = replace(last, amplitude=(1.0 + _SIZE_DIFFERENCE) * last.amplitude)
-            moved = (self._along(log, [*others, nearby]).errors - line.errors) / (_SIZE_DIFFERENCE * last.amplitude)
+            step = sensitivity.EFFECT_DIFFERENCE * size.typical
+            step = step if last.amplitude + step <= size.high else -step
+            nearby = replace(last, amplitude=last.amplitude + step)
+            moved = (self._along(log, [*others, nearby]).errors - line.errors) / step
             slopes = np.concatenate([slopes, moved[None]])
             # So wide that the days alone tell it.
             prior = prior.beside(last.effect, last.amplitude, size.high - size.low)
