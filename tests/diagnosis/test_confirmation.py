@@ -49,7 +49,8 @@ def test_where_steps_and_runs_tell_another_size_nothing_is_told(
     by_runs: float, told: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(confirmation, "_by_runs", lambda *_: by_runs)
-    log = cast(Any, SimpleNamespace(fit=lambda *_: None, folds=lambda: ()))
+    monkeypatch.setattr(confirmation, "cross_validated_skill", lambda *_: 0.1)
+    log = cast(Any, SimpleNamespace(fit=lambda *_: None))
     found = confirmed(log, knowledge_of(model_in_force(), SITE, DEFAULT), (), change(1.0), DEFAULT)
     assert (found is not None) is told
 
