@@ -13,6 +13,7 @@ from igrow.trainer.diagnosis import amplitudes, history, linear, search
 from igrow.trainer.diagnosis.candidates import Pattern
 from igrow.trainer.diagnosis.change import changed, net_gain, proven_gain
 from igrow.trainer.diagnosis.design import Design, History
+from igrow.trainer.diagnosis.estimate import estimate
 from igrow.trainer.diagnosis.null_gains import NullGains
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.fit.discrepancy import Discrepancy
@@ -114,6 +115,8 @@ def test_a_change_beyond_the_history_is_named_and_its_own_gain_is_taken_off() ->
     assert not judged.patterns
     assert abs(judged.cause.profile.amplitudes[0] - 0.5) < 4.0 * judged.cause.profile.deviations[0]
     found = judged.cause.hypothesis
+    told = estimate(judged, np.random.default_rng(RNG_SEED))
+    assert told is not None and told.over_null == pytest.approx(proven_gain(judged.design, found) / BARE.least)
     own = with_history(make_design(truth, seed=5), 0.01, lamp_heat=found.gain - 5.0)
     assert np.isclose(net_gain(own, found), 5.0)
     assert changed(own, 0.0, np.random.default_rng(RNG_SEED)).cause is None

@@ -111,7 +111,7 @@ def solve(
     def slopes(moved: Floats) -> Floats:
         nonlocal latest, steps
         point = begin + scale * moved
-        latest = point, residuals(point), _running(jacobian(point), weight)
+        latest = point, residuals(point), _finite_slopes(jacobian(point), weight)
         if progress is not None:
             progress(steps, latest[1])
         steps += 1
@@ -170,7 +170,7 @@ def step(
         robust: size of an error from which on it counts linearly.
     """
     weight = np.broadcast_to(np.asarray(weights, dtype=np.float64), len(residuals))
-    slope, errors, scale = _weighted(residuals, _running(jacobian, weight), prior, weight, robust)
+    slope, errors, scale = _weighted(residuals, _finite_slopes(jacobian, weight), prior, weight, robust)
     white = prior.whitening
     slopes, apart = np.concatenate([slope, white * scale]), np.append(errors, white @ (start - prior.mean))
     # A triangle in place of many rows: the same sum of squares.
@@ -231,7 +231,7 @@ def _has_arrived(found: OptimizeResult) -> bool:
     return fall <= _ARRIVED * float(found.cost)
 
 
-def _running(jacobian: Floats, weight: Floats) -> Floats:
+def _finite_slopes(jacobian: Floats, weight: Floats) -> Floats:
     """Return slopes (n, p), 0 of what runs out of all bounds a little further on: it stays where it is in a step."""
     return np.where(np.isfinite(jacobian[weight > 0.0]).all(axis=0), jacobian, 0.0)
 
