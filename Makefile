@@ -17,7 +17,7 @@ $(STAMP): pyproject.toml
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[edge,trainer,exchange,postgresql,dev]'
 	@touch $@
 
-demo: $(STAMP) ## Run the whole loop on a virtual greenhouse with an undeclared effect (six to eighteen minutes).
+demo: $(STAMP) ## Run the whole loop on a virtual greenhouse with an undeclared effect (five to fifteen minutes).
 	$(BIN)/python config/demo/run.py --out out/demo
 
 # One thread of linear algebra a process: more of them wait for each other beside other processes, and burn twice the time.
