@@ -67,6 +67,14 @@ def vapour_pressure_deficit(xp: Any, temperature: Array, concentration: Array) -
     return xp.maximum(saturation_pressure(xp, temperature) - pressure, 0.0 * pressure)
 
 
+def humidity_and_deficit(xp: Any, temperature: Array, concentration: Array) -> tuple[Array, Array]:
+    """Return `relative_humidity` and `vapour_pressure_deficit`, for which saturation is computed once."""
+    saturated, kelvin = saturation_pressure(xp, temperature), temperature + 273.15
+    humidity = 100.0 * concentration / (saturated * (MOLAR_MASS_WATER / GAS_CONSTANT) / kelvin)
+    pressure = concentration * (GAS_CONSTANT / MOLAR_MASS_WATER) * kelvin
+    return humidity, xp.maximum(saturated - pressure, 0.0 * pressure)
+
+
 def co2_concentration(temperature: Array, ppm: Array) -> Array:
     """Return the CO2 content in kg m-3 of air of standard pressure with a volume fraction in ppm."""
     return ppm * (1e-6 * STANDARD_PRESSURE * MOLAR_MASS_CO2 / GAS_CONSTANT) / (temperature + 273.15)

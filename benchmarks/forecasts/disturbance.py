@@ -79,7 +79,7 @@ def missing_fluxes(
     substeps = max(1, round(record.step / records.SUBSTEP))
     drivers = climate.derive(np, ahead, inputs, parameters, record.lamp_efficacy)
     added_by_effects = climate.contributions(np, drivers, ahead, effects, record.step)
-    fluxes = balances(np, ahead, drivers, parameters, added_by_effects)
+    fluxes = balances(np, ahead, drivers, parameters, added_by_effects).of
     for _ in range(substeps):
         ahead = climate.advance(
             np,

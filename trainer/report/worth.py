@@ -112,7 +112,7 @@ def _needed(record: Record, stage: Stage) -> dict[str, Floats]:
         added[channel] = added.get(channel, 0.0) + flux
     none = np.zeros(len(record))
     unheated = dict(drivers) | {"rail_pipe_excess": none, "grow_pipe_excess": none, "co2_dosing": none}
-    net = balances(np, state, unheated, parameters, added)
+    net = balances(np, state, unheated, parameters, added).of
     heat = np.maximum(-_course(net["air_temperature"][0], record), 0.0)
     dosed = np.asarray(record.inputs["co2_dosing"]) > 0.0
     short = np.maximum(-_course(net["co2_concentration"][0], record), 0.0) / parameters["dosing_share"]

@@ -20,8 +20,39 @@ _LOW_LEAKS = 0.5
 """Share of the leaks that lies below the screens (Vanthoor 2011, electronic appendix, section 8)."""
 
 
+def given_above(xp: Any, screens: Array, surroundings: Array, inputs: Drivers, parameters: Values) -> dict[str, Array]:
+    """Return what `drivers_above` reads and no state changes; arguments as its own."""
+    # De Jong (1990): the flow past lee vents saturates with the opening, that past windward vents does not.
+    lee = 0.01 * inputs["vent_lee"]
+    lee = lee * (1.0 + parameters["vent_curvature"] * (1.0 - lee))
+    opening = lee + 0.01 * parameters["vent_windward_ratio"] * inputs["vent_wind"]
+    wind = inputs["wind_speed"]
+    leakage = (parameters["leakage_still"] + parameters["leakage_wind"] * wind) * inputs["mean_height"] / 3600.0
+    cover = parameters["cover_heat_transfer"] + parameters["cover_wind_heat_transfer"] * wind
+    closed = 0.01 * xp.maximum(inputs["energy_screen"], inputs["blackout_screen"])
+    open_part = xp.maximum(1.0 - closed, 0.0 * closed)
+    return {
+        "half_opening": 0.5 * opening,
+        "by_wind": parameters["vent_wind"] * wind,
+        "leakage_below": _LOW_LEAKS * leakage,
+        "leakage_above": (1.0 - _LOW_LEAKS) * leakage,
+        "cover": cover,
+        "unscreened": cover * screens,
+        "screened": 1.0 - screens,
+        "lost_to_surroundings": cover * surroundings,
+        "cloth": closed / parameters["screen_air_resistance"],
+        "past_open_part": _OPEN_FLOW * open_part * xp.sqrt(open_part + 1e-4),
+    }
+
+
 def drivers_above(
-    xp: Any, temperature: Array, surroundings: Array, screens: Array, inputs: Drivers, parameters: Values
+    xp: Any,
+    temperature: Array,
+    surroundings: Array,
+    screens: Array,
+    inputs: Drivers,
+    parameters: Values,
+    given: Mapping[str, Array],
 ) -> dict[str, Array]:
     """Return the exchange of air and heat past the screens, the vents, the leaks and the cover.
 
@@ -32,34 +63,29 @@ def drivers_above(
         screens: share of the heat through the cover that they let pass.
         inputs: as `climate.derive`'s.
         parameters: by name.
+        given: from `given_above`.
     """
-    # De Jong (1990): the flow past lee vents saturates with the opening, that past windward vents does not.
-    lee = 0.01 * inputs["vent_lee"]
-    lee = lee * (1.0 + parameters["vent_curvature"] * (1.0 - lee))
-    opening = lee + 0.01 * parameters["vent_windward_ratio"] * inputs["vent_wind"]
     # How warm it is above the screens without vents tells how much rises through these.
-    outdoor, wind = inputs["outdoor_temperature"], inputs["wind_speed"]
+    outdoor = inputs["outdoor_temperature"]
     still = surroundings + screens * (temperature - surroundings)
     buoyancy = xp.sqrt(xp.abs(still - outdoor) + 0.01)
-    ventilation = 0.5 * opening * (parameters["vent_wind"] * wind + parameters["vent_stack"] * buoyancy)
-    leakage = (parameters["leakage_still"] + parameters["leakage_wind"] * wind) * inputs["mean_height"] / 3600.0
-    exchange_above = ventilation + (1.0 - _LOW_LEAKS) * leakage
-    cover = parameters["cover_heat_transfer"] + parameters["cover_wind_heat_transfer"] * wind
+    ventilation = given["half_opening"] * (given["by_wind"] + parameters["vent_stack"] * buoyancy)
+    exchange_above = ventilation + given["leakage_above"]
     carried = air.VOLUMETRIC_HEAT * exchange_above
-    unscreened = cover * screens
-    pull = cover + (1.0 - screens) * carried
-    temperature_above = (unscreened * temperature + (1.0 - screens) * (cover * surroundings + carried * outdoor)) / pull
+    unscreened, screened = given["unscreened"], given["screened"]
+    pull = given["cover"] + screened * carried
+    temperature_above = (
+        unscreened * temperature + screened * (given["lost_to_surroundings"] + carried * outdoor)
+    ) / pull
     # Through closed cloth and its gaps air passes with the two thirds power of the difference (Balemans 1989).
-    closed = 0.01 * xp.maximum(inputs["energy_screen"], inputs["blackout_screen"])
     colder = temperature - temperature_above
-    past_cloth = closed / parameters["screen_air_resistance"] * xp.exp(xp.log(colder * colder + 0.04) / 3.0)
-    open_part = xp.maximum(1.0 - closed, 0.0 * closed)
+    past_cloth = given["cloth"] * xp.exp(xp.log(colder * colder + 0.04) / 3.0)
     return {
         "ventilation": ventilation,
-        "exchange_below": _LOW_LEAKS * leakage,
+        "exchange_below": given["leakage_below"],
         "exchange_above": exchange_above,
-        "past_screens": past_cloth + _OPEN_FLOW * open_part * xp.sqrt(open_part + 1e-4),
-        "cover_conductance": cover,
+        "past_screens": past_cloth + given["past_open_part"],
+        "cover_conductance": given["cover"],
         "temperature_above": temperature_above,
         "share_above": unscreened / pull,
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from igrow.core import air
@@ -22,12 +23,19 @@ _SLOWEST = 1e-7
 """Rate at which a state is pulled back at least, s-1; in single precision a smaller one would be lost."""
 
 
-def balances(
-    xp: Any, state: Values, drivers: Drivers, parameters: Values, added: Mapping[str, Array]
-) -> dict[str, tuple[Array, Array, Array]]:
-    """Return (net flux, restoring conductance, capacity) of each of `STATES`.
+@dataclass(frozen=True)
+class Balances:
+    """What moves each of `STATES`, and what pulls it back."""
 
-    Heat in W m-2, W m-2 K-1 and J m-2 K-1; vapour and CO2 in kg m-2 s-1, m s-1 and m.
+    of: dict[str, tuple[Array, Array, Array]]
+    """(Net flux, restoring conductance, capacity) by state: heat in W m-2, W m-2 K-1 and J m-2 K-1; vapour and CO2 in
+    kg m-2 s-1, m s-1 and m."""
+    moistened: Array
+    """By how much more vapour warmer air is moistened, from the crop and by a cover that bears more, kg m-2 s-1 K-1."""
+
+
+def balances(xp: Any, state: Values, drivers: Drivers, parameters: Values, added: Mapping[str, Array]) -> Balances:
+    """Return the balances of each of `STATES`.
 
     Args:
         xp: the array namespace.
@@ -41,15 +49,19 @@ def balances(
     outdoor = drivers["outdoor_temperature"]
     low, top = exchanged(xp, drivers, added)
     past = drivers["past_screens"]
-    light = 1.0 - added.get("light_loss", 0.0)
 
     # Heat: through the cover and with the air that leaves above the screens, and with that which leaves below.
     temperature_above, cover = drivers["temperature_above"], drivers["cover_conductance"]
     rail = parameters["rail_pipe_heat_transfer"] * drivers["rail_pipe_excess"]
     grow = parameters["grow_pipe_heat_transfer"] * drivers["grow_pipe_excess"]
-    sun = drivers["radiation_inside"] * light
-    transpiration = drivers["transpiration"] - (1.0 - light) * drivers["sun_transpiration"]
+    sun, transpiration, assimilation = (drivers[name] for name in ("radiation_inside", "transpiration", "assimilation"))
+    if "light_loss" in added:
+        light = 1.0 - added["light_loss"]
+        sun = sun * light
+        transpiration = transpiration - (1.0 - light) * drivers["sun_transpiration"]
+        assimilation = assimilation * (1.0 - (1.0 - light) * drivers["sun_share_of_par"])
     to_mass = parameters["mass_heat_transfer"] * (temperature - mass)
+    dried = drying(xp, state, drivers)
     heat = (
         rail
         + grow
@@ -67,27 +79,28 @@ def balances(
         + low * air.VOLUMETRIC_HEAT
         + parameters["mass_heat_transfer"]
         + parameters["rail_pipe_heat_transfer"] * xp.tanh(drivers["rail_pipe_excess"])
-        + drying(xp, state, drivers)
+        + dried
     )
 
     # Vapour: what passes the screens leaves with the air, or condenses on the cover.
     outdoor_vapour = drivers["outdoor_vapour_concentration"]
-    dew, wet, _ = condensing(xp, state, drivers, parameters, top)
-    condensation = wet * xp.maximum(dew, 0.0 * dew) * (past + top) / (past + top + wet)
-    above = (past * vapour + top * outdoor_vapour - condensation) / (past + top)
+    dew, wet, slope = condensing(xp, state, drivers, parameters, top)
+    both = past + top
+    condensation = wet * xp.maximum(dew, 0.0 * dew) * both / (both + wet)
+    above = (past * vapour + top * outdoor_vapour - condensation) / both
     vapour_flux = transpiration - low * (vapour - outdoor_vapour) - past * (vapour - above) + added.get("vapour", 0.0)
     leaves = drivers["transpiration_response"] * (PASCAL_PER_CONTENT / air.LATENT_HEAT)
-    vapour_conductance = low + past * (top + wet) / (past + top + wet) + leaves
+    vapour_conductance = low + past * (top + wet) / (both + wet) + leaves
+    moistened = dried / air.LATENT_HEAT + past * wet / (both + wet) * slope * (
+        parameters["cover_share"] * drivers["share_above"]
+    )
 
-    outdoor_co2 = air.co2_concentration(outdoor, drivers["outdoor_co2"])
     respiration = parameters["respiration"] / 3.6e6 * xp.exp(0.0693147 * (temperature - 20.0))
-    lit = 1.0 - (1.0 - light) * drivers["sun_share_of_par"]
-    assimilation = drivers["assimilation"] * lit + added.get("assimilation", 0.0)
-    exchange = low + past * top / (past + top)
+    exchange = low + past * top / both
     co2_flux = (
         parameters["dosing_share"] * drivers["co2_dosing"] / 3600.0
-        - exchange * (co2 - outdoor_co2)
-        - assimilation
+        - exchange * (co2 - drivers["outdoor_co2_concentration"])
+        - (assimilation + added.get("assimilation", 0.0))
         + respiration
         + added.get("co2", 0.0)
     )
@@ -106,7 +119,8 @@ def balances(
         "soil_temperature": (to_soil, parameters["soil_heat_transfer"], _SOIL_HEAT_CAPACITY + 0.0 * mass),
     }
     # Without wind, vents, leaks and light nothing pulls CO2 back: its balance is then a plain sum.
-    return {
+    of = {
         name: (flux, xp.maximum(conductance, _SLOWEST * capacity), capacity)
         for name, (flux, conductance, capacity) in found.items()
     }
+    return Balances(of, moistened)

@@ -19,41 +19,59 @@ _EXTINCTION = 0.7
 """Extinction of radiation in a tomato canopy (Stanghellini 1987)."""
 
 
-def canopy_drivers(xp: Any, climate: Values, inputs: Drivers, parameters: Values) -> dict[str, Array]:
-    """Return transpiration (kg m-2 s-1) and assimilation (kg m-2 s-1), and how they answer to the air.
+def given_canopy(xp: Any, climate: Values, inputs: Drivers, parameters: Values) -> dict[str, Array]:
+    """Return what `canopy_drivers` reads and no state changes.
 
     Args:
         xp: the array namespace.
-        climate: air temperature, its deficit, CO2 and light inside, and ``screens`` and ``surroundings``, as
-            `climate.derive` returns them.
+        climate: light inside and ``screens``, as `climate.derive` returns them.
         inputs: as `climate.derive`'s.
         parameters: by name.
     """
-    temperature, deficit = climate["air_temperature"], climate["vapour_deficit"]
-    radiation_inside, par, ppm = climate["radiation_inside"], climate["par"], climate["air_co2"]
+    radiation_inside, par = climate["radiation_inside"], climate["par"]
     canopy = 1.0 - xp.exp(-_EXTINCTION * inputs["leaf_area_index"])
     of_radiation = parameters["transpiration_radiation"] * canopy
     radiation = radiation_inside + parameters["lamp_radiation_share"] * inputs["lamp_power"]
     night = parameters["transpiration_night_share"]
     day_share = night + (1.0 - night) * radiation / (radiation + _STOMATA_HALF_OPEN)
+    long_wave = parameters["crop_long_wave_loss"] * climate["screens"]
+    return {
+        "of_radiation": of_radiation,
+        "radiation": radiation,
+        "in_moist_air": 0.001 * parameters["transpiration_moist_air"] * inputs["leaf_area_index"] * day_share,
+        "long_wave": long_wave,
+        "sun_transpiration": of_radiation * radiation_inside / air.LATENT_HEAT,
+        "long_wave_response": of_radiation * long_wave,
+        "assimilation_in_light": parameters["assimilation_maximum"]
+        / 3.6e6
+        * canopy
+        * (par / (par + parameters["assimilation_light"])),
+    }
+
+
+def canopy_drivers(xp: Any, climate: Values, parameters: Values, given: Values) -> dict[str, Array]:
+    """Return transpiration (kg m-2 s-1) and assimilation (kg m-2 s-1), and how they answer to the air.
+
+    Args:
+        xp: the array namespace.
+        climate: air temperature, its deficit, CO2 and ``surroundings``, as `climate.derive` returns them.
+        parameters: by name.
+        given: from `given_canopy`.
+    """
+    temperature, deficit, ppm = climate["air_temperature"], climate["vapour_deficit"], climate["air_co2"]
     # Stomata close as the air dries (Leuning 1995), so that a crop answers to drier air less than in proportion.
     open_share = _CLOSING_DEFICIT / (_CLOSING_DEFICIT + xp.maximum(deficit, 0.0 * deficit))
-    response = 0.001 * parameters["transpiration_moist_air"] * inputs["leaf_area_index"] * day_share * open_share
+    response = given["in_moist_air"] * open_share
     # A crop that radiates to a cold cover is colder than the air, and evaporates less than the air's deficit says.
-    long_wave = parameters["crop_long_wave_loss"] * climate["screens"]
-    lost = long_wave * (temperature - climate["surroundings"])
-    evaporation = of_radiation * (radiation - lost) + response * deficit
+    lost = given["long_wave"] * (temperature - climate["surroundings"])
+    evaporation = given["of_radiation"] * (given["radiation"] - lost) + response * deficit
     evaporation = xp.maximum(evaporation, 0.0 * temperature)
     return {
         "transpiration": evaporation / air.LATENT_HEAT,
-        "sun_transpiration": of_radiation * radiation_inside / air.LATENT_HEAT,
+        "sun_transpiration": given["sun_transpiration"],
         "transpiration_response": response * open_share * deficit / (deficit + 1.0),
-        "long_wave_response": of_radiation * long_wave,
-        "assimilation": parameters["assimilation_maximum"]
-        / 3.6e6
-        * canopy
-        * (par / (par + parameters["assimilation_light"]))
-        * (ppm / (ppm + parameters["assimilation_co2"])),
+        "long_wave_response": given["long_wave_response"],
+        "assimilation": given["assimilation_in_light"] * (ppm / (ppm + parameters["assimilation_co2"])),
     }
 
 

@@ -13,15 +13,16 @@ All functions are pure and elementwise over arrays of one shape, and work in num
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 from igrow.core import air
 from igrow.core.arrays import Array
 from igrow.core.effects import EFFECTS
 from igrow.core.effects.definition import Drivers, Values
-from igrow.core.simulator.hybrid.above_screens import drivers_above
+from igrow.core.simulator.hybrid.above_screens import drivers_above, given_above
 from igrow.core.simulator.hybrid.balances import STATES
-from igrow.core.simulator.hybrid.canopy import canopy_drivers
+from igrow.core.simulator.hybrid.canopy import canopy_drivers, given_canopy
 from igrow.core.simulator.hybrid.exponential import relax
 
 INPUTS = (
@@ -57,18 +58,37 @@ def memory_name(effect: str) -> str:
     return f"memory:{effect}"
 
 
-def derive(xp: Any, state: Values, inputs: Drivers, parameters: Values, lamp_efficacy: Array) -> dict[str, Array]:
-    """Return the drivers: all inputs, the states in the log's quantities, and what effects read beside them.
+@dataclass(frozen=True)
+class Given:
+    """What no state changes: inputs, and what follows from these and the parameters alone.
 
-    Args:
-        xp: the array namespace.
-        state: `STATES` by name.
-        inputs: `INPUTS` and whatever the active effects read, by name; must hold ``mean_height``.
-        parameters: `igrow.core.simulator.hybrid.parameters.PARAMETERS` by name.
-        lamp_efficacy: photons of PAR per electric energy of the lamps, umol J-1.
+    In a run over a log it is computed once, for many steps together.
     """
-    temperature, vapour, co2 = (state[name] for name in STATES[:3])
-    zero = 0.0 * temperature
+
+    drivers: Mapping[str, Array]
+    """Inputs and drivers, by name."""
+    above: Mapping[str, Array]
+    """From `above_screens.given_above`."""
+    canopy: Mapping[str, Array]
+    """From `canopy.given_canopy`."""
+
+    def at(self, step: int) -> Given:
+        """Return that of one step, where arrays have steps as their first axis."""
+        parts = (self.drivers, self.above, self.canopy)
+        return Given(*({name: values[step] for name, values in part.items()} for part in parts))
+
+    @property
+    def pipes(self) -> dict[str, Array]:
+        """Temperatures of the pipes, degC, from which nothing else here follows."""
+        return {name: self.drivers[name] for name in ("rail_pipe_temperature", "grow_pipe_temperature")}
+
+    def with_pipes(self, pipes: Mapping[str, Array]) -> Given:
+        """Return it with other temperatures of the pipes."""
+        return replace(self, drivers={**self.drivers, **pipes})
+
+
+def given(xp: Any, inputs: Drivers, parameters: Values, lamp_efficacy: Array) -> Given:
+    """Return what no state changes; arguments as `derive`'s."""
     shade = (1.0 - 0.01 * _ENERGY_SCREEN_SHADE * inputs["energy_screen"]) * (
         1.0 - 0.01 * _BLACKOUT_SCREEN_SHADE * inputs["blackout_screen"]
     )
@@ -81,27 +101,53 @@ def derive(xp: Any, state: Values, inputs: Drivers, parameters: Values, lamp_eff
     )
     outdoor = inputs["outdoor_temperature"]
     surroundings = outdoor + parameters["sky_share"] * (inputs["sky_temperature"] - outdoor)
-    inside = {
-        "air_temperature": temperature,
-        "air_humidity": air.relative_humidity(xp, temperature, vapour),
-        "air_co2": air.co2_fraction(temperature, co2),
+    drivers = dict(inputs) | {
         "par": par,
         "sun_share_of_par": sun_par / (par + 1e-3),
         "radiation_inside": radiation_inside,
-        "vapour_concentration": vapour,
         "outdoor_vapour_concentration": air.vapour_concentration(xp, outdoor, inputs["outdoor_humidity"]),
-        "vapour_deficit": air.vapour_pressure_deficit(xp, temperature, vapour),
+        "outdoor_co2_concentration": air.co2_concentration(outdoor, inputs["outdoor_co2"]),
         "screens": screens,
         "surroundings": surroundings,
-        "rail_pipe_excess": xp.maximum(inputs["rail_pipe_temperature"] - temperature, zero),
-        "grow_pipe_excess": xp.maximum(inputs["grow_pipe_temperature"] - temperature, zero),
     }
-    return (
-        dict(inputs)
-        | inside
-        | drivers_above(xp, temperature, surroundings, screens, inputs, parameters)
-        | canopy_drivers(xp, inside, inputs, parameters)
+    return Given(
+        drivers,
+        given_above(xp, screens, surroundings, inputs, parameters),
+        given_canopy(xp, drivers, inputs, parameters),
     )
+
+
+def derive(xp: Any, state: Values, inputs: Drivers, parameters: Values, lamp_efficacy: Array) -> dict[str, Array]:
+    """Return the drivers: all inputs, the states in the log's quantities, and what effects read beside them.
+
+    Args:
+        xp: the array namespace.
+        state: `STATES` by name.
+        inputs: `INPUTS` and whatever the active effects read, by name; must hold ``mean_height``.
+        parameters: `igrow.core.simulator.hybrid.parameters.PARAMETERS` by name.
+        lamp_efficacy: photons of PAR per electric energy of the lamps, umol J-1.
+    """
+    return with_state(xp, state, given(xp, inputs, parameters, lamp_efficacy), parameters)
+
+
+def with_state(xp: Any, state: Values, known: Given, parameters: Values) -> dict[str, Array]:
+    """Return the drivers as `derive` does, from what no state changes."""
+    temperature, vapour, co2 = (state[name] for name in STATES[:3])
+    zero = 0.0 * temperature
+    humidity, deficit = air.humidity_and_deficit(xp, temperature, vapour)
+    drivers = {
+        **known.drivers,
+        "air_temperature": temperature,
+        "air_humidity": humidity,
+        "air_co2": air.co2_fraction(temperature, co2),
+        "vapour_concentration": vapour,
+        "vapour_deficit": deficit,
+        "rail_pipe_excess": xp.maximum(known.drivers["rail_pipe_temperature"] - temperature, zero),
+        "grow_pipe_excess": xp.maximum(known.drivers["grow_pipe_temperature"] - temperature, zero),
+    }
+    surroundings, screens = drivers["surroundings"], drivers["screens"]
+    drivers |= drivers_above(xp, temperature, surroundings, screens, known.drivers, parameters, known.above)
+    return drivers | canopy_drivers(xp, drivers, parameters, known.canopy)
 
 
 def contributions(xp: Any, drivers: Drivers, state: Values, effects: ActiveEffects, seconds: float) -> dict[str, Array]:

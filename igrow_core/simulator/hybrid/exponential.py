@@ -11,12 +11,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from igrow.core import air
 from igrow.core.arrays import Array
 from igrow.core.effects.definition import Drivers, Values
-from igrow.core.simulator.hybrid.above_screens import condensing, exchanged
-from igrow.core.simulator.hybrid.balances import STATES, balances
-from igrow.core.simulator.hybrid.canopy import PASCAL_PER_CONTENT, drying
+from igrow.core.simulator.hybrid.balances import STATES, Balances, balances
+from igrow.core.simulator.hybrid.canopy import PASCAL_PER_CONTENT
 
 
 def relax(
@@ -24,8 +22,7 @@ def relax(
 ) -> dict[str, Array]:
     """Return `STATES` by name `seconds` later, by the exponentials of the balances."""
     parts = balances(xp, state, drivers, parameters, added)
-    by_heat, by_vapour = heat_and_vapour(xp, state, drivers, parameters, added, parts, seconds)
-    return moved(xp, state, parts, (by_heat, by_vapour), seconds)
+    return moved(xp, state, parts.of, heat_and_vapour(xp, drivers, parts, seconds), seconds)
 
 
 def moved(
@@ -46,31 +43,20 @@ def moved(
 
 
 def heat_and_vapour(
-    xp: Any,
-    state: Values,
-    drivers: Drivers,
-    parameters: Values,
-    added: Mapping[str, Array],
-    parts: Mapping[str, tuple[Array, Array, Array]],
-    seconds: Array,
+    xp: Any, drivers: Drivers, parts: Balances, seconds: Array
 ) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
     """Return by how much a flux of heat and one of vapour change temperature, and vapour, over a step: two rows of two.
 
     The exponential of both balances together: warmer air is moistened by the crop and by a cover that bears more, and
-    moister air is cooled less. Other arguments as `balances`', whose result is `parts`.
+    moister air is cooled less. `parts` is what `balances` returns for these drivers.
     """
     (_, heat_pull, heat_capacity), (_, vapour_pull, vapour_capacity) = (
-        parts[name] for name in ("air_temperature", "vapour_concentration")
-    )
-    past = drivers["past_screens"]
-    _, top = exchanged(xp, drivers, added)
-    _, wet, slope = condensing(xp, state, drivers, parameters, top)
-    moistened = drying(xp, state, drivers) / air.LATENT_HEAT + past * wet / (past + top + wet) * slope * (
-        parameters["cover_share"] * drivers["share_above"]
+        parts.of[name] for name in ("air_temperature", "vapour_concentration")
     )
     warmed = drivers["transpiration_response"] * PASCAL_PER_CONTENT
     heat_rate, vapour_rate = seconds / heat_capacity, seconds / vapour_capacity
-    own, cross = (-heat_rate * heat_pull, -vapour_rate * vapour_pull), (heat_rate * warmed, vapour_rate * moistened)
+    own = (-heat_rate * heat_pull, -vapour_rate * vapour_pull)
+    cross = (heat_rate * warmed, vapour_rate * parts.moistened)
     # Both eigenvalues are real, since neither pushes the other away; they are kept apart, and below nought.
     middle, half = 0.5 * (own[0] + own[1]), 0.5 * (own[0] - own[1])
     apart = xp.sqrt(half * half + cross[0] * cross[1] + 1e-6)

@@ -5,7 +5,7 @@ Row k of a record holds the measurements at its time, and the inputs from that t
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,10 +17,12 @@ from igrow.core.effects import EFFECTS
 from igrow.core.effects.definition import Values
 from igrow.core.simulator.hybrid import climate, measurement
 from igrow.core.simulator.hybrid.balances import balances
-from igrow.core.simulator.hybrid.climate import ActiveEffects, memory_name
+from igrow.core.simulator.hybrid.climate import ActiveEffects, Given, memory_name
 
 SUBSTEP = 900.0
 """Longest step of the balances in seconds."""
+_AT_ONCE = 16_384
+"""Elements of an array that is computed for many steps at once."""
 
 
 @dataclass(frozen=True)
@@ -123,24 +125,23 @@ def free_run(
     """
     begin = np.asarray(starts, dtype=np.int64)
     substeps = max(1, round(record.step / SUBSTEP))
-    names = list(record.inputs)
-    table = np.stack([record.inputs[name] for name in names])
+    course = _given_course(record, begin, steps, parameters)
     extra = {channel: np.asarray(flux) for channel, flux in (added or {}).items()}
     state: dict[str, Array] = {name: values[..., begin] for name, values in states.items()}
     shown: dict[str, list[Floats]] = {name: [] for name in measurement.PREDICTED}
-    inputs, active = dict(zip(names, table[:, begin], strict=True)), _at_rows(effects, begin, len(record))
-    drivers = climate.derive(np, state, inputs, parameters, record.lamp_efficacy)
+    known, active = next(course), _at_rows(effects, begin, len(record))
+    drivers = climate.with_state(np, state, known, parameters)
     for k in range(steps):
         row = begin + k
         fluxes = {channel: flux[row] if flux.ndim == 1 else flux[k] for channel, flux in extra.items()}
         for part in range(substeps):
             if part > 0:
-                drivers = climate.derive(np, state, inputs, parameters, record.lamp_efficacy)
-            true = _corrected(inputs, drivers, state, parameters, active, record.lamp_efficacy)
+                drivers = climate.with_state(np, state, known, parameters)
+            true = _corrected(known, drivers, state, parameters, active)
             state = climate.step(np, state, true, parameters, active, seconds=record.step / substeps, added=fluxes)
         # What the sensors show at a row is what the next step begins with.
-        inputs, active = dict(zip(names, table[:, row + 1], strict=True)), _at_rows(effects, row + 1, len(record))
-        drivers = climate.derive(np, state, inputs, parameters, record.lamp_efficacy)
+        known, active = next(course), _at_rows(effects, row + 1, len(record))
+        drivers = climate.with_state(np, state, known, parameters)
         for name, values in measurement.measured(np, drivers, state, active).items():
             shown[name].append(values)
     return {name: np.stack(np.broadcast_arrays(*values)) for name, values in shown.items()}
@@ -164,14 +165,26 @@ def _given(record: Record) -> list[Floats]:
     return [values for values in record.measured.values() if np.isfinite(values).any()]
 
 
-def _corrected(
-    inputs: Values, drivers: Values, state: Values, parameters: Values, effects: ActiveEffects, lamp_efficacy: float
-) -> Values:
+def _given_course(record: Record, begin: Integers, steps: int, parameters: Values) -> Iterator[Given]:
+    """Yield what no state changes at each step of runs from rows `begin`, the last one's end too."""
+    variants = max((np.shape(value)[0] for value in parameters.values() if np.ndim(value) > 1), default=0)
+    # As many steps at once as the processor's cache holds: arrays of few elements cost as much as long ones.
+    block = max(1, _AT_ONCE // (max(variants, 1) * max(len(begin), 1)))
+    for first in range(0, steps + 1, block):
+        rows = begin + np.arange(first, min(first + block, steps + 1))[:, None]
+        if variants:
+            rows = rows[:, None, :]
+        inputs = {name: values[rows] for name, values in record.inputs.items()}
+        known = climate.given(np, inputs, parameters, record.lamp_efficacy)
+        yield from (known.at(k) for k in range(len(rows)))
+
+
+def _corrected(known: Given, drivers: Values, state: Values, parameters: Values, effects: ActiveEffects) -> Values:
     """Take the pipe sensors' error out of the drivers that were derived from the inputs, where one is active."""
     if "pipe_temperature_offset" not in effects:
         return drivers
-    true = measurement.correct_inputs(np, inputs, drivers, state, effects)
-    return climate.derive(np, state, true, parameters, lamp_efficacy)
+    pipes = measurement.correct_inputs(np, known.pipes, drivers, state, effects)
+    return climate.with_state(np, state, known.with_pipes(pipes), parameters)
 
 
 def _at_rows(effects: ActiveEffects, rows: Integers, count: int) -> ActiveEffects:
@@ -193,7 +206,7 @@ def bridge(values: Floats, longest: int, *, smooth: bool) -> tuple[Floats, Mask]
 def _run_below(record: Record, state: Values, drivers: Values, parameters: Values) -> tuple[Floats, Floats]:
     """Run the balances of floor and soil under the measured air; return both temperatures."""
     added: dict[str, Array] = {}
-    parts = balances(np, state, drivers, parameters, added)
+    parts = balances(np, state, drivers, parameters, added).of
     flux, conductance, capacity = parts["mass_temperature"]
     _, soil_conductance, soil_capacity = parts["soil_temperature"]
     # The floor is drawn to `aim`, less by so much as the soil is colder than where both stand now.

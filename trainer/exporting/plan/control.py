@@ -79,8 +79,8 @@ def _control(xp: Any, arrays: Mapping[str, Any]) -> Mapping[str, Any]:
     zero = 0.0 * temperature
     idle = drivers | {"rail_pipe_excess": zero, "grow_pipe_excess": zero, "co2_dosing": zero}
     added = named.get("added", {})
-    parts = balances(xp, state, idle, parameters, added)
-    answers = heat_and_vapour(xp, state, idle, parameters, added, parts, SECONDS)
+    found = balances(xp, state, idle, parameters, added)
+    parts, answers = found.of, heat_and_vapour(xp, idle, found, SECONDS)
     if "minimum_pipe_setpoint" in setpoints:
         excess = xp.maximum(setpoints["minimum_pipe_setpoint"] - arrays["shown_temperature"], zero)
         held = named["actuation"]["rail_minimum"] * parameters["rail_pipe_heat_transfer"] * excess
