@@ -68,6 +68,8 @@ class LogDays:
     split: DaySplit
     runs: DayRuns
     """A day long, one from every local midnight."""
+    _fitted: dict[tuple[object, ...], Gaussian] = field(default_factory=dict, repr=False, compare=False)
+    """Fits that were made, by what they were asked: of two causes each is held against the same fit without it."""
 
     def fit(
         self,
@@ -87,6 +89,24 @@ class LogDays:
         Raises:
             DivergenceError: the model runs out of all bounds where the fit begins.
         """
+        asked = (
+            (prior.names, prior.mean.tobytes(), prior.covariance.tobytes()),
+            tuple((one.effect, one.amplitude, tuple(one.shape.items()), one.onset) for one in terms),
+            None if start is None else tuple(start.items()),
+        )
+        if added is not None:
+            return self._fit(prior, terms, start, added)
+        if asked not in self._fitted:
+            self._fitted[asked] = self._fit(prior, terms, start, None)
+        return self._fitted[asked]
+
+    def _fit(
+        self,
+        prior: Gaussian,
+        terms: Sequence[ActiveTerm],
+        start: Mapping[str, float] | None,
+        added: Mapping[str, Floats] | None,
+    ) -> Gaussian:
         record, runs, effects = self.record, self.runs, activate(self.record, terms)
         counted = (runs.weight & self.split.fit[runs.day][None, :, None]).ravel()
         low, high = bounds(prior.names)
