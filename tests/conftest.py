@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from itertools import chain, islice
+from itertools import chain, islice, zip_longest
 from pathlib import Path
 
 import pytest
@@ -28,18 +28,20 @@ def pytest_unconfigure(config: pytest.Config) -> None:
         made_once.end()
 
 
-LONG = {
-    "benchmarks", "diagnosis", "fit", "fleet", "hangs", "loop", "page", "recalibration", "report", "research",
-    "scoring", "season", "service",
-}  # fmt: skip
-"""Folders with tests that fit, plan or wait for many seconds."""
+COMPUTING = (
+    "diagnosis", "fit", "fleet", "research", "recalibration", "scoring", "season", "report", "benchmarks"
+)  # fmt: skip
+"""Folders with tests that fit or plan for many seconds, those that take longest first."""
+WAITING = ("service", "loop", "page", "hangs")
+"""Folders with tests that wait for many seconds, for a daemon, a line or a clock."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Let each worker begin with files of its own that take long, so that at the end none waits for one of these.
 
     A worker is given as many tests as any other, those that follow each other; who has done his takes over the last of
-    whoever has most, however long they take.
+    whoever has most, however long they take. Files that compute and files that wait follow each other, so that some
+    wait while others compute.
     """
     workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "0"))
     if not workers:
@@ -47,8 +49,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     files: dict[Path, list[pytest.Item]] = {}
     for item in items:
         files.setdefault(item.path, []).append(item)
-    long = [file for path, file in files.items() if path.parent.name in LONG]
-    others = chain.from_iterable(file for path, file in files.items() if path.parent.name not in LONG)
+
+    def of(folders: tuple[str, ...]) -> list[list[pytest.Item]]:
+        return [file for folder in folders for path, file in files.items() if path.parent.name == folder]
+
+    pairs = zip_longest(of(COMPUTING), of(WAITING))
+    long = [file for pair in pairs for file in pair if file is not None]
+    others = chain.from_iterable(file for path, file in files.items() if path.parent.name not in (*COMPUTING, *WAITING))
     ordered: list[pytest.Item] = []
     for worker in range(workers):
         share = list(chain.from_iterable(long[worker::workers]))

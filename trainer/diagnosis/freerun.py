@@ -68,7 +68,7 @@ class LogDays:
     split: DaySplit
     runs: DayRuns
     """A day long, one from every local midnight."""
-    _fitted: dict[tuple[object, ...], Gaussian] = field(default_factory=dict, repr=False, compare=False)
+    _fitted: dict[tuple[object, ...], Gaussian] = field(default_factory=dict, init=False, repr=False, compare=False)
     """Fits that were made, by what they were asked: of two causes each is held against the same fit without it."""
 
     def fit(
