@@ -147,7 +147,7 @@ class DecisionRules:
     deviation_inflation: float = _chosen(1.3, "of a standard error, for structure that no covariance knows")
     form_deviation: float = _chosen(0.3, "relative standard error for a truth that is not of the catalogue's form")
     confounded_gain: float = _chosen(6.0, "gain within which another cause fits as well")
-    least_confounded_gain: float = _tuned(4.0, "gain from which on another cause is told at all as one that fits as well")
+    least_confounded_gain: float = _tuned(4.0, "gain below which no other cause is told to fit as well")
     confounded_share: float = _chosen(0.25, "the same as a share of the cause's own gain")
     nonlinear_spread: float = _chosen(0.12, "prior deviation of a nonlinear parameter, as a share of its range")
     refit_rounds: int = _chosen(3, "alternations between a refit and its noise")
