@@ -20,7 +20,9 @@ _LOW_LEAKS = 0.5
 """Share of the leaks that lies below the screens (Vanthoor 2011, electronic appendix, section 8)."""
 
 
-def given_above(xp: Any, screens: Array, surroundings: Array, inputs: Drivers, parameters: Values) -> dict[str, Array]:
+def forcing_above(
+    xp: Any, screens: Array, surroundings: Array, inputs: Drivers, parameters: Values
+) -> dict[str, Array]:
     """Return what `drivers_above` reads and no state changes; arguments as its own."""
     # De Jong (1990): the flow past lee vents saturates with the opening, that past windward vents does not.
     lee = 0.01 * inputs["vent_lee"]
@@ -52,7 +54,7 @@ def drivers_above(
     screens: Array,
     inputs: Drivers,
     parameters: Values,
-    given: Mapping[str, Array],
+    forcing: Mapping[str, Array],
 ) -> dict[str, Array]:
     """Return the exchange of air and heat past the screens, the vents, the leaks and the cover.
 
@@ -63,29 +65,29 @@ def drivers_above(
         screens: share of the heat through the cover that they let pass.
         inputs: as `climate.derive`'s.
         parameters: by name.
-        given: from `given_above`.
+        forcing: from `forcing_above`.
     """
     # How warm it is above the screens without vents tells how much rises through these.
     outdoor = inputs["outdoor_temperature"]
     still = surroundings + screens * (temperature - surroundings)
     buoyancy = xp.sqrt(xp.abs(still - outdoor) + 0.01)
-    ventilation = given["half_opening"] * (given["by_wind"] + parameters["vent_stack"] * buoyancy)
-    exchange_above = ventilation + given["leakage_above"]
+    ventilation = forcing["half_opening"] * (forcing["by_wind"] + parameters["vent_stack"] * buoyancy)
+    exchange_above = ventilation + forcing["leakage_above"]
     carried = air.VOLUMETRIC_HEAT * exchange_above
-    unscreened, screened = given["unscreened"], given["screened"]
-    pull = given["cover"] + screened * carried
+    unscreened, screened = forcing["unscreened"], forcing["screened"]
+    pull = forcing["cover"] + screened * carried
     temperature_above = (
-        unscreened * temperature + screened * (given["lost_to_surroundings"] + carried * outdoor)
+        unscreened * temperature + screened * (forcing["lost_to_surroundings"] + carried * outdoor)
     ) / pull
     # Through closed cloth and its gaps air passes with the two thirds power of the difference (Balemans 1989).
     colder = temperature - temperature_above
-    past_cloth = given["cloth"] * xp.exp(xp.log(colder * colder + 0.04) / 3.0)
+    past_cloth = forcing["cloth"] * xp.exp(xp.log(colder * colder + 0.04) / 3.0)
     return {
         "ventilation": ventilation,
-        "exchange_below": given["leakage_below"],
+        "exchange_below": forcing["leakage_below"],
         "exchange_above": exchange_above,
-        "past_screens": past_cloth + given["past_open_part"],
-        "cover_conductance": given["cover"],
+        "past_screens": past_cloth + forcing["past_open_part"],
+        "cover_conductance": forcing["cover"],
         "temperature_above": temperature_above,
         "share_above": unscreened / pull,
     }

@@ -19,7 +19,7 @@ _EXTINCTION = 0.7
 """Extinction of radiation in a tomato canopy (Stanghellini 1987)."""
 
 
-def given_canopy(xp: Any, climate: Values, inputs: Drivers, parameters: Values) -> dict[str, Array]:
+def forcing_canopy(xp: Any, climate: Values, inputs: Drivers, parameters: Values) -> dict[str, Array]:
     """Return what `canopy_drivers` reads and no state changes.
 
     Args:
@@ -49,29 +49,29 @@ def given_canopy(xp: Any, climate: Values, inputs: Drivers, parameters: Values) 
     }
 
 
-def canopy_drivers(xp: Any, climate: Values, parameters: Values, given: Values) -> dict[str, Array]:
+def canopy_drivers(xp: Any, climate: Values, parameters: Values, forcing: Values) -> dict[str, Array]:
     """Return transpiration (kg m-2 s-1) and assimilation (kg m-2 s-1), and how they answer to the air.
 
     Args:
         xp: the array namespace.
         climate: air temperature, its deficit, CO2 and ``surroundings``, as `climate.derive` returns them.
         parameters: by name.
-        given: from `given_canopy`.
+        forcing: from `forcing_canopy`.
     """
     temperature, deficit, ppm = climate["air_temperature"], climate["vapour_deficit"], climate["air_co2"]
     # Stomata close as the air dries (Leuning 1995), so that a crop answers to drier air less than in proportion.
     open_share = _CLOSING_DEFICIT / (_CLOSING_DEFICIT + xp.maximum(deficit, 0.0 * deficit))
-    response = given["in_moist_air"] * open_share
+    response = forcing["in_moist_air"] * open_share
     # A crop that radiates to a cold cover is colder than the air, and evaporates less than the air's deficit says.
-    lost = given["long_wave"] * (temperature - climate["surroundings"])
-    evaporation = given["of_radiation"] * (given["radiation"] - lost) + response * deficit
+    lost = forcing["long_wave"] * (temperature - climate["surroundings"])
+    evaporation = forcing["of_radiation"] * (forcing["radiation"] - lost) + response * deficit
     evaporation = xp.maximum(evaporation, 0.0 * temperature)
     return {
         "transpiration": evaporation / air.LATENT_HEAT,
-        "sun_transpiration": given["sun_transpiration"],
+        "sun_transpiration": forcing["sun_transpiration"],
         "transpiration_response": response * open_share * deficit / (deficit + 1.0),
-        "long_wave_response": given["long_wave_response"],
-        "assimilation": given["assimilation_in_light"] * (ppm / (ppm + parameters["assimilation_co2"])),
+        "long_wave_response": forcing["long_wave_response"],
+        "assimilation": forcing["assimilation_in_light"] * (ppm / (ppm + parameters["assimilation_co2"])),
     }
 
 

@@ -20,9 +20,9 @@ from igrow.core import air
 from igrow.core.arrays import Array
 from igrow.core.effects import EFFECTS
 from igrow.core.effects.definition import Drivers, Values
-from igrow.core.simulator.hybrid.above_screens import drivers_above, given_above
+from igrow.core.simulator.hybrid.above_screens import drivers_above, forcing_above
 from igrow.core.simulator.hybrid.balances import STATES
-from igrow.core.simulator.hybrid.canopy import canopy_drivers, given_canopy
+from igrow.core.simulator.hybrid.canopy import canopy_drivers, forcing_canopy
 from igrow.core.simulator.hybrid.exponential import relax
 
 INPUTS = (
@@ -59,8 +59,8 @@ def memory_name(effect: str) -> str:
 
 
 @dataclass(frozen=True)
-class Given:
-    """What no state changes: inputs, and what follows from these and the parameters alone.
+class Forcing:
+    """What drives the balances from outside and no state changes: inputs, and what follows from them by the parameters.
 
     In a run over a log it is computed once, for many steps together.
     """
@@ -68,27 +68,27 @@ class Given:
     drivers: Mapping[str, Array]
     """Inputs and drivers, by name."""
     above: Mapping[str, Array]
-    """From `above_screens.given_above`."""
+    """From `above_screens.forcing_above`."""
     canopy: Mapping[str, Array]
-    """From `canopy.given_canopy`."""
+    """From `canopy.forcing_canopy`."""
 
-    def at(self, step: int) -> Given:
+    def at(self, step: int) -> Forcing:
         """Return that of one step, where arrays have steps as their first axis."""
         parts = (self.drivers, self.above, self.canopy)
-        return Given(*({name: values[step] for name, values in part.items()} for part in parts))
+        return Forcing(*({name: values[step] for name, values in part.items()} for part in parts))
 
     @property
     def pipes(self) -> dict[str, Array]:
         """Temperatures of the pipes, degC, from which nothing else here follows."""
         return {name: self.drivers[name] for name in ("rail_pipe_temperature", "grow_pipe_temperature")}
 
-    def with_pipes(self, pipes: Mapping[str, Array]) -> Given:
+    def with_pipes(self, pipes: Mapping[str, Array]) -> Forcing:
         """Return it with other temperatures of the pipes."""
         return replace(self, drivers={**self.drivers, **pipes})
 
 
-def given(xp: Any, inputs: Drivers, parameters: Values, lamp_efficacy: Array) -> Given:
-    """Return what no state changes; arguments as `derive`'s."""
+def forcing(xp: Any, inputs: Drivers, parameters: Values, lamp_efficacy: Array) -> Forcing:
+    """Return what of the drivers no state changes; arguments as `derive`'s."""
     shade = (1.0 - 0.01 * _ENERGY_SCREEN_SHADE * inputs["energy_screen"]) * (
         1.0 - 0.01 * _BLACKOUT_SCREEN_SHADE * inputs["blackout_screen"]
     )
@@ -110,10 +110,10 @@ def given(xp: Any, inputs: Drivers, parameters: Values, lamp_efficacy: Array) ->
         "screens": screens,
         "surroundings": surroundings,
     }
-    return Given(
+    return Forcing(
         drivers,
-        given_above(xp, screens, surroundings, inputs, parameters),
-        given_canopy(xp, drivers, inputs, parameters),
+        forcing_above(xp, screens, surroundings, inputs, parameters),
+        forcing_canopy(xp, drivers, inputs, parameters),
     )
 
 
@@ -127,27 +127,27 @@ def derive(xp: Any, state: Values, inputs: Drivers, parameters: Values, lamp_eff
         parameters: `igrow.core.simulator.hybrid.parameters.PARAMETERS` by name.
         lamp_efficacy: photons of PAR per electric energy of the lamps, umol J-1.
     """
-    return with_state(xp, state, given(xp, inputs, parameters, lamp_efficacy), parameters)
+    return with_state(xp, state, forcing(xp, inputs, parameters, lamp_efficacy), parameters)
 
 
-def with_state(xp: Any, state: Values, known: Given, parameters: Values) -> dict[str, Array]:
-    """Return the drivers as `derive` does, from what no state changes."""
+def with_state(xp: Any, state: Values, outer: Forcing, parameters: Values) -> dict[str, Array]:
+    """Return the drivers as `derive` does, from those that no state changes."""
     temperature, vapour, co2 = (state[name] for name in STATES[:3])
     zero = 0.0 * temperature
     humidity, deficit = air.humidity_and_deficit(xp, temperature, vapour)
     drivers = {
-        **known.drivers,
+        **outer.drivers,
         "air_temperature": temperature,
         "air_humidity": humidity,
         "air_co2": air.co2_fraction(temperature, co2),
         "vapour_concentration": vapour,
         "vapour_deficit": deficit,
-        "rail_pipe_excess": xp.maximum(known.drivers["rail_pipe_temperature"] - temperature, zero),
-        "grow_pipe_excess": xp.maximum(known.drivers["grow_pipe_temperature"] - temperature, zero),
+        "rail_pipe_excess": xp.maximum(outer.drivers["rail_pipe_temperature"] - temperature, zero),
+        "grow_pipe_excess": xp.maximum(outer.drivers["grow_pipe_temperature"] - temperature, zero),
     }
     surroundings, screens = drivers["surroundings"], drivers["screens"]
-    drivers |= drivers_above(xp, temperature, surroundings, screens, known.drivers, parameters, known.above)
-    return drivers | canopy_drivers(xp, drivers, parameters, known.canopy)
+    drivers |= drivers_above(xp, temperature, surroundings, screens, outer.drivers, parameters, outer.above)
+    return drivers | canopy_drivers(xp, drivers, parameters, outer.canopy)
 
 
 def contributions(xp: Any, drivers: Drivers, state: Values, effects: ActiveEffects, seconds: float) -> dict[str, Array]:

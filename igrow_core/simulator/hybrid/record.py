@@ -17,7 +17,7 @@ from igrow.core.effects import EFFECTS
 from igrow.core.effects.definition import Values
 from igrow.core.simulator.hybrid import climate, measurement
 from igrow.core.simulator.hybrid.balances import balances
-from igrow.core.simulator.hybrid.climate import ActiveEffects, Given, memory_name
+from igrow.core.simulator.hybrid.climate import ActiveEffects, Forcing, memory_name
 
 SUBSTEP = 900.0
 """Longest step of the balances in seconds."""
@@ -125,23 +125,23 @@ def free_run(
     """
     begin = np.asarray(starts, dtype=np.int64)
     substeps = max(1, round(record.step / SUBSTEP))
-    course = _given_course(record, begin, steps, parameters)
+    course = _forcing_of(record, begin, steps, parameters)
     extra = {channel: np.asarray(flux) for channel, flux in (added or {}).items()}
     state: dict[str, Array] = {name: values[..., begin] for name, values in states.items()}
     shown: dict[str, list[Floats]] = {name: [] for name in measurement.PREDICTED}
-    known, active = next(course), _at_rows(effects, begin, len(record))
-    drivers = climate.with_state(np, state, known, parameters)
+    outer, active = next(course), _at_rows(effects, begin, len(record))
+    drivers = climate.with_state(np, state, outer, parameters)
     for k in range(steps):
         row = begin + k
         fluxes = {channel: flux[row] if flux.ndim == 1 else flux[k] for channel, flux in extra.items()}
         for part in range(substeps):
             if part > 0:
-                drivers = climate.with_state(np, state, known, parameters)
-            true = _corrected(known, drivers, state, parameters, active)
+                drivers = climate.with_state(np, state, outer, parameters)
+            true = _corrected(outer, drivers, state, parameters, active)
             state = climate.step(np, state, true, parameters, active, seconds=record.step / substeps, added=fluxes)
         # What the sensors show at a row is what the next step begins with.
-        known, active = next(course), _at_rows(effects, row + 1, len(record))
-        drivers = climate.with_state(np, state, known, parameters)
+        outer, active = next(course), _at_rows(effects, row + 1, len(record))
+        drivers = climate.with_state(np, state, outer, parameters)
         for name, values in measurement.measured(np, drivers, state, active).items():
             shown[name].append(values)
     return {name: np.stack(np.broadcast_arrays(*values)) for name, values in shown.items()}
@@ -165,7 +165,7 @@ def _given(record: Record) -> list[Floats]:
     return [values for values in record.measured.values() if np.isfinite(values).any()]
 
 
-def _given_course(record: Record, begin: Integers, steps: int, parameters: Values) -> Iterator[Given]:
+def _forcing_of(record: Record, begin: Integers, steps: int, parameters: Values) -> Iterator[Forcing]:
     """Yield what no state changes at each step of runs from rows `begin`, the last one's end too."""
     variants = max((np.shape(value)[0] for value in parameters.values() if np.ndim(value) > 1), default=0)
     # As many steps at once as the processor's cache holds: arrays of few elements cost as much as long ones.
@@ -175,16 +175,16 @@ def _given_course(record: Record, begin: Integers, steps: int, parameters: Value
         if variants:
             rows = rows[:, None, :]
         inputs = {name: values[rows] for name, values in record.inputs.items()}
-        known = climate.given(np, inputs, parameters, record.lamp_efficacy)
-        yield from (known.at(k) for k in range(len(rows)))
+        outer = climate.forcing(np, inputs, parameters, record.lamp_efficacy)
+        yield from (outer.at(k) for k in range(len(rows)))
 
 
-def _corrected(known: Given, drivers: Values, state: Values, parameters: Values, effects: ActiveEffects) -> Values:
+def _corrected(outer: Forcing, drivers: Values, state: Values, parameters: Values, effects: ActiveEffects) -> Values:
     """Take the pipe sensors' error out of the drivers that were derived from the inputs, where one is active."""
     if "pipe_temperature_offset" not in effects:
         return drivers
-    pipes = measurement.correct_inputs(np, known.pipes, drivers, state, effects)
-    return climate.with_state(np, state, known.with_pipes(pipes), parameters)
+    pipes = measurement.correct_inputs(np, outer.pipes, drivers, state, effects)
+    return climate.with_state(np, state, outer.with_pipes(pipes), parameters)
 
 
 def _at_rows(effects: ActiveEffects, rows: Integers, count: int) -> ActiveEffects:
