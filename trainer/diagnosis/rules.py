@@ -79,7 +79,7 @@ class DecisionRules:
     least_change_skill: float = _tuned(
         -0.02, "share that the shipped model gains at least with a change in it: chance makes as much"
     )
-    least_fitted_change: float = _tuned(2.0, "gain from which on a change is fitted to free runs")
+    least_fitted_change: float = _tuned(4.0, "gain from which on a change is fitted to free runs")
     most_change_fits: int = _chosen(5, "changes that are fitted beside the parameters, those that gain most")
     least_pattern_change: float = _tuned(60.0, "the same of a pattern: greenhouses drift with the weather")
     least_proven_pattern: float = _tuned(20.0, "of it, what the scatter of day scores must bear out")
