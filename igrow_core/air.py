@@ -58,17 +58,14 @@ def vapour_concentration(xp: Any, temperature: Array, humidity: Array) -> Array:
 
 def relative_humidity(xp: Any, temperature: Array, concentration: Array) -> Array:
     """Return the relative humidity in % of air with a vapour content in kg m-3 (not cut at 100)."""
-    return 100.0 * concentration / saturation_concentration(xp, temperature)
-
-
-def vapour_pressure_deficit(xp: Any, temperature: Array, concentration: Array) -> Array:
-    """Return the pressure in Pa that the vapour lacks to saturation (never negative)."""
-    pressure = concentration * (GAS_CONSTANT / MOLAR_MASS_WATER) * (temperature + 273.15)
-    return xp.maximum(saturation_pressure(xp, temperature) - pressure, 0.0 * pressure)
+    return humidity_and_deficit(xp, temperature, concentration)[0]
 
 
 def humidity_and_deficit(xp: Any, temperature: Array, concentration: Array) -> tuple[Array, Array]:
-    """Return `relative_humidity` and `vapour_pressure_deficit`, for which saturation is computed once."""
+    """Return the relative humidity, and the pressure in Pa that the vapour lacks to saturation (never negative).
+
+    Saturation, which is what takes long, is computed once.
+    """
     saturated, kelvin = saturation_pressure(xp, temperature), temperature + 273.15
     humidity = 100.0 * concentration / (saturated * (MOLAR_MASS_WATER / GAS_CONSTANT) / kelvin)
     pressure = concentration * (GAS_CONSTANT / MOLAR_MASS_WATER) * kelvin

@@ -200,12 +200,12 @@ def run(demo: Demo) -> None:
     demo.run("publish", ["igrow-trainer", "publish", "diagnosis/bundle", "--keys", "keys", "--exchange", "exchange"])
     daemon.send_signal(signal.SIGCONT)
     demo.finish("nothing", nothing)
-    silence = demo.spawn(
+    quiet = demo.spawn(
         "nothing-diagnose",
         ["igrow-trainer", "diagnose", "nothing", "--bundle", "first-bundle", "--site", "site.yaml",
          "--out", "nothing-diagnosis"],
     )  # fmt: skip
-    give_way(silence)
+    give_way(quiet)
     demo.wait_for_day(days, "shadow run, adoption, control with the corrected bundle")
     for name in ("daemon", "virtual-plc"):
         demo.running[name].send_signal(signal.SIGTERM)
@@ -213,7 +213,7 @@ def run(demo: Demo) -> None:
 
     demo.run("collect", collect)
     demo.finish("recipe", recipe)
-    verdict = demo.finish("nothing-diagnose", silence, VERDICTS)
+    verdict = demo.finish("nothing-diagnose", quiet, VERDICTS)
     demo.say("the same greenhouse, had nothing broken")
     demo.say(one_line((demo.out / "nothing-diagnose.log").read_text()))
     print()

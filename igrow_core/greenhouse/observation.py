@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from igrow.core.air import co2_fraction, relative_humidity, vapour_pressure_deficit
+from igrow.core.air import co2_fraction, humidity_and_deficit, relative_humidity
 from igrow.core.arrays import Array
 from igrow.core.greenhouse import tomato
 from igrow.core.greenhouse.climate_computer import Readings
@@ -106,6 +106,7 @@ def drivers(
     """
     like = 0.0 * state.climate.air
     air = state.climate.air
+    humidity, deficit = humidity_and_deficit(xp, air, state.climate.vapour)
     light = state.light
     values: dict[str, Array] = {name: like + value for name, value in setpoints.items()}
     values.update(zip(ACCUMULATED, state.actuators(parameters), strict=True))
@@ -118,7 +119,7 @@ def drivers(
         sky_temperature=like + weather.sky_temperature,
         rain=like + weather.rain,
         air_temperature=air,
-        air_humidity=relative_humidity(xp, air, state.climate.vapour),
+        air_humidity=humidity,
         air_co2=co2_fraction(air, state.climate.co2),
         par=light.par + like if light is not None else like,
         leaf_area_index=tomato.leaf_area_index(parameters, state.crop),
@@ -129,7 +130,7 @@ def drivers(
         radiation_inside=light.inside + like if light is not None else like,
         vapour_concentration=state.climate.vapour,
         outdoor_vapour_concentration=like + weather.vapour,
-        vapour_deficit=vapour_pressure_deficit(xp, air, state.climate.vapour),
+        vapour_deficit=deficit,
         ventilation=ventilation,
         transpiration=state.transpiration,
         assimilation=state.assimilation,

@@ -117,12 +117,6 @@ def test_a_cause_is_the_same_by_day_and_by_night_in_calm_and_in_wind(values: dic
     assert stands(replace(cause(), regimes=regimes), [], DEFAULT) is same
 
 
-def test_sizes_of_which_little_is_known_are_not_apart() -> None:
-    shut, opened = Estimate(0.2, -0.4, 0.8, "1"), Estimate(1.2, 0.7, 1.7, "1")
-    assert same_in_all_regimes({"vents shut": shut, "vents open": opened}, DEFAULT)
-    assert not same_in_all_regimes({"vents shut": replace(shut, high=0.6), "vents open": opened}, DEFAULT)
-
-
 def test_the_corrected_model_keeps_correlations_adds_causes_and_remembers_where_it_was_fitted() -> None:
     model = model_in_force()
     old = EffectRecord("lamp_heat", "process", {"share": Estimate(0.1, 0.0, 0.2, "1")}, ("heat",))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -121,3 +122,16 @@ def test_a_turn_is_fitted_by_one_step_nearly_as_by_a_whole_search() -> None:
     for fold, turn in zip(days.folds()[1:], Refittable(own, prior, sized=True).turns(days)[1:], strict=True):
         together = fit_together(shown, fold.split.fit_rows, prior, {"co2_offset": 0.0}, {"co2_offset": {}})
         assert turn.terms[0].amplitude == pytest.approx(together.values["co2_offset:offset"], rel=0.05)
+
+
+def test_a_fit_is_made_once_for_a_log_and_anew_for_one_with_other_inputs(
+    moved: tuple[dict[str, float], Gaussian],
+) -> None:
+    _, known = moved
+    record = prepare_log(virtual_log(8, seed=8, step=900.0), SITE).record(0.0)
+    split = split_days(record, SITE.longitude)
+    days = LogDays(record, split, sensitivity.day_runs(record, split.day))
+    first, dark = days.fit(known, ()), {**record.inputs, "global_radiation": 0.5 * record.inputs["global_radiation"]}
+    assert days.fit(known, ()) is first
+    assert days.fit(known, (ActiveTerm("co2_offset", 60.0, {}),)).values != first.values
+    assert replace(days, record=replace(record, inputs=dark)).fit(known, ()).values != first.values

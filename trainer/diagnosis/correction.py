@@ -144,19 +144,12 @@ def predicts_better(log: LogDays, one: Corrected, other: Corrected, rules: Decis
 
 
 def same_in_all_regimes(regimes: Mapping[str, Estimate], rules: DecisionRules) -> bool:
-    """Tell whether a cause's size may be the same by day and by night, in calm and in wind, and so on.
+    """Tell whether a cause's size is about the same by day and by night, in calm and in wind, and so on.
 
-    A regime in which the effect hardly shows has no size of its own, and sizes of which little is known are not apart.
+    A regime in which the effect hardly shows has no size of its own.
     """
-    pairs = ([regimes[name] for name in pair] for pair in REGIMES if all(name in regimes for name in pair))
-    return not any(_are_apart(one, other, rules) for one, other in pairs)
-
-
-def _are_apart(one: Estimate, other: Estimate, rules: DecisionRules) -> bool:
-    """Tell whether of two sizes one is surely not the other, and far from it."""
-    a, b = one.value, other.value
-    far = a * b <= 0.0 or min(a / b, b / a) < rules.regime_share
-    return far and (one.low > other.high or other.low > one.high)
+    pairs = ([regimes[name].value for name in pair] for pair in REGIMES if all(name in regimes for name in pair))
+    return all(a * b > 0.0 and min(a / b, b / a) >= rules.regime_share for a, b in pairs)
 
 
 def _judged(log: LogDays, knowledge: Knowledge, one: Estimated, current: Stage, trial: Stage) -> Estimated:

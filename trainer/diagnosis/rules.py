@@ -80,7 +80,7 @@ class DecisionRules:
         -0.02, "share that the shipped model gains at least with a change in it: chance makes as much"
     )
     least_fitted_change: float = _tuned(4.0, "gain from which on a change is fitted to free runs")
-    most_change_fits: int = _chosen(5, "changes that are fitted beside the parameters, those that gain most")
+    most_change_fits: int = _chosen(3, "changes that are fitted beside the parameters, those that gain most")
     least_pattern_change: float = _tuned(60.0, "the same of a pattern: greenhouses drift with the weather")
     least_proven_pattern: float = _tuned(20.0, "of it, what the scatter of day scores must bear out")
     pattern_over_change: float = _tuned(1.5, "times a change's gain at which a pattern replaces it")
@@ -147,7 +147,6 @@ class DecisionRules:
     deviation_inflation: float = _chosen(1.3, "of a standard error, for structure that no covariance knows")
     form_deviation: float = _chosen(0.3, "relative standard error for a truth that is not of the catalogue's form")
     confounded_gain: float = _chosen(6.0, "gain within which another cause fits as well")
-    least_confounded_gain: float = _tuned(4.0, "gain below which no other cause is told to fit as well")
     confounded_share: float = _chosen(0.25, "the same as a share of the cause's own gain")
     nonlinear_spread: float = _chosen(0.12, "prior deviation of a nonlinear parameter, as a share of its range")
     refit_rounds: int = _chosen(3, "alternations between a refit and its noise")
