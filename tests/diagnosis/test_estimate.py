@@ -70,8 +70,8 @@ def test_what_gains_next_to_nothing_is_not_as_good_as_a_cause_that_gains_little(
     null = linear.fit(design.grams, design.null_model())
     scored = search.score_candidates(design, null, [None], rng)
     (cause,) = (one for one in scored if one.effect == "lamp_heat")
-    assert DEFAULT.least_fitted_change < cause.gain < DEFAULT.confounded_gain
-    assert [one.effect for one in scored if 0.0 < one.gain < DEFAULT.least_fitted_change]
+    assert DEFAULT.least_unproven_change < cause.gain < DEFAULT.confounded_gain
+    assert [one.effect for one in scored if 0.0 < one.gain < DEFAULT.least_unproven_change]
     named = linear.fit(design.grams, null.model.with_term(cause.term))
     profiled = Profile(named.model, (), (), design.whitening, -named.day_losses, 0.0)
     found = estimate(Round(design, null, named, Contender(cause, cause.gain, profiled, 0.0), ()), rng)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from benchmarks.diagnosis import fitted_change as falls
 from benchmarks.diagnosis import null_gains as learning
-from benchmarks.diagnosis.fitted_change import Told
+from benchmarks.diagnosis import null_skills as skills
 from benchmarks.diagnosis.null_gains import Gained
+from benchmarks.diagnosis.null_skills import Told
 from igrow.core.effects import EFFECTS
-from igrow.trainer.diagnosis.null_gains import NullGains, read_null_falls, read_null_gains
+from igrow.trainer.diagnosis.null_gains import NullGains, read_null_gains, read_null_skills
 
 
 def test_a_change_must_gain_more_than_it_did_where_nothing_had_changed() -> None:
@@ -16,7 +16,7 @@ def test_a_change_must_gain_more_than_it_did_where_nothing_had_changed() -> None
     assert known.needed("lamp_heat") == known.needed("rain_cooling") == 9.0
 
 
-def test_a_fall_is_judged_by_the_others_too_and_by_its_own_effect() -> None:
+def test_a_skill_is_judged_by_the_others_too_and_by_its_own_effect() -> None:
     found = [
         Told("one", "nothing", {"lamp_heat": 0.0402}),
         Told("one", "nothing", {"lamp_heat": 0.02}),
@@ -24,11 +24,11 @@ def test_a_fall_is_judged_by_the_others_too_and_by_its_own_effect() -> None:
         Told("two", "nothing", {"rain_cooling": -0.01}),
         Told("three", "nothing", {}),
     ]
-    assert falls.of_each(found) == {"lamp_heat": 0.0523, "rain_cooling": 0.026}
+    assert skills.of_each(found) == {"lamp_heat": 0.0523, "rain_cooling": 0.026}
     # The other greenhouse's 0.03 would have let it pass; the second's was no more than what the first one lost.
-    assert falls.least_fall(found) == 0.041
-    assert falls.least_fall(found[1:]) == 0.031
-    known = read_null_falls()
+    assert skills.least_skill(found) == 0.041
+    assert skills.least_skill(found[1:]) == 0.031
+    known = read_null_skills()
     assert known.needed("soil_respiration") > known.needed("lamp_heat") >= known.least > 0.01
     assert set(known.largest) <= set(EFFECTS)
 

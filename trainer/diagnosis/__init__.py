@@ -9,7 +9,7 @@ sensor must show), `sensitivity` (day runs of the model, and how they depend on 
 `recalibration`, `design` (errors and candidates in named blocks), `linear` and `search` (a scan of all candidates),
 `rounds` (one cause after the other), `compare` (the best of them beside their own noise) or, where the greenhouse's
 own calibration log taught what is missing even then, `amplitudes`, `history`, `null_gains` and `change` (what has
-changed since; `fitted_change` asks free runs where time steps tell nothing or not which, `parameter_change` asks the
+changed since; `cross_validation` asks unseen days where time steps tell nothing or not which, `parameter_change` the
 parameters, `omission` what it lacked from the first day), `estimate`, `refit` (size, beginning, confounded causes),
 `confirmation` (the same by free runs), `correction` (what stands on unseen days), `wording`, `result`. `rules` holds
 every threshold, `nuisance` what greenhouses show though nothing is missing, `sharing` what one tells others.

@@ -131,9 +131,9 @@ def _confounded(
 ) -> tuple[str, ...]:
     """Return the effects that would do as well in the place of a cause of this gain, itself first.
 
-    Of a cause that only fits to free runs tell, what gains too little to be fitted is as good by nothing.
+    Of a cause that only unseen days tell, what gains too little to be asked of them is as good by nothing.
     """
-    least = max(gain - design.rules.confounded_within(gain), design.rules.least_fitted_change)
+    least = max(gain - design.rules.confounded_within(gain), design.rules.least_unproven_change)
     onsets = search.onset_days(design) if hypothesis.term.onset is not None else [None]
     scored = search.score_candidates(design, null, onsets, rng)
     hidden = frozenset[str]() if design.history is None else design.history.without

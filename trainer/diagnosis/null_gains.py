@@ -14,7 +14,7 @@ from typing import Any
 from igrow.trainer.diagnosis.rules import came_with_the_trainer
 
 FILE = "learned/null_gains.json"
-FALLS_FILE = "learned/null_falls.json"
+SKILLS_FILE = "learned/null_skills.json"
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,6 @@ def read_null_gains() -> NullGains:
     return NullGains(**came_with_the_trainer(FILE))
 
 
-def read_null_falls() -> NullGains:
-    """Return the shares that came with the trainer: of the error a day ahead that fits of an effect take off."""
-    return NullGains(**came_with_the_trainer(FALLS_FILE))
+def read_null_skills() -> NullGains:
+    """Return the shares that came with the trainer: of the squared error a day ahead that an effect takes off."""
+    return NullGains(**came_with_the_trainer(SKILLS_FILE))

@@ -9,7 +9,7 @@ import numpy as np
 
 from igrow.core.arrays import Floats
 from igrow.core.site import Site
-from igrow.trainer.diagnosis import fitted_change, history, parameter_change
+from igrow.trainer.diagnosis import cross_validation, history, parameter_change
 from igrow.trainer.diagnosis.change import changed
 from igrow.trainer.diagnosis.compare import Round, compare
 from igrow.trainer.diagnosis.design import Design, prepare
@@ -123,14 +123,14 @@ class Change(Search):
     """Terms that the log was laid out with last: it is asked in two ways, and laid out once."""
 
     def judge(self, design: Design, found: Sequence[Estimated], rng: np.random.Generator, *, causes: bool) -> Round:
-        """Return what one round finds; where time steps tell nothing, or not which, fits to free runs are asked."""
+        """Return what one round finds; where time steps tell nothing, or not which, unseen days are asked."""
         judged = changed(design, _explained(found), rng, causes=causes)
         if judged.patterns or not causes:
             return judged
-        known = replace(self.knowledge, terms=(*self.knowledge.terms, *(one.term for one in found)))
+        by_physics = self.knowledge.by_physics(self.rules)
         if judged.cause is not None:
-            return fitted_change.settled(self.days, known, design, judged, rng)
-        return fitted_change.find(self.days, known, design, rng) or judged
+            return cross_validation.settled(design, by_physics, judged, rng)
+        return cross_validation.find(design, by_physics, rng) or judged
 
     def design(self, terms: Sequence[ActiveTerm], interval: float) -> Design:
         """Return the design of a model with terms, about the calibrated parameters."""

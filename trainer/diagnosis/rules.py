@@ -75,12 +75,13 @@ class DecisionRules:
     clear_change_skill: float = _tuned(
         0.03, "share of the squared error of unseen days that a change must remove, all else changing by physics"
     )
-    far_over_null: float = _tuned(2.5, "times what a change must gain from which on `least_skill` is enough of it")
+    far_over_null: float = _tuned(
+        2.5, "times what a change must gain from which on `least_skill` is enough of it, and no null skill is asked"
+    )
     least_change_skill: float = _tuned(
         -0.02, "share that the shipped model gains at least with a change in it: chance makes as much"
     )
-    least_fitted_change: float = _tuned(4.0, "gain from which on a change is fitted to free runs")
-    most_change_fits: int = _chosen(3, "changes that are fitted beside the parameters, those that gain most")
+    least_unproven_change: float = _tuned(4.0, "gain from which on a change is asked of unseen days alone")
     least_pattern_change: float = _tuned(60.0, "the same of a pattern: greenhouses drift with the weather")
     least_proven_pattern: float = _tuned(20.0, "of it, what the scatter of day scores must bear out")
     pattern_over_change: float = _tuned(1.5, "times a change's gain at which a pattern replaces it")

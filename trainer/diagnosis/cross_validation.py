@@ -1,0 +1,213 @@
+"""A change that time steps alone do not prove: told by days that no fit has seen, a day ahead.
+
+What a calibration carries into another season can look like a sensor that is off, or like what a crop transpires at
+night, as strongly as such a change itself. The errors of free runs of a day tell these apart. In the linear model that
+the search has made, all changes are fitted to some days, beside everything else, and judged on the others, each day
+held out in turn (Stone 1974, J. R. Stat. Soc. B 36, 111-147). What is known of everything else is asked twice: what the
+history of the greenhouse leads to expect, and parameters that move as physics lets. Neither is quite so, and what only
+one of them bears out is often no change: both count.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from igrow.core.arrays import Floats
+from igrow.trainer.data.splits import folds
+from igrow.trainer.diagnosis import change, linear, search
+from igrow.trainer.diagnosis.compare import Round
+from igrow.trainer.diagnosis.design import Design
+from igrow.trainer.diagnosis.linear import DailyGrams, LinearModel
+from igrow.trainer.diagnosis.null_gains import read_null_skills
+from igrow.trainer.diagnosis.rules import DecisionRules
+from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.fit.gaussian import Gaussian
+from igrow.trainer.fit.scales import CORRELATION_TIME
+
+_EXPLAINED = 1e-6
+"""Share of a column's square below which everything else explains it altogether."""
+
+
+@dataclass(frozen=True)
+class CrossValidated:
+    """A hypothesis, and what it takes off the squared errors of days that were held out."""
+
+    hypothesis: Hypothesis
+    falls: Floats
+    """By history and by physics, on each day, over the squared error of all days, mean over quantities, (2, days)."""
+
+    @property
+    def skill(self) -> float:
+        """Share of the squared error that goes: the geometric mean by history and by physics, or the lesser below 0."""
+        return float(_skill(self.falls))
+
+
+def find(design: Design, by_physics: Gaussian, rng: np.random.Generator) -> Round | None:
+    """Return the round in which unseen days name a change; None where none makes them better by enough.
+
+    Args:
+        design: of the log, with its greenhouse's history.
+        by_physics: where the parameters may lie if they have changed as physics alone lets expect.
+        rng: for flips and bootstraps.
+    """
+    null = linear.fit(design.grams, design.null_model())
+    found = best(cross_validated(design, by_physics, promising(design, rng)))
+    if found is None or found.skill < read_null_skills().needed(found.hypothesis.effect):
+        return None
+    return _by_days(design, null, found, rng)
+
+
+def best(found: Sequence[CrossValidated]) -> CrossValidated | None:
+    """Return the hypothesis that takes most off unseen days; None for none."""
+    return max(found, key=lambda one: one.skill, default=None)
+
+
+def _by_days(design: Design, null: linear.Fit, found: CrossValidated, rng: np.random.Generator) -> Round:
+    """Return the round of a cause that unseen days tell: single steps say less of it."""
+    told = change.round_of(design, null, found.hypothesis, rng)
+    assert told.cause is not None
+    (skills,) = _drawn([found], design.rules, rng)
+    return replace(told, cause=replace(told.cause, bootstrap_p=float(np.mean(skills <= 0.0))))
+
+
+def settled(design: Design, by_physics: Gaussian, told: Round, rng: np.random.Generator) -> Round:
+    """Return a round whose cause unseen days tell as well, or one without a cause.
+
+    Where another that gains about as much surely makes unseen days better than it does, that is the cause if it gains
+    what it must, or makes unseen days better by as much as one must that these alone tell. What gains little more than
+    it must is no cause where unseen days show no more of it than where nothing has changed.
+
+    Args:
+        design: of the log, with its greenhouse's history.
+        by_physics: where the parameters may lie if they have changed as physics alone lets expect.
+        told: a round with a cause.
+        rng: for flips and bootstraps.
+    """
+    assert told.cause is not None and design.history is not None and design.history.null_gains is not None
+    rules, null, known = design.rules, linear.fit(design.grams, design.null_model()), read_null_skills()
+    nothing, first = Round(design, null, null, None, ()), told.cause.hypothesis
+    own, *others = cross_validated(design, by_physics, [first, *rivals(design, null, first, rng)])
+    rival = best(others)
+    # What makes days worse that no fit saw is no rival.
+    if rival is not None and rival.skill > max(own.skill, 0.0):
+        skills = _drawn([own, rival], rules, rng)
+        if np.mean(skills[1] > skills[0]) >= rules.confidence:
+            own = rival
+    chosen = own.hypothesis
+    over_null = change.proven_gain(design, chosen) / design.history.null_gains.needed(chosen.effect)
+    if over_null < 1.0:
+        alone = chosen.term.onset is None and own.skill >= known.needed(chosen.effect)
+        return _by_days(design, null, own, rng) if alone else nothing
+    if over_null < rules.far_over_null and own.skill < known.largest.get(chosen.effect, 0.0):
+        return nothing
+    return told if chosen is first else change.round_of(design, null, chosen, rng)
+
+
+def rivals(design: Design, null: linear.Fit, first: Hypothesis, rng: np.random.Generator) -> list[Hypothesis]:
+    """Return the hypotheses of other effects that gain nearly as much as the first, or more, with their beginnings."""
+    assert design.history is not None
+    gain = change.net_gain(design, first)
+    least = gain - design.rules.confounded_within(gain)
+    scored = search.score_candidates(design, null, search.onset_days(design), rng)
+    asked = (one for one in scored if one.effect not in {first.effect, *design.history.without})
+    return [one for one in asked if change.net_gain(design, one) >= least]
+
+
+def promising(design: Design, rng: np.random.Generator) -> list[Hypothesis]:
+    """Return the effects that gain enough to be asked of unseen days, as if they had been there all the time."""
+    assert design.history is not None
+    null = linear.fit(design.grams, design.null_model())
+    scored = search.score_candidates(design, null, [None], rng)
+    asked = (one for one in scored if one.effect not in design.history.without)
+    return [one for one in asked if change.net_gain(design, one) >= design.rules.least_unproven_change]
+
+
+def cross_validated(design: Design, by_physics: Gaussian, hypotheses: Sequence[Hypothesis]) -> list[CrossValidated]:
+    """Return hypotheses with what each takes off every day, by fits to other days.
+
+    Args:
+        design: of the log, with its greenhouse's history.
+        by_physics: where the parameters may lie if they have changed as physics alone lets expect.
+        hypotheses: each beside everything else, but not beside the others.
+    """
+    if not hypotheses:
+        return []
+    # A design stands where the parameters were expected.
+    assert design.history is not None and design.prior.names == by_physics.names
+    columns = np.array([search.column_of(design, one.term) for one in hypotheses])
+    limits = np.array([design.amplitude_bounds(one.effect, one.term.onset) for one in hypotheses])
+    joint = design.null_model()
+    held = design.block("parameter").columns
+    errors = design.values[0]
+    falls = [
+        _falls(design, errors, design.values[list(joint.base)], joint, columns, limits),
+        _falls(
+            design,
+            errors - design.history.misfit,
+            design.values[held.start : held.stop],
+            LinearModel(tuple(held), by_physics.precision, by_physics.mean - design.prior.mean),
+            columns,
+            limits,
+        ),
+    ]
+    return [CrossValidated(one, fall) for one, fall in zip(hypotheses, np.stack(falls, axis=1), strict=True)]
+
+
+def _falls(
+    design: Design, errors: Floats, others: Floats, known: LinearModel, columns: Floats, limits: Floats
+) -> Floats:
+    """Return what columns take off the squared errors of days that are held out, as `CrossValidated.falls`, (c, days).
+
+    Args:
+        design: of the log: its days and runs.
+        errors: (b, r, intervals).
+        others: columns of everything else, (p, b, r, intervals).
+        known: of their coefficients.
+        columns: to be judged, each beside `others`, (c, b, r, intervals).
+        limits: least and largest amplitude of each, (c, 2).
+    """
+    day, count, split = design.line.runs.day, len(others), design.split
+    # Every quantity counts by its own error; errors within a correlation time count once.
+    scale = np.sqrt(np.mean(errors**2, axis=(1, 2), keepdims=True) + 1e-300)
+    everything = np.concatenate([errors[None], others, columns]) / scale
+    weight = design.interval / CORRELATION_TIME
+    products = weight * linear.daily_products(everything, day, split.days)
+    base = LinearModel(tuple(range(1, count + 1)), known.precision, known.mean)
+    before, after = np.zeros((len(errors), split.days)), np.zeros((len(columns), len(errors), split.days))
+    for fold in folds(split):
+        fitted = linear.fit(DailyGrams(products, fold.fit), base).solution
+        total = products[fold.fit].sum(axis=0)
+        # What is left of every column when everything else has followed it.
+        own, along = np.diag(total)[count + 1 :], total[count + 1 :, : count + 1]
+        follow = along[:, 1:] @ fitted.inverse
+        curvature = own - np.sum(follow * along[:, 1:], axis=1)
+        score = along @ np.append(1.0, fitted.coefficients)
+        seen = curvature > _EXPLAINED * np.maximum(own, 1e-300)
+        amplitudes = np.where(seen, np.clip(-score / np.where(seen, curvature, 1.0), *limits.T), 0.0)
+        runs = ~fold.fit[day]
+        held = everything[:, :, runs]
+        left = held[0] + np.tensordot(fitted.coefficients, held[1 : count + 1], axes=1)
+        changed = held[count + 1 :] - np.tensordot(follow, held[1 : count + 1], axes=1)
+        with_each = left + amplitudes[:, None, None, None] * changed
+        for place, one in enumerate(day[runs]):
+            before[:, one] += np.sum(left[:, place] ** 2, axis=-1)
+            after[:, :, one] += np.sum(with_each[:, :, place] ** 2, axis=-1)
+    whole = np.maximum(before.sum(axis=-1, keepdims=True), 1e-300)
+    falls: Floats = np.mean((before - after) / whole, axis=1)
+    return falls
+
+
+def _drawn(found: Sequence[CrossValidated], rules: DecisionRules, rng: np.random.Generator) -> Floats:
+    """Return the skills of hypotheses on bootstrap draws of days, the same days for all, (h, draws)."""
+    count = found[0].falls.shape[-1]
+    days = rng.integers(0, count, size=(rules.bootstrap_draws, count))
+    return np.stack([_skill(one.falls[:, days]) for one in found])
+
+
+def _skill(falls: Floats) -> Floats:
+    """Return the skill of falls by history and by physics, (2, ..., days) -> (...)."""
+    lesser, larger = np.sort(falls.sum(axis=-1), axis=0)
+    return np.where(lesser > 0.0, np.sqrt(np.maximum(lesser, 0.0) * np.maximum(larger, 0.0)), lesser)
