@@ -212,6 +212,11 @@ def test_what_gains_little_more_than_it_must_unseen_days_must_show(
     monkeypatch.setattr(cross_validation, "read_null_skills", lambda: NullGains({"first": 0.05}, 0.06))
     assert settled_as(hypothesis("other"), ([0.01] * 4, [0.0] * 4), proven, monkeypatch) == named
     assert settled_as(hypothesis("other"), ([0.013] * 4, [0.0] * 4), proven, monkeypatch) == "first"
+    # Of what began within the log they must show as much as if they alone told it; the other must gain 10.
+    begun = hypothesis("other", onset=9)
+    assert settled_as(begun, ([0.0] * 4, [0.014] * 4), proven, monkeypatch) == ""
+    assert settled_as(begun, ([0.0] * 4, [0.016] * 4), proven, monkeypatch) == "other"
+    assert settled_as(begun, ([0.0] * 4, [0.014] * 4), proven + 14.0, monkeypatch) == "other"
 
 
 def test_both_that_is_known_of_everything_else_counts() -> None:

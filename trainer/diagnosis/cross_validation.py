@@ -96,12 +96,13 @@ def settled(design: Design, by_physics: Gaussian, told: Round, rng: np.random.Ge
         skills = _drawn([own, rival], rules, rng)
         if np.mean(skills[1] > skills[0]) >= rules.confidence:
             own = rival
-    chosen = own.hypothesis
+    chosen, begun = own.hypothesis, own.hypothesis.term.onset is not None
     over_null = change.proven_gain(design, chosen) / design.history.null_gains.needed(chosen.effect)
     if over_null < 1.0:
-        alone = chosen.term.onset is None and own.skill >= known.needed(chosen.effect)
-        return _by_days(design, null, own, rng) if alone else nothing
-    if over_null < rules.far_over_null and own.skill < known.largest.get(chosen.effect, 0.0):
+        return nothing if begun or own.skill < known.needed(chosen.effect) else _by_days(design, null, own, rng)
+    # A beginning was searched for among all days.
+    least = known.needed(chosen.effect) if begun else known.largest.get(chosen.effect, 0.0)
+    if over_null < rules.far_over_null and own.skill < least:
         return nothing
     return told if chosen is first else change.round_of(design, null, chosen, rng)
 
@@ -210,4 +211,5 @@ def _drawn(found: Sequence[CrossValidated], rules: DecisionRules, rng: np.random
 def _skill(falls: Floats) -> Floats:
     """Return the skill of falls by history and by physics, (2, ..., days) -> (...)."""
     lesser, larger = np.sort(falls.sum(axis=-1), axis=0)
-    return np.where(lesser > 0.0, np.sqrt(np.maximum(lesser, 0.0) * np.maximum(larger, 0.0)), lesser)
+    skill: Floats = np.where(lesser > 0.0, np.sqrt(np.maximum(lesser, 0.0) * np.maximum(larger, 0.0)), lesser)
+    return skill
