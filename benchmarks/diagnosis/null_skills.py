@@ -1,9 +1,9 @@
 """Learn what a change that only unseen days tell must take off their errors: more than where there is none.
 
 Asked of the same logs in which nothing is missing that teach what a change must gain (`null-gains`). An effect must
-exceed `OVER_NULL` times what it took off in any of these logs. Above that stands what every change must take off: the
-least with which none of these logs gets a name, each greenhouse judged by the others. No case of a benchmark has these
-seeds.
+exceed `OVER_NULL` times what it took off in any of these logs, a pattern without a name what any of its channel did.
+Above that stands what every change must take off: the least with which none of these logs is told to lack one, each
+greenhouse judged by the others; of patterns the same. No case of a benchmark has these seeds.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -26,14 +26,21 @@ from benchmarks.provenance import provenance
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import prepare_log
 from igrow.trainer.diagnosis import DEFAULT, cross_validation, null_gains
+from igrow.trainer.diagnosis.candidates import Pattern
+from igrow.trainer.diagnosis.cross_validation import CrossValidated, cross_validated
+from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import knowledge_of
 from igrow.trainer.diagnosis.null_gains import NullGains
 from igrow.trainer.diagnosis.rounds import Change, search_of
+from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.fit.gaussian import Gaussian
 
 COMMAND = "python -m benchmarks.diagnosis null-skills"
 OVER_NULL = 1.3
-"""Times the most that an effect takes off where nothing has changed."""
+"""Times the most that an effect, or a pattern, takes off where nothing has changed."""
+Skills = Mapping[str, float]
+"""Share of the squared error of unseen days that each takes off; the largest first."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +51,8 @@ class Told:
     group: str
     skills: dict[str, float]
     """Share of their squared error that each effect takes off, of those that were asked; the largest first."""
+    patterns: dict[str, float]
+    """The same of the best pattern in each channel."""
 
 
 def told(job: tuple[Reference, Case, Telemetry]) -> Told:
@@ -55,27 +64,51 @@ def told(job: tuple[Reference, Case, Telemetry]) -> Told:
     search = search_of(days, site, knowledge, frozenset(), DEFAULT, None, None)
     assert isinstance(search, Change)
     design = search.resolved()
-    promising = cross_validation.promising(design, rng)
-    found = cross_validation.cross_validated(design, knowledge.by_physics(DEFAULT), promising)
-    ranked = sorted(found, key=lambda one: -one.skill)
-    return Told(site.name, case.group, {one.hypothesis.effect: one.skill for one in ranked})
+    by_physics = knowledge.by_physics(DEFAULT)
+    effects = _ranked(design, by_physics, cross_validation.promising(design, rng))
+    patterns: dict[str, float] = {}
+    for one in _ranked(design, by_physics, cross_validation.promising_patterns(design, rng)):
+        assert isinstance(one.hypothesis.cause, Pattern)
+        patterns.setdefault(one.hypothesis.cause.channel, one.skill)
+    return Told(site.name, case.group, {one.hypothesis.effect: one.skill for one in effects}, patterns)
 
 
-def of_each(found: Sequence[Told]) -> dict[str, float]:
-    """Return what each effect must exceed by itself."""
-    taken = largest([{effect: OVER_NULL * skill for effect, skill in one.skills.items()} for one in found])
-    return {effect: skill for effect, skill in taken.items() if skill > 0.0}
+def _ranked(design: Design, by_physics: Gaussian, promising: list[Hypothesis]) -> list[CrossValidated]:
+    return sorted(cross_validated(design, by_physics, promising), key=lambda one: -one.skill)
 
 
-def least_skill(found: Sequence[Told]) -> float:
-    """Return the least that every change must take off, so that no log gets a name by what others take off."""
+def of_each(skills: Sequence[Skills]) -> dict[str, float]:
+    """Return what each effect, or each channel, must exceed by itself."""
+    taken = largest([{name: OVER_NULL * skill for name, skill in one.items()} for one in skills])
+    return {name: skill for name, skill in taken.items() if skill > 0.0}
+
+
+def least_skill(found: Sequence[tuple[str, Skills]]) -> float:
+    """Return the least that every change must take off, so that no log is told to lack one by what others take off.
+
+    Args:
+        found: greenhouse and skills of every log.
+    """
     told = [0.0]
-    for one in found:
-        by_others = of_each([other for other in found if other.greenhouse != one.greenhouse])
-        effect, skill = next(iter(one.skills.items()), ("", 0.0))
-        if skill >= by_others.get(effect, 0.0):
+    for greenhouse, skills in found:
+        by_others = of_each([other for name, other in found if name != greenhouse])
+        best, skill = next(iter(skills.items()), ("", 0.0))
+        if skill >= by_others.get(best, 0.0):
             told.append(skill)
     return (math.floor(1000.0 * max(told)) + 1.0) / 1000.0
+
+
+def learned(found: Sequence[Told]) -> dict[str, NullGains]:
+    """Return the bounds of effects and of patterns, by their file."""
+    made = provenance(COMMAND, dict(SEEDS))
+    by_file = {
+        null_gains.SKILLS_FILE: [(one.greenhouse, one.skills) for one in found],
+        null_gains.PATTERN_SKILLS_FILE: [(one.greenhouse, one.patterns) for one in found],
+    }
+    return {
+        file: NullGains(of_each([skills for _, skills in those]), least_skill(those), made)
+        for file, those in by_file.items()
+    }
 
 
 def main(processes: int) -> int:
@@ -86,10 +119,10 @@ def main(processes: int) -> int:
             found.append(one)
             print(f"{len(found)}: {one}", file=sys.stderr, flush=True)
     for one in sorted(found, key=lambda one: -max(one.skills.values(), default=0.0)):
-        for effect, skill in one.skills.items():
-            print(f"{one.greenhouse:24} {one.group:8} {effect:32} {skill:6.3f}")
-    learned = NullGains(of_each(found), least_skill(found), provenance(COMMAND, dict(SEEDS)))
-    path = Path(str(files("igrow.trainer.diagnosis"))) / null_gains.SKILLS_FILE
-    path.write_text(json.dumps(asdict(learned), indent=1) + "\n", encoding="utf-8")
-    print(f"{len(found)} logs; least skill {learned.least:g}; wrote {path}")
+        for name, skill in (one.skills | one.patterns).items():
+            print(f"{one.greenhouse:24} {one.group:8} {name:32} {skill:6.3f}")
+    for file, bounds in learned(found).items():
+        path = Path(str(files("igrow.trainer.diagnosis"))) / file
+        path.write_text(json.dumps(asdict(bounds), indent=1) + "\n", encoding="utf-8")
+        print(f"{len(found)} logs; least skill {bounds.least:g}; wrote {path}")
     return 0

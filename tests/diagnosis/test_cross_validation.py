@@ -19,7 +19,7 @@ from igrow.trainer.diagnosis.cross_validation import CrossValidated, cross_valid
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, knowledge_of
 from igrow.trainer.diagnosis.linear import Term
-from igrow.trainer.diagnosis.null_gains import NullGains, read_null_skills
+from igrow.trainer.diagnosis.null_gains import NullGains, read_null_pattern_skills, read_null_skills
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.scales import CORRELATION_TIME
@@ -148,6 +148,32 @@ def test_what_gains_little_is_not_asked_of_unseen_days(size: float, told: list[s
     assert [one.effect for one in cross_validation.promising(design, rng())][:1] == told
 
 
+@pytest.mark.parametrize(("size", "told"), [(0.4, "heat:cold weather"), (0.0, "")])
+def test_a_pattern_that_unseen_days_bear_out_is_unexplained(size: float, told: str) -> None:
+    design = with_parameters(Truth({}, {"heat:cold weather": size}), 1)
+    found = cross_validation.unexplained(design, BY_PHYSICS, rng())
+    assert ("" if found is None else found.key) == told
+
+
+def test_a_pattern_must_have_more_skill_than_its_channel_where_nothing_has_changed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    design = with_parameters(Truth({}, {"heat:cold weather": 0.4}), 1)
+    monkeypatch.setattr(cross_validation, "read_null_pattern_skills", lambda: NullGains({"heat": 0.5}, 0.01))
+    assert cross_validation.unexplained(design, BY_PHYSICS, rng()) is None
+    monkeypatch.setattr(cross_validation, "read_null_pattern_skills", lambda: NullGains({"co2": 0.5}, 0.01))
+    assert cross_validation.unexplained(design, BY_PHYSICS, rng()) is not None
+
+
+def test_what_a_greenhouse_always_does_is_not_unexplained() -> None:
+    """What the pattern gained at the calibration is taken off what it gains."""
+    design = with_parameters(Truth({}, {"heat:cold weather": 0.4}), 1)
+    (gained,) = cross_validation.promising_patterns(design, rng())
+    assert design.history is not None
+    usual = replace(design, history=replace(design.history, own_gains={gained.key: gained.gain}))
+    assert cross_validation.promising_patterns(usual, rng()) == []
+
+
 def test_a_rival_may_have_begun_within_the_log() -> None:
     design = with_parameters(Truth({"lamp_heat": 1.0}, {}, onset=16), 1)
     null = linear.fit(design.grams, design.null_model())
@@ -250,7 +276,7 @@ def contender(one: Hypothesis) -> Contender:
     return Contender(one, one.gain, cast(Any, None), 0.3)
 
 
-def test_what_came_with_the_trainer_is_a_share() -> None:
-    known = read_null_skills()
+@pytest.mark.parametrize("known", [read_null_skills(), read_null_pattern_skills()])
+def test_what_came_with_the_trainer_is_a_share(known: NullGains) -> None:
     assert 0.01 < known.least < 1.0
     assert all(0.0 < share < 1.0 for share in known.largest.values())

@@ -7,7 +7,15 @@ from benchmarks.diagnosis import null_skills as skills
 from benchmarks.diagnosis.null_gains import Gained
 from benchmarks.diagnosis.null_skills import Told
 from igrow.core.effects import EFFECTS
-from igrow.trainer.diagnosis.null_gains import NullGains, read_null_gains, read_null_skills
+from igrow.trainer.diagnosis.candidates import CHANNELS
+from igrow.trainer.diagnosis.null_gains import (
+    PATTERN_SKILLS_FILE,
+    SKILLS_FILE,
+    NullGains,
+    read_null_gains,
+    read_null_pattern_skills,
+    read_null_skills,
+)
 
 
 def test_a_change_must_gain_more_than_it_did_where_nothing_had_changed() -> None:
@@ -18,19 +26,30 @@ def test_a_change_must_gain_more_than_it_did_where_nothing_had_changed() -> None
 
 def test_a_skill_is_judged_by_the_others_too_and_by_its_own_effect() -> None:
     found = [
-        Told("one", "nothing", {"lamp_heat": 0.0402}),
-        Told("one", "nothing", {"lamp_heat": 0.02}),
-        Told("two", "noise", {"lamp_heat": 0.03, "rain_cooling": 0.02}),
-        Told("two", "nothing", {"rain_cooling": -0.01}),
-        Told("three", "nothing", {}),
+        ("one", {"lamp_heat": 0.0402}),
+        ("one", {"lamp_heat": 0.02}),
+        ("two", {"lamp_heat": 0.03, "rain_cooling": 0.02}),
+        ("two", {"rain_cooling": -0.01}),
+        ("three", {}),
     ]
-    assert skills.of_each(found) == {"lamp_heat": 0.0523, "rain_cooling": 0.026}
+    assert skills.of_each([one for _, one in found]) == {"lamp_heat": 0.0523, "rain_cooling": 0.026}
     # The other greenhouse's 0.03 would have let it pass; the second's was no more than what the first one lost.
     assert skills.least_skill(found) == 0.041
     assert skills.least_skill(found[1:]) == 0.031
     known = read_null_skills()
     assert known.needed("soil_respiration") > known.needed("lamp_heat") >= known.least > 0.01
     assert set(known.largest) <= set(EFFECTS)
+
+
+def test_patterns_have_bounds_of_their_own_by_channel() -> None:
+    found = [
+        Told("one", "nothing", {"lamp_heat": 0.03}, {"heat": 0.05, "co2": 0.01}),
+        Told("two", "noise", {"lamp_heat": 0.02}, {"heat": 0.02}),
+    ]
+    of_effects, of_patterns = (skills.learned(found)[file] for file in (SKILLS_FILE, PATTERN_SKILLS_FILE))
+    assert (of_effects.largest, of_effects.least) == ({"lamp_heat": 0.039}, 0.031)
+    assert (of_patterns.largest, of_patterns.least) == ({"heat": 0.065, "co2": 0.013}, 0.051)
+    assert set(read_null_pattern_skills().largest) <= set(CHANNELS)
 
 
 def test_what_came_with_the_trainer_knows_effects_and_parameters() -> None:

@@ -18,10 +18,11 @@ import numpy as np
 from igrow.core.arrays import Floats
 from igrow.trainer.data.splits import folds
 from igrow.trainer.diagnosis import change, linear, search
+from igrow.trainer.diagnosis.candidates import Pattern
 from igrow.trainer.diagnosis.compare import Round
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.linear import DailyGrams, LinearModel
-from igrow.trainer.diagnosis.null_gains import read_null_skills
+from igrow.trainer.diagnosis.null_gains import read_null_pattern_skills, read_null_skills
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.fit.gaussian import Gaussian
@@ -58,6 +59,22 @@ def find(design: Design, by_physics: Gaussian, rng: np.random.Generator) -> Roun
     if found is None or found.skill < read_null_skills().needed(found.hypothesis.effect):
         return None
     return _by_days(design, null, found, rng)
+
+
+def unexplained(design: Design, by_physics: Gaussian, rng: np.random.Generator) -> Hypothesis | None:
+    """Return the pattern by which unseen days show that something goes on, where nothing has a name; None for none.
+
+    Args:
+        design: of the log, with its greenhouse's history.
+        by_physics: where the parameters may lie if they have changed as physics alone lets expect.
+        rng: for flips.
+    """
+    found = best(cross_validated(design, by_physics, promising_patterns(design, rng)))
+    if found is None:
+        return None
+    assert isinstance(found.hypothesis.cause, Pattern)
+    needed = read_null_pattern_skills().needed(found.hypothesis.cause.channel)
+    return found.hypothesis if found.skill >= needed else None
 
 
 def best(found: Sequence[CrossValidated]) -> CrossValidated | None:
@@ -126,6 +143,13 @@ def promising(design: Design, rng: np.random.Generator) -> list[Hypothesis]:
     return [one for one in asked if change.net_gain(design, one) >= design.rules.least_unproven_change]
 
 
+def promising_patterns(design: Design, rng: np.random.Generator) -> list[Hypothesis]:
+    """Return the patterns that gain enough to be asked of unseen days, as if they had been there all the time."""
+    null = linear.fit(design.grams, design.null_model())
+    scored = search.score_patterns(design, null, [None], rng)
+    return [one for one in scored if change.net_gain(design, one) >= design.rules.least_unproven_change]
+
+
 def cross_validated(design: Design, by_physics: Gaussian, hypotheses: Sequence[Hypothesis]) -> list[CrossValidated]:
     """Return hypotheses with what each takes off every day, by fits to other days.
 
@@ -139,7 +163,7 @@ def cross_validated(design: Design, by_physics: Gaussian, hypotheses: Sequence[H
     # A design stands where the parameters were expected.
     assert design.history is not None and design.prior.names == by_physics.names
     columns = np.array([search.column_of(design, one.term) for one in hypotheses])
-    limits = np.array([design.amplitude_bounds(one.effect, one.term.onset) for one in hypotheses])
+    limits = np.array([_reach(design, one) for one in hypotheses])
     joint = design.null_model()
     held = design.block("parameter").columns
     errors = design.values[0]
@@ -155,6 +179,13 @@ def cross_validated(design: Design, by_physics: Gaussian, hypotheses: Sequence[H
         ),
     ]
     return [CrossValidated(one, fall) for one, fall in zip(hypotheses, np.stack(falls, axis=1), strict=True)]
+
+
+def _reach(design: Design, one: Hypothesis) -> tuple[float, float]:
+    """Return the least and the largest amplitude of an effect or a pattern."""
+    if isinstance(one.cause, Pattern):
+        return -design.rules.largest_pattern, design.rules.largest_pattern
+    return design.amplitude_bounds(one.effect, one.term.onset)
 
 
 def _falls(

@@ -165,6 +165,9 @@ class _Question:
             rivals_it = bool(last.patterns) or explains_as_well(beside.kept, parameter, rules)
             if rivals_it and (result.parameter is None or predicts_better(days, beside, result, rules)):
                 result, patterns = beside, last.patterns
+        explained = bool(completed.found or result.kept or result.parameter or patterns)
+        if not (explained or nothing_asked) and (patterns := search.unexplained(rng)):
+            result = correct(days, knowledge, (), patterns, site.longitude, rules)
         verdict, findings = _verdict(completed, result, patterns, rules)
         stages = _stages(result, completed, logged)
         progress("predicting unseen days")

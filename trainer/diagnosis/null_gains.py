@@ -15,6 +15,7 @@ from igrow.trainer.diagnosis.rules import came_with_the_trainer
 
 FILE = "learned/null_gains.json"
 SKILLS_FILE = "learned/null_skills.json"
+PATTERN_SKILLS_FILE = "learned/null_pattern_skills.json"
 
 
 @dataclass(frozen=True)
@@ -22,15 +23,16 @@ class NullGains:
     """What is gained where nothing has changed: log-likelihoods in nats, or shares of the error of unseen days."""
 
     largest: Mapping[str, float]
-    """In any such log, of an effect and of a parameter (``parameter:name``); of shares 1.3 times that."""
+    """In any such log, of an effect, a parameter (``parameter:name``) or a channel of patterns; of shares 1.3 times
+    that."""
     least: float
     """What any change must gain: of such logs none or nearly none is given a name then, each by the gains of others."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
     """The command that learned it, its date and seeds."""
 
-    def needed(self, effect: str) -> float:
+    def needed(self, name: str) -> float:
         """Return what a change must gain: more than it did in any greenhouse in which nothing had changed."""
-        return max(self.least, self.largest.get(effect, 0.0))
+        return max(self.least, self.largest.get(name, 0.0))
 
 
 def read_null_gains() -> NullGains:
@@ -41,3 +43,8 @@ def read_null_gains() -> NullGains:
 def read_null_skills() -> NullGains:
     """Return the shares that came with the trainer: of the squared error a day ahead that an effect takes off."""
     return NullGains(**came_with_the_trainer(SKILLS_FILE))
+
+
+def read_null_pattern_skills() -> NullGains:
+    """Return the same of patterns without a name, by the channel that they act in."""
+    return NullGains(**came_with_the_trainer(PATTERN_SKILLS_FILE))

@@ -21,6 +21,7 @@ from igrow.trainer.diagnosis.null_gains import NullGains
 from igrow.trainer.diagnosis.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.refit import are_identifiable, refit
 from igrow.trainer.diagnosis.rules import HOUR, DecisionRules
+from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.diagnosis.structure import disagreement
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.solver import DivergenceError
@@ -63,6 +64,10 @@ class Search:
     def changed_parameter(self, _rng: np.random.Generator) -> ParameterChange | None:
         """Return nothing: without a history nobody knows what a parameter was."""
         return None
+
+    def unexplained(self, _rng: np.random.Generator) -> tuple[Hypothesis, ...]:
+        """Return nothing: what a calibration elsewhere misses here is a pattern as well."""
+        return ()
 
     def judge(self, design: Design, found: Sequence[Estimated], rng: np.random.Generator, *, causes: bool) -> Round:
         """Return what one round finds beside the causes found before, which the design has as terms."""
@@ -144,6 +149,11 @@ class Change(Search):
         plain = self._laid_out(list(self.knowledge.terms))
         surely = replace(plain, rules=replace(self.rules, vent_drift=self.rules.wall_drift))
         return parameter_change.find(self._expected(surely), rng)
+
+    def unexplained(self, rng: np.random.Generator) -> tuple[Hypothesis, ...]:
+        """Return the pattern that unseen days tell where nothing else is told."""
+        found = cross_validation.unexplained(self.resolved(), self.knowledge.by_physics(self.rules), rng)
+        return () if found is None else (found,)
 
     def _expected(self, laid_out: Design) -> Design:
         return history.expected(self.history, laid_out, self.misfit, self.without, self.null_gains)
