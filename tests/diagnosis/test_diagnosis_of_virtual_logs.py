@@ -18,9 +18,9 @@ from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import Log, prepare_log
 from igrow.trainer.diagnosis import Diagnosis, diagnose, history, rounds, wording
 from igrow.trainer.diagnosis.correction import Corrected, predicts_better
-from igrow.trainer.diagnosis.diagnosed_days import newest_weeks, since_calibration
+from igrow.trainer.diagnosis.diagnosed_days import since_calibration, weeks_in_turn
 from igrow.trainer.diagnosis.evidence import errors_with
-from igrow.trainer.diagnosis.knowledge import VENTS, ActiveTerm, knowledge_of
+from igrow.trainer.diagnosis.knowledge import VENTS, ActiveTerm
 from igrow.trainer.diagnosis.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.plots import needed
 from igrow.trainer.diagnosis.rules import DEFAULT
@@ -311,19 +311,20 @@ def test_a_correction_that_makes_a_quantity_worse_says_so(leak: Diagnosis) -> No
     assert worse.to_json()["worsened"] == list(worse.worsened)
 
 
-def test_of_a_long_log_the_newest_six_weeks_are_asked_what_has_changed(quiet_log: Log) -> None:
+def test_a_long_log_is_asked_in_equal_parts_the_oldest_first(quiet_log: Log) -> None:
     middle = quiet_log.telemetry.time[0] - np.timedelta64(80, "D")
     known = Discrepancy({}, Gaussian((), np.zeros(0), np.zeros((0, 0))), {}, STEP, {}, middle)
     model = model_in_force()
-    unknown, remembering = (knowledge_of(one, SITE, DEFAULT) for one in (model, replace(model, history=known)))
-    long = replace(
-        quiet_log, telemetry=Telemetry(quiet_log.telemetry.time[0] + np.arange(60) * np.timedelta64(1, "D"), {})
-    )
-    assert newest_weeks(long, unknown, DEFAULT) is long
-    assert newest_weeks(quiet_log, remembering, DEFAULT) is quiet_log
-    newest = newest_weeks(long, remembering, DEFAULT)
-    assert newest.telemetry.time[-1] == long.telemetry.time[-1]
-    assert newest.days == 41.0
+    remembering = replace(model, history=known)
+    hours = quiet_log.telemetry.time[0] + np.arange(84 * 24) * np.timedelta64(1, "h")
+    long = replace(quiet_log, telemetry=Telemetry(hours, {}))
+    assert weeks_in_turn(long, model, DEFAULT) == [long]
+    assert weeks_in_turn(long, replace(remembering, calibrated_on="another"), DEFAULT) == [long]
+    assert weeks_in_turn(quiet_log, remembering, DEFAULT) == [quiet_log]
+    parts = weeks_in_turn(long, remembering, DEFAULT)
+    assert np.array_equal(np.concatenate([one.telemetry.time for one in parts]), hours)
+    assert [round(one.days) for one in parts] == [28, 28, 28]
+    assert len(weeks_in_turn(long.select(end=hours[43 * 24]), remembering, DEFAULT)) == 2
 
 
 def test_what_is_not_asked_of_vents_is_said(

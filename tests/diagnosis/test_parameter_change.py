@@ -12,11 +12,8 @@ from igrow.core.language import speak
 from igrow.core.simulator.hybrid import climate
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.core.simulator.hybrid.record import observe
-from igrow.core.telemetry import Telemetry, concatenate
-from igrow.trainer.calibration import calibrate
-from igrow.trainer.data import Log, prepare_log
+from igrow.core.telemetry import Telemetry
 from igrow.trainer.diagnosis import (
-    DEFAULT,
     Diagnosis,
     Finding,
     amplitudes,
@@ -33,12 +30,11 @@ from igrow.trainer.fit import FittedModel
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.report import sentences
 from igrow.trainer.report.worth import worth
+from tests.diagnosis.known_greenhouse import DAYS, KNOWN, calibrated, later, weeks
 from tests.diagnosis.synthetic_design import BALANCES, PLAIN, Truth, make_design
-from tests.made_once import made_once
-from tests.virtual_log import GREENHOUSE, SITE, disturbances, virtual_log
+from tests.virtual_log import GREENHOUSE, SITE
 
 NAMES = ("transmissivity", "mass_heat_capacity", "leakage_wind")
-STEP, DAYS, KNOWN = 900.0, 44, 24
 
 
 @pytest.fixture
@@ -158,28 +154,13 @@ def test_air_that_leaks_may_come_in_by_a_vent_that_does_not_close() -> None:
 @pytest.fixture(scope="module")
 def log() -> tuple[Telemetry, Telemetry]:
     """The same weeks twice: with the cover as it was, and with a third of its light taken."""
-    painted = GREENHOUSE | {"transmissivity": 0.67 * GREENHOUSE["transmissivity"]}
-    added = disturbances(DAYS, STEP, seed=5)
-    plain = virtual_log(DAYS, seed=5, step=STEP, added=added)
-    return plain, virtual_log(DAYS, seed=5, step=STEP, added=added, parameters=painted)
+    return weeks(), weeks(GREENHOUSE | {"transmissivity": 0.67 * GREENHOUSE["transmissivity"]})
 
 
 @pytest.fixture(scope="module")
-@made_once
-def model(log: tuple[Telemetry, Telemetry]) -> FittedModel:
+def model() -> FittedModel:
     """Calibrated on the weeks before, with its history."""
-    plain, _ = log
-    before = prepare_log(plain.select(end=plain.time[0] + np.timedelta64(KNOWN, "D")), SITE)
-    fitted = calibrate(before)
-    return replace(fitted, history=history.history_of(before.record(fitted.alignment or 0.0), fitted, DEFAULT))
-
-
-def later(log: tuple[Telemetry, Telemetry], begins: int) -> Log:
-    """The weeks after the calibration, as they were until a day and as they are from it on."""
-    before, after = log
-    first = before.time[0] + np.timedelta64(KNOWN, "D")
-    cut = first + np.timedelta64(begins, "D")
-    return prepare_log(concatenate([before.select(first, cut), after.select(start=cut)]), SITE)
+    return calibrated()
 
 
 def costs(told: Diagnosis, finding: Finding) -> None:
@@ -208,7 +189,7 @@ def costs(told: Diagnosis, finding: Finding) -> None:
 def test_a_painted_cover_is_told_and_is_no_news_afterwards(
     log: tuple[Telemetry, Telemetry], model: FittedModel
 ) -> None:
-    seen = later(log, 0)
+    seen = later(*log, 0)
     told = diagnose(seen, model)
     assert told.verdict == "named"
     (finding,) = told.findings
@@ -230,7 +211,7 @@ def test_a_painted_cover_is_told_and_is_no_news_afterwards(
 def test_a_cover_that_is_painted_within_the_log_has_a_date(
     log: tuple[Telemetry, Telemetry], model: FittedModel
 ) -> None:
-    seen = later(log, 9)
+    seen = later(*log, 9)
     told = diagnose(seen, model)
     (finding,) = told.findings
     assert finding.effect == "transmissivity" and finding.onset is not None
@@ -246,8 +227,8 @@ def test_leaves_that_wilt_within_the_log_have_a_date_and_are_no_sensor(
 ) -> None:
     plain, values = log[0], GREENHOUSE
     wilted = values | {name: 0.4 * values[name] for name in members("transpiration")}
-    after = virtual_log(DAYS, seed=5, step=STEP, added=disturbances(DAYS, STEP, seed=5), parameters=wilted)
-    told = diagnose(later((plain, after), 9), model)
+    after = weeks(wilted)
+    told = diagnose(later(plain, after, 9), model)
     (finding,) = told.findings
     assert finding.effect == "transpiration" and finding.onset is not None
     assert abs(finding.onset.time - plain.time[0] - np.timedelta64(KNOWN + 9, "D")) <= np.timedelta64(2, "D")
@@ -273,11 +254,11 @@ def test_a_cover_that_was_painted_some_days_ago_waits_for_a_later_log(
 ) -> None:
     # Fewer days than a diagnosis needs: no set of parameters is right for this log.
     painted = GREENHOUSE | {"transmissivity": left * GREENHOUSE["transmissivity"]}
-    after = virtual_log(DAYS, seed=5, step=STEP, added=disturbances(DAYS, STEP, seed=5), parameters=painted)
-    told = diagnose(later((log[0], after), DAYS - KNOWN - 6), model)
+    after = weeks(painted)
+    told = diagnose(later(log[0], after, DAYS - KNOWN - 6), model)
     assert told.findings == ()
     assert wording.WAITING in told.notes
 
 
 def test_the_cover_as_it_was_is_not_named(log: tuple[Telemetry, Telemetry], model: FittedModel) -> None:
-    assert diagnose(later(log, DAYS), model).verdict == "nothing"
+    assert diagnose(later(*log, DAYS), model).verdict == "nothing"

@@ -31,8 +31,8 @@ from igrow.trainer.diagnosis.correction import (
     with_parameter,
 )
 from igrow.trainer.diagnosis.crop import LEAVES_AND_LIGHT, has_new_crop, of_one_crop, with_its_drift
-from igrow.trainer.diagnosis.diagnosed_days import newest_weeks, since_calibration
-from igrow.trainer.diagnosis.estimate import normal_quantile
+from igrow.trainer.diagnosis.diagnosed_days import since_calibration, weeks_in_turn
+from igrow.trainer.diagnosis.estimate import Estimated, from_before, normal_quantile
 from igrow.trainer.diagnosis.evidence import Evidence
 from igrow.trainer.diagnosis.freerun import HORIZONS, FreeRuns, LogDays, Stage, log_days, mean_absolute_errors
 from igrow.trainer.diagnosis.knowledge import VENTS, ActiveTerm, knowledge_of
@@ -40,11 +40,12 @@ from igrow.trainer.diagnosis.nuisance import NuisanceSubspace
 from igrow.trainer.diagnosis.null_gains import NullGains
 from igrow.trainer.diagnosis.open_vents import under_open_vents
 from igrow.trainer.diagnosis.parameter_change import ParameterChange
-from igrow.trainer.diagnosis.result import Diagnosis, Finding, Verdict
+from igrow.trainer.diagnosis.result import DISCREPANCY, Diagnosis, Finding, Verdict
 from igrow.trainer.diagnosis.rounds import search_of
 from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.diagnosis.visible_parameters import members
+from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.growth import built_in_crop, growth_since
 from igrow.trainer.fit.model import FittedModel
 from igrow.trainer.given import MADE, READ, must_be
@@ -87,12 +88,23 @@ def diagnose(
     if log.faults:
         return _data_fault(log, model)
     log.require("a diagnosis", rules.least_days)
-    return _Question(model, frozenset(without), seed, rules, nuisance, null_gains, progress).answer(log)
+    return _Question(model, frozenset(without), seed, rules, nuisance, null_gains, progress).in_turn(log)
+
+
+@dataclass(frozen=True)
+class _Answer:
+    """What a log, or some weeks of it, tell."""
+
+    diagnosis: Diagnosis
+    causes: tuple[Estimated, ...] = ()
+    parameter: ParameterChange | None = None
+    history: Discrepancy | None = None
+    """Of the greenhouse, these weeks seen; None where it has none."""
 
 
 @dataclass(frozen=True)
 class _Question:
-    """What is asked of a log, and of the days since something began in it; fields as the arguments of `diagnose`."""
+    """What is asked of a log, and of parts of it; fields as the arguments of `diagnose`."""
 
     model: FittedModel
     without: frozenset[str]
@@ -102,21 +114,46 @@ class _Question:
     null_gains: NullGains | None
     progress: Progress
 
-    def answer(self, log: Log, asked: ParameterChange | None = None, rivals: Sequence[ActiveTerm] = ()) -> Diagnosis:
-        """Return the diagnosis of a log.
+    def in_turn(self, log: Log) -> Diagnosis:
+        """Return the diagnosis of a log: of a long one its weeks in turn, each by what those before it have told."""
+        since, notes = since_calibration(log, self.model, self.rules)
+        since, left_out = of_one_crop(since, self.rules)
+        first, *later = weeks_in_turn(since, self.model, self.rules)
+        told = latest = self.answer(first)
+        for weeks in later:
+            earlier = [from_before(one, first.telemetry.time[0]) for one in told.causes]
+            seen = replace(self.model, history=latest.history or self.model.history)
+            latest = replace(self, model=seen).answer(weeks, told.parameter, earlier=earlier)
+            if _bears_out(latest, told, self.rules):
+                told = latest
+        found, beside = told.diagnosis, (wording.IN_TURN if told is latest else wording.EARLIER,) if later else ()
+        # What is shipped asks the next log by the calibration, as it asks one that is not long.
+        corrected = replace(found.corrected, history=self.model.history)
+        return replace(
+            found,
+            model=self.model,
+            corrected=remembering(corrected, told.parameter, self.rules),
+            notes=(*notes, *left_out, *found.notes, *beside),
+        )
+
+    def answer(
+        self,
+        log: Log,
+        asked: ParameterChange | None = None,
+        rivals: Sequence[ActiveTerm] = (),
+        earlier: Sequence[Estimated] = (),
+    ) -> _Answer:
+        """Return what a log tells.
 
         Args:
-            log: of a week or more.
-            asked: what a longer log tells to have changed before this one, where this one alone tells nothing.
+            log: of a week or more, and not long.
+            asked: what other days tell to have changed before this log, where this one alone tells nothing.
             rivals: faults of sensors that explain it there as well.
+            earlier: causes that the weeks before it have told.
         """
         model, rules, progress, site = self.model, self.rules, self.progress, log.known_site
-        since, notes = since_calibration(log, model, rules)
-        since, left_out = of_one_crop(since, rules)
-        notes = (*notes, *left_out)
-        new_crop, rules = has_new_crop(since.telemetry.time, site, model), with_its_drift(rules, since, model)
+        new_crop, rules = has_new_crop(log.telemetry.time, site, model), with_its_drift(rules, log, model)
         knowledge = knowledge_of(model, site, rules)
-        log = newest_weeks(since, knowledge, rules)
         progress("completing the log")
         logged, rng = log_days(log, model), np.random.default_rng(self.seed)
         of_vents = frozenset[str]()
@@ -131,7 +168,7 @@ class _Question:
         hidden = self.without | (frozenset({"co2_drift"}) if off else frozenset()) | of_crop | of_vents
         search = search_of(days, site, knowledge, hidden, rules, self.nuisance, self.null_gains)
         progress("searching for causes")
-        first, last, found = search.run(rng)
+        first, last, found = search.run(rng, earlier)
         unseen = hidden_by_missing_weather(first.design.line)
         found = [replace(one, confounded=(*one.confounded, *unseen)) for one in found]
         # A parameter can stand in for an actuator that the log lacks, found or not.
@@ -139,7 +176,7 @@ class _Question:
         waiting: tuple[str, ...] = ()
         parameter = None if hiding or new_crop else search.changed_parameter(rng) or asked
         if parameter is not None and parameter.leads and parameter.onset is not None:
-            if (told := self._since(parameter, parameter.onset.time, log, notes)) is not None:
+            if (told := self._since(parameter, parameter.onset.time, log)) is not None:
                 return told
             # What the days since then alone do not bear out, or are too few to, is left to a later log; of too few days
             # all is left, since what an effect explains of them the parameter explains better.
@@ -157,7 +194,7 @@ class _Question:
             faults = [one.term for one in told_beside] or rivals
             if parameter.onset is None:
                 result = with_parameter(days, knowledge, result, parameter, faults, rules)
-            elif (told := self._since(parameter, parameter.onset.time, log, notes, faults)) is not None:
+            elif (told := self._since(parameter, parameter.onset.time, log, faults)) is not None:
                 return told
         if parameter is not None and leads and not nothing_asked and (found or last.patterns):
             # What the search told beside the parameter stands where unseen days do not bear that out, or less.
@@ -178,18 +215,16 @@ class _Question:
         crop = growth_since(log, days.record, moved, model.crop or built_in_crop())
         corrected = corrected_model(model, result, findings, errors, knowledge.discrepancy, (start, end), crop)
         notes = (
-            *notes,
             *waiting,
             *((wording.NEW_CROP,) if new_crop else (wording.GROWN_CROP,) if of_crop else ()),
             *((wording.VENTS_HARDLY_OPEN,) if of_vents else ()),
             *((wording.NOT_CALIBRATED,) if knowledge.transferred else ()),
-            *((wording.NEWEST,) if log is not since else ()),
             *wording.thin_air(site),
             *((opened.sentence,) if opened is not None and off else ()),
         )
         possible = {name for one in findings for name in one.confounded}
         not_asked = {*first.design.untestable, *of_crop}
-        return Diagnosis(
+        diagnosis = Diagnosis(
             site=site.name,
             verdict=verdict,
             start=start,
@@ -200,7 +235,7 @@ class _Question:
             errors=errors,
             screened=log.screened,
             model=model,
-            corrected=remembering(corrected, result.parameter, rules),
+            corrected=corrected,
             # What a cause may as well be is told already.
             untestable=tuple(name for name in EFFECTS if name in not_asked and name not in possible),
             missing=logged.record.missing,
@@ -210,16 +245,18 @@ class _Question:
             ),
             log=log,
         ).settled()
+        followed = remembering(model, result.parameter, rules).history
+        seen = search.history_after(result.kept) if result.parameter is None else followed
+        return _Answer(diagnosis, result.kept, result.parameter, seen)
 
     def _since(
         self,
         change: ParameterChange,
         begin: np.datetime64,
         log: Log,
-        notes: Sequence[str],
         rivals: Sequence[ActiveTerm] = (),
-    ) -> Diagnosis | None:
-        """Return the diagnosis of the days since a parameter has changed; None where these alone do not bear it out.
+    ) -> _Answer | None:
+        """Return what the days since a parameter has changed tell; None where these alone do not bear it out.
 
         One set of parameters is none for a log of two greenhouses: the one that is there now counts.
 
@@ -227,7 +264,6 @@ class _Question:
             change: by the whole log.
             begin: of it.
             log: whole.
-            notes: of the whole log, which stay.
             rivals: faults of sensors that the whole log tells as well: these days tell which of both it is.
         """
         later = log.select(begin)
@@ -238,10 +274,28 @@ class _Question:
         # Without the days before there is less to see: what leads in the whole log, unseen days alone must bear out.
         asked = replace(change, onset=None, leads=change.leads and not rivals)
         told = self.answer(later, asked if rivals or change.leads else None, rivals)
-        findings = tuple(begun(one, change) if is_same(one, change) else one for one in told.findings)
-        if findings == told.findings:
+        diagnosis = told.diagnosis
+        findings = tuple(begun(one, change) if is_same(one, change) else one for one in diagnosis.findings)
+        if findings == diagnosis.findings:
             return None
-        return replace(told, findings=findings, notes=tuple(dict.fromkeys((*notes, *told.notes, wording.SINCE))))
+        return replace(told, diagnosis=replace(diagnosis, findings=findings, notes=(*diagnosis.notes, wording.SINCE)))
+
+
+def _bears_out(later: _Answer, earlier: _Answer, rules: DecisionRules) -> bool:
+    """Tell whether later weeks tell all that earlier ones have named, or anything where these had no name for it."""
+    told = {one.effect for one in later.diagnosis.findings}
+    named = [one for one in earlier.diagnosis.findings if one.kind != DISCREPANCY]
+    if not named:
+        return bool(told) or not earlier.diagnosis.findings
+    sizes = {one.effect: one.term.amplitude for one in later.causes}
+    return all(told.intersection(_same_as(one)) for one in named) and all(
+        sizes.get(one.effect, 0.0) / one.term.amplitude >= rules.regime_share for one in earlier.causes
+    )
+
+
+def _same_as(one: Finding) -> tuple[str, ...]:
+    """Return the names under which later weeks may tell a finding: of parameters, of all that change alike."""
+    return one.confounded if one.kind == "parameter" else (one.effect,)
 
 
 def is_same(later: Finding, change: ParameterChange) -> bool:

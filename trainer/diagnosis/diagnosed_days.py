@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
 from igrow.trainer.data.log import Log
-from igrow.trainer.diagnosis.knowledge import Knowledge
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.fit.model import FittedModel
 from igrow.trainer.fit.unseen_days import unseen
@@ -24,9 +23,16 @@ def since_calibration(log: Log, model: FittedModel, rules: DecisionRules) -> tup
     return later, (f"The model was calibrated on the days up to {until:%Y-%m-%d %H:%M} UTC: they are left out.",)
 
 
-def newest_weeks(log: Log, knowledge: Knowledge, rules: DecisionRules) -> Log:
-    """Return the newest weeks of a long log where its greenhouse's history can be asked what has changed, else all."""
-    if knowledge.history is None or log.days <= rules.long_days:
-        return log
+def weeks_in_turn(log: Log, model: FittedModel, rules: DecisionRules) -> list[Log]:
+    """Return a long log in equal parts, the oldest first, where its greenhouse's history can be asked, else as it is.
+
+    Within a long one the crop changes, and the weeks next to the calibration are those of which it says most.
+    """
+    asked = model.history is not None and model.calibrated_on == log.known_site.name and rules.history
+    if not asked or log.days <= rules.long_days:
+        return [log]
     # So many local days at most, the first and the last of them cut.
-    return log.select(log.telemetry.time[-1] - np.timedelta64(round((rules.long_days - 1.0) * 86_400.0), "s"))
+    count = math.ceil(log.days / (rules.long_days - 1.0))
+    start, end = log.telemetry.time[0], log.telemetry.time[-1]
+    ends = [start + (end - start) * part // count for part in range(1, count)]
+    return [log.select(begin, until) for begin, until in zip([None, *ends], [*ends, None], strict=True)]

@@ -116,6 +116,19 @@ def within_bounds(one: Estimated, design: Design) -> Estimated:
     return replace(one, term=replace(one.term, amplitude=size), amplitude=interval)
 
 
+def from_before(one: Estimated, start: np.datetime64) -> Estimated:
+    """Return a cause as a later log sees it: there from its first day on.
+
+    Args:
+        one: as the weeks before have told it.
+        start: of these weeks, since when a sensor drifts that has drifted in all of them.
+    """
+    always = replace(one.hypothesis, term=replace(one.hypothesis.term, onset=None, ageing=None))
+    ages = "elapsed_days" in EFFECTS[one.effect].drivers
+    onset = start if ages and one.term.onset is None else one.term.onset
+    return replace(one, hypothesis=always, term=replace(one.term, onset=onset))
+
+
 def normal_quantile(rules: DecisionRules) -> float:
     """Return how many standard errors an interval reaches to either side."""
     return float(norm.ppf(0.5 + 0.5 * rules.confidence))

@@ -12,6 +12,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from igrow.core.arrays import Floats
 from igrow.core.simulator.hybrid.climate import ActiveEffects
@@ -65,7 +66,7 @@ def history_of(
         filters={balance: one.raw for balance, one in zip(balances, design.whitening.filters, strict=True)},
         step=record.step,
         own_gains=own_gains(design),
-        middle=record.time[0] + (record.time[-1] - record.time[0]) / 2,
+        middle=_middle(record),
         opening=opening_of(record),
     )
 
@@ -238,11 +239,34 @@ def followed(known: Discrepancy, parameters: Collection[str], share: float, devi
     return replace(known, amplitudes=moved)
 
 
+def after(known: Discrepancy, design: Design) -> Discrepancy:
+    """Return a history that has seen a later log too: what is expected of the greenhouse from then on.
+
+    Args:
+        known: so far.
+        design: of that log, by this history, with all causes that were found in it.
+    """
+    solution = linear.fit(design.grams, design.null_model()).solution
+    seen, before = keys(design), known.amplitudes
+    place = {key: row for row, key in enumerate(before.names)}
+    kept = [key for key in before.names if key not in set(seen)]
+    rows = [place[key] for key in kept]
+    mean = np.array([before.mean[place[key]] if key in place else 0.0 for key in seen]) + solution.coefficients
+    # What this log says nothing of is known as before, but no longer together with the rest.
+    covariance = block_diag(solution.inverse, before.covariance[np.ix_(rows, rows)])
+    amplitudes = Gaussian((*seen, *kept), np.concatenate([mean, before.mean[rows]]), covariance)
+    return replace(known, amplitudes=amplitudes, middle=_middle(design.line.record))
+
+
 def days_between(known: Discrepancy, plain: Design) -> float:
     """Return the days from the middle of the calibration log to that of a later one."""
-    time = plain.line.record.time
-    middle = time[0] + (time[-1] - time[0]) / 2
+    middle = _middle(plain.line.record)
     return float((middle - known.middle).astype("timedelta64[s]").astype(np.float64) / 86_400.0)
+
+
+def _middle(record: Record) -> np.datetime64:
+    middle: np.datetime64 = record.time[0] + (record.time[-1] - record.time[0]) / 2
+    return middle
 
 
 def own_gains(design: Design) -> dict[str, float]:

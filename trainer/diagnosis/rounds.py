@@ -42,11 +42,19 @@ class Search:
     rules: DecisionRules
     nuisance: NuisanceSubspace
 
-    def run(self, rng: np.random.Generator) -> tuple[Round, Round, list[Estimated]]:
-        """Return the first and the last round, and the causes that were found."""
+    def run(self, rng: np.random.Generator, earlier: Sequence[Estimated] = ()) -> tuple[Round, Round, list[Estimated]]:
+        """Return the first and the last round, and the causes that were found.
+
+        Args:
+            rng: for flips and bootstraps.
+            earlier: causes that the weeks before this log have told: found already.
+        """
         design = self.resolved()
         first: Round | None = None
-        found: list[Estimated] = []
+        found = list(earlier)
+        if found:
+            first = self.judge(design, [], rng, causes=True)
+            design = self.design([*self.knowledge.terms, *(one.term for one in found)], design.interval)
         while True:
             judged = self.judge(design, found, rng, causes=len(found) < self.rules.most_causes)
             first = first or judged
@@ -60,6 +68,10 @@ class Search:
                 # No cause: the log itself stayed within all bounds.
                 return first, judged, found
             found = terms
+
+    def history_after(self, _causes: Sequence[Estimated]) -> Discrepancy | None:
+        """Return None: there is no history."""
+        return None
 
     def changed_parameter(self, _rng: np.random.Generator) -> ParameterChange | None:
         """Return nothing: without a history nobody knows what a parameter was."""
@@ -140,6 +152,11 @@ class Change(Search):
     def design(self, terms: Sequence[ActiveTerm], interval: float) -> Design:
         """Return the design of a model with terms, about the calibrated parameters."""
         return self._expected(self._laid_out(list(terms)))
+
+    def history_after(self, causes: Sequence[Estimated]) -> Discrepancy | None:
+        """Return the history that has seen this log too, with the causes that stand in it."""
+        terms = [*self.knowledge.terms, *(one.term for one in causes)]
+        return history.after(self.history, self.design(terms, self.days.record.step))
 
     def changed_parameter(self, rng: np.random.Generator) -> ParameterChange | None:
         """Return the parameter that has changed where no effect is missing.

@@ -22,9 +22,13 @@ NOT_CALIBRATED = N_(
     "What the model misses of this greenhouse when all is well is not known, so only large causes can be told from a "
     "greenhouse that is another: calibrate it on weeks that are known to be good (igrow-trainer calibrate)."
 )
-NEWEST = N_(
-    "Within more than six weeks a crop changes: what has changed since the calibration was looked for in the newest "
-    "six."
+IN_TURN = N_(
+    "Within more than six weeks a crop changes: they were asked part by part, the oldest first. The errors are of the "
+    "newest part."
+)
+EARLIER = N_(
+    "Within more than six weeks a crop changes: they were asked part by part, the oldest first. The newest part does "
+    "not tell again what an earlier one has told: look whether it is still so. The errors are of the earlier part."
 )
 WAITING = N_("Something began less than a week ago: what it is, a later log tells.")
 NEW_CROP = N_(

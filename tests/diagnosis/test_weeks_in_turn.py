@@ -1,0 +1,133 @@
+"""A long log is asked part by part; what a part tells the next ones are asked again, and silence teaches them too."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.data import Log, prepare_log
+from igrow.trainer.diagnosis import DEFAULT, Diagnosis, Finding, diagnose, history, wording
+from igrow.trainer.diagnosis.freerun import log_days
+from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, knowledge_of
+from igrow.trainer.diagnosis.rounds import Change, search_of
+from igrow.trainer.fit import FittedModel
+from tests.diagnosis.known_greenhouse import DAYS, KNOWN, STEP, calibrated, later, weeks
+from tests.virtual_log import SITE
+
+IN_PARTS = replace(DEFAULT, long_days=11.5)
+"""Two parts of the twenty days after the calibration."""
+module = sys.modules[diagnose.__module__]
+
+
+@pytest.fixture(scope="module")
+def plain() -> Telemetry:
+    return weeks()
+
+
+@pytest.fixture(scope="module")
+def model() -> FittedModel:
+    return calibrated()
+
+
+def warm(telemetry: Telemetry, kelvin: float) -> Telemetry:
+    """Return a log whose air sensor reads too much."""
+    return telemetry.with_columns({"air_temperature": telemetry["air_temperature"] + kelvin})
+
+
+def test_what_the_oldest_part_tells_is_told_of_the_newest(plain: Telemetry, model: FittedModel) -> None:
+    told = diagnose(later(plain, warm(plain, 1.2)), model, rules=IN_PARTS)
+    (finding,) = told.findings
+    assert (finding.effect, finding.onset) == ("air_temperature_offset", None)
+    assert finding.parameters["offset"].value == pytest.approx(1.2, abs=0.15)
+    assert wording.IN_TURN in told.notes
+    assert told.start >= plain.time[0] + np.timedelta64(KNOWN + 9, "D")
+    # The errors before and after are those of the model in force, and what is shipped has its history.
+    assert told.model is model
+    assert told.corrected.history is model.history
+    day = told.errors["air_temperature"]["24_h"]
+    assert day["corrected"] < 0.8 * day["deployed"]
+
+
+def test_what_is_no_longer_so_is_told_of_the_part_that_told_it(plain: Telemetry, model: FittedModel) -> None:
+    seen = later(warm(plain, 1.2), plain, begins=10)
+    told = diagnose(seen, model, rules=IN_PARTS)
+    (finding,) = told.findings
+    assert finding.effect == "air_temperature_offset"
+    assert wording.EARLIER in told.notes
+    assert told.end <= plain.time[0] + np.timedelta64(KNOWN + 10, "D")
+
+
+def test_weeks_in_which_nothing_is_told_teach_what_to_expect(plain: Telemetry, model: FittedModel) -> None:
+    """The mean moves to where the log put it, and is known more surely; what the log says nothing of stays."""
+    assert model.history is not None
+    known = knowledge_of(model, SITE, DEFAULT)
+    log = later(plain, plain)
+    search = search_of(log_days(log, model), SITE, known, frozenset(), DEFAULT, None, None)
+    assert isinstance(search, Change)
+    seen = search.history_after(())
+    assert seen is not None
+    before, now = model.history.amplitudes, seen.amplitudes
+    assert set(before.names) <= set(now.names)
+    design = search.resolved()
+    solution = history.linear.fit(design.grams, design.null_model()).solution
+    name = PARAMETER_PREFIX + "transmissivity"
+    moved = now.values[name] - before.values[name]
+    assert moved == pytest.approx(dict(zip(history.keys(design), solution.coefficients, strict=True))[name])
+    expected = history.drifted(model.history, search.plain)
+    assert now.deviations[name] < expected.deviations[name]
+    assert seen.middle > model.history.middle
+    # By what it was taught the same log has less that is new.
+    again = history.expected(seen, search.plain, history.expected_misfit(seen, search.plain))
+    assert np.sum(again.values[0] ** 2) < np.sum(design.values[0] ** 2)
+
+
+def test_a_door_that_steps_do_not_tell_unseen_days_tell(plain: Telemetry, model: FittedModel) -> None:
+    """Steps are asked for more than any log can give, as if the door were a small one."""
+    hours = np.arange(DAYS * 96) * STEP / 3600.0
+    weekday = (5 + np.floor(hours / 24.0)) % 7  # the log begins on a Saturday
+    opened = (hours % 24.0 >= 7.0) & (hours % 24.0 < 16.0) & (weekday < 5)
+    seen = later(plain, weeks(added={"air_exchange": 0.003 * opened}))
+    deaf = replace(DEFAULT, least_pattern_change=1e6)
+    told = diagnose(seen, model, rules=deaf)
+    assert told.verdict == "unexplained"
+    assert "hour" in told.findings[-1].drivers
+
+
+@pytest.mark.parametrize(
+    ("parts", "told", "note"),
+    [
+        (["", "", ""], "", wording.IN_TURN),
+        (["co2_offset", "co2_offset", "co2_offset"], "co2_offset", wording.IN_TURN),
+        (["", "co2_offset", ""], "co2_offset", wording.EARLIER),
+        (["co2_offset", "lamp_heat", "lamp_heat"], "co2_offset", wording.EARLIER),
+        (["discrepancy", "", ""], "discrepancy", wording.EARLIER),
+        (["discrepancy", "", "lamp_heat"], "lamp_heat", wording.IN_TURN),
+    ],
+)
+def test_which_part_is_told(
+    parts: list[str], told: str, note: str, model: FittedModel, plain: Telemetry, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nothing = diagnosis_of("", later(plain, plain), model)
+    asked = iter(parts)
+
+    def answer(_question: object, log: Log, *_: object, **__: object) -> object:
+        return module._Answer(replace(diagnosis_of(next(asked), log, model), notes=nothing.notes))
+
+    monkeypatch.setattr(module._Question, "answer", answer)
+    monkeypatch.setattr(module, "weeks_in_turn", lambda log, *_: [log, log, log])
+    found = diagnose(prepare_log(plain.select(end=plain.time[0] + np.timedelta64(20, "D")), SITE), model)
+    assert [one.effect for one in found.findings] == [told] * bool(told)
+    assert found.notes[-1] == note
+
+
+def diagnosis_of(effect: str, log: Log, model: FittedModel) -> Diagnosis:
+    """Return a diagnosis that tells an effect, or nothing."""
+    kind = "discrepancy" if effect == "discrepancy" else "process"
+    finding = Finding(effect, kind, (), {}, None, 0.0, (effect,), (), "")
+    time = log.telemetry.time
+    findings = (finding,) if effect else ()
+    return Diagnosis(SITE.name, "nothing", time[0], time[-1], 10, 4, findings, {}, (), model, model, log=log)
