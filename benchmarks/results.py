@@ -208,7 +208,7 @@ RESULTS = {
     ),
     "diagnosis-same": Result(
         "The same greenhouse later",
-        ("benchmarks.diagnosis", "same", "--greenhouses", "2", "--cases", "120", "--history-only"),
+        ("benchmarks.diagnosis", "same", "--greenhouses", "4", "--cases", "240", "--history-only"),
         "Calibrated on eight weeks of its own, diagnosed weeks later by its history.",
         "300000 and on",
         long=True,
@@ -216,7 +216,7 @@ RESULTS = {
     "diagnosis-same-season": Result(
         "The same greenhouse later, over twelve weeks",
         ("benchmarks.diagnosis", "same", "--days", "84", "--greenhouses", "2", "--cases", "60", "--history-only"),
-        "The same greenhouses and causes; of a log that is longer than six weeks the newest six are asked.",
+        "The same greenhouses and causes; a log that is longer than six weeks is asked in parts, the oldest first.",
         "300000 and on",
         long=True,
     ),

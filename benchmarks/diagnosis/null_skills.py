@@ -1,7 +1,7 @@
 """Learn what a change that only unseen days tell must take off their errors: more than where there is none.
 
 Asked of the same logs in which nothing is missing that teach what a change must gain (`null-gains`). An effect must
-exceed `OVER_NULL` times what it took off in any of these logs, a pattern without a name what any of its channel did.
+exceed `OVER_NULL` times what it took off in any of these logs, a pattern without a name what any of its kind did.
 Above that stands what every change must take off: the least with which none of these logs is told to lack one, each
 greenhouse judged by the others; of patterns the same. No case of a benchmark has these seeds.
 """
@@ -25,16 +25,13 @@ from benchmarks.jobs import Jobs
 from benchmarks.provenance import provenance
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import prepare_log
-from igrow.trainer.diagnosis import DEFAULT, cross_validation, null_gains
+from igrow.trainer.diagnosis import DEFAULT, cross_validation, null_gains, unexplained
 from igrow.trainer.diagnosis.candidates import Pattern
 from igrow.trainer.diagnosis.cross_validation import CrossValidated, cross_validated
-from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import knowledge_of
 from igrow.trainer.diagnosis.null_gains import NullGains
 from igrow.trainer.diagnosis.rounds import Change, search_of
-from igrow.trainer.diagnosis.search import Hypothesis
-from igrow.trainer.fit.gaussian import Gaussian
 
 COMMAND = "python -m benchmarks.diagnosis null-skills"
 OVER_NULL = 1.3
@@ -52,7 +49,7 @@ class Told:
     skills: dict[str, float]
     """Share of their squared error that each effect takes off, of those that were asked; the largest first."""
     patterns: dict[str, float]
-    """The same of the best pattern in each channel."""
+    """The same of the best pattern of each kind."""
 
 
 def told(job: tuple[Reference, Case, Telemetry]) -> Told:
@@ -65,20 +62,20 @@ def told(job: tuple[Reference, Case, Telemetry]) -> Told:
     assert isinstance(search, Change)
     design = search.resolved()
     by_physics = knowledge.by_physics(DEFAULT)
-    effects = _ranked(design, by_physics, cross_validation.promising(design, rng))
+    effects = _ranked(cross_validated(design, by_physics, cross_validation.promising(design, rng)))
     patterns: dict[str, float] = {}
-    for one in _ranked(design, by_physics, cross_validation.promising_patterns(design, rng)):
+    for one in _ranked(unexplained.judged(design, site.longitude, by_physics).found):
         assert isinstance(one.hypothesis.cause, Pattern)
-        patterns.setdefault(one.hypothesis.cause.channel, one.skill)
+        patterns.setdefault(one.hypothesis.cause.kind, one.skill)
     return Told(site.name, case.group, {one.hypothesis.effect: one.skill for one in effects}, patterns)
 
 
-def _ranked(design: Design, by_physics: Gaussian, promising: list[Hypothesis]) -> list[CrossValidated]:
-    return sorted(cross_validated(design, by_physics, promising), key=lambda one: -one.skill)
+def _ranked(found: Sequence[CrossValidated]) -> list[CrossValidated]:
+    return sorted(found, key=lambda one: -one.skill)
 
 
 def of_each(skills: Sequence[Skills]) -> dict[str, float]:
-    """Return what each effect, or each channel, must exceed by itself."""
+    """Return what each effect, or each kind of patterns, must exceed by itself."""
     taken = largest([{name: OVER_NULL * skill for name, skill in one.items()} for one in skills])
     return {name: skill for name, skill in taken.items() if skill > 0.0}
 
@@ -119,7 +116,8 @@ def main(processes: int) -> int:
             found.append(one)
             print(f"{len(found)}: {one}", file=sys.stderr, flush=True)
     for one in sorted(found, key=lambda one: -max(one.skills.values(), default=0.0)):
-        for name, skill in (one.skills | one.patterns).items():
+        of_patterns = {f"pattern of {name}": skill for name, skill in one.patterns.items()}
+        for name, skill in (one.skills | of_patterns).items():
             print(f"{one.greenhouse:24} {one.group:8} {name:32} {skill:6.3f}")
     for file, bounds in learned(found).items():
         path = Path(str(files("igrow.trainer.diagnosis"))) / file

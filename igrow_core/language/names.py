@@ -78,6 +78,7 @@ NAMES: Mapping[str, str] = {
     "growth": N_("growth"),
     "air_exchange": N_("air exchange"),
     "light_loss": N_("loss of light"),
+    "evaporation": N_("evaporation"),
     "assimilation": N_("assimilation"),
     # why readings are set aside
     "out of range": N_("out of range"),

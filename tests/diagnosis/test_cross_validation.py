@@ -19,7 +19,11 @@ from igrow.trainer.diagnosis.cross_validation import CrossValidated, cross_valid
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, knowledge_of
 from igrow.trainer.diagnosis.linear import Term
-from igrow.trainer.diagnosis.null_gains import NullGains, read_null_pattern_skills, read_null_skills
+from igrow.trainer.diagnosis.null_gains import (
+    NullGains,
+    read_null_pattern_skills,
+    read_null_skills,
+)
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.scales import CORRELATION_TIME
@@ -146,32 +150,6 @@ def test_a_change_must_have_more_skill_than_where_nothing_has_changed(monkeypatc
 def test_what_gains_little_is_not_asked_of_unseen_days(size: float, told: list[str]) -> None:
     design = with_parameters(Truth({"lamp_heat": size}, {}), 4)
     assert [one.effect for one in cross_validation.promising(design, rng())][:1] == told
-
-
-@pytest.mark.parametrize(("size", "told"), [(0.4, "heat:cold weather"), (0.0, "")])
-def test_a_pattern_that_unseen_days_bear_out_is_unexplained(size: float, told: str) -> None:
-    design = with_parameters(Truth({}, {"heat:cold weather": size}), 1)
-    found = cross_validation.unexplained(design, BY_PHYSICS, rng())
-    assert ("" if found is None else found.key) == told
-
-
-def test_a_pattern_must_have_more_skill_than_its_channel_where_nothing_has_changed(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    design = with_parameters(Truth({}, {"heat:cold weather": 0.4}), 1)
-    monkeypatch.setattr(cross_validation, "read_null_pattern_skills", lambda: NullGains({"heat": 0.5}, 0.01))
-    assert cross_validation.unexplained(design, BY_PHYSICS, rng()) is None
-    monkeypatch.setattr(cross_validation, "read_null_pattern_skills", lambda: NullGains({"co2": 0.5}, 0.01))
-    assert cross_validation.unexplained(design, BY_PHYSICS, rng()) is not None
-
-
-def test_what_a_greenhouse_always_does_is_not_unexplained() -> None:
-    """What the pattern gained at the calibration is taken off what it gains."""
-    design = with_parameters(Truth({}, {"heat:cold weather": 0.4}), 1)
-    (gained,) = cross_validation.promising_patterns(design, rng())
-    assert design.history is not None
-    usual = replace(design, history=replace(design.history, own_gains={gained.key: gained.gain}))
-    assert cross_validation.promising_patterns(usual, rng()) == []
 
 
 def test_a_rival_may_have_begun_within_the_log() -> None:

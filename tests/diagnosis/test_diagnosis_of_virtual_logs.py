@@ -219,15 +219,6 @@ def test_a_cause_outside_the_catalogue_is_told_by_its_hours_and_not_given_a_name
     assert "Something that the model does not know" in render_report(result)
 
 
-def test_what_steps_do_not_tell_unseen_days_tell_by_its_hours(door_log: Log) -> None:
-    """Steps are asked for more than any log can give, as if the door were a small one."""
-    result = diagnose(door_log, model_in_force(), rules=replace(DEFAULT, least_pattern_change=1e6))
-    assert result.verdict == "unexplained"
-    (found,) = result.findings
-    assert found.kind == "discrepancy"
-    assert {"hour", "weekday"} <= set(found.drivers)
-
-
 def test_a_log_without_humidity_and_co2_is_diagnosed_on_what_it_has(quiet_log: Log) -> None:
     result = diagnose(quiet_log.without("air_humidity", "air_co2"), model_in_force())
     assert set(result.errors) == {"air_temperature"}

@@ -41,15 +41,15 @@ def test_a_skill_is_judged_by_the_others_too_and_by_its_own_effect() -> None:
     assert set(known.largest) <= set(EFFECTS)
 
 
-def test_patterns_have_bounds_of_their_own_by_channel() -> None:
+def test_patterns_have_bounds_of_their_own_by_kind() -> None:
     found = [
-        Told("one", "nothing", {"lamp_heat": 0.03}, {"heat": 0.05, "co2": 0.01}),
+        Told("one", "nothing", {"lamp_heat": 0.03}, {"heat": 0.05, "weekly": 0.01}),
         Told("two", "noise", {"lamp_heat": 0.02}, {"heat": 0.02}),
     ]
     of_effects, of_patterns = (skills.learned(found)[file] for file in (SKILLS_FILE, PATTERN_SKILLS_FILE))
     assert (of_effects.largest, of_effects.least) == ({"lamp_heat": 0.039}, 0.031)
-    assert (of_patterns.largest, of_patterns.least) == ({"heat": 0.065, "co2": 0.013}, 0.051)
-    assert set(read_null_pattern_skills().largest) <= set(CHANNELS)
+    assert (of_patterns.largest, of_patterns.least) == ({"heat": 0.065, "weekly": 0.013}, 0.051)
+    assert set(read_null_pattern_skills().largest) <= {*CHANNELS, "weekly"}
 
 
 def test_what_came_with_the_trainer_knows_effects_and_parameters() -> None:

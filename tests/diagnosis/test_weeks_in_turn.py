@@ -10,12 +10,12 @@ import pytest
 
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import Log, prepare_log
-from igrow.trainer.diagnosis import DEFAULT, Diagnosis, Finding, diagnose, history, wording
+from igrow.trainer.diagnosis import DEFAULT, Diagnosis, Finding, amplitudes, diagnose, history, linear, wording
 from igrow.trainer.diagnosis.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, knowledge_of
 from igrow.trainer.diagnosis.rounds import Change, search_of
 from igrow.trainer.fit import FittedModel
-from tests.diagnosis.known_greenhouse import DAYS, KNOWN, STEP, calibrated, later, weeks
+from tests.diagnosis.known_greenhouse import KNOWN, calibrated, later, weeks
 from tests.virtual_log import SITE
 
 IN_PARTS = replace(DEFAULT, long_days=11.5)
@@ -73,28 +73,16 @@ def test_weeks_in_which_nothing_is_told_teach_what_to_expect(plain: Telemetry, m
     before, now = model.history.amplitudes, seen.amplitudes
     assert set(before.names) <= set(now.names)
     design = search.resolved()
-    solution = history.linear.fit(design.grams, design.null_model()).solution
+    solution = linear.fit(design.grams, design.null_model()).solution
     name = PARAMETER_PREFIX + "transmissivity"
     moved = now.values[name] - before.values[name]
-    assert moved == pytest.approx(dict(zip(history.keys(design), solution.coefficients, strict=True))[name])
+    assert moved == pytest.approx(dict(zip(amplitudes.keys(design), solution.coefficients, strict=True))[name])
     expected = history.drifted(model.history, search.plain)
     assert now.deviations[name] < expected.deviations[name]
     assert seen.middle > model.history.middle
     # By what it was taught the same log has less that is new.
     again = history.expected(seen, search.plain, history.expected_misfit(seen, search.plain))
     assert np.sum(again.values[0] ** 2) < np.sum(design.values[0] ** 2)
-
-
-def test_a_door_that_steps_do_not_tell_unseen_days_tell(plain: Telemetry, model: FittedModel) -> None:
-    """Steps are asked for more than any log can give, as if the door were a small one."""
-    hours = np.arange(DAYS * 96) * STEP / 3600.0
-    weekday = (5 + np.floor(hours / 24.0)) % 7  # the log begins on a Saturday
-    opened = (hours % 24.0 >= 7.0) & (hours % 24.0 < 16.0) & (weekday < 5)
-    seen = later(plain, weeks(added={"air_exchange": 0.003 * opened}))
-    deaf = replace(DEFAULT, least_pattern_change=1e6)
-    told = diagnose(seen, model, rules=deaf)
-    assert told.verdict == "unexplained"
-    assert "hour" in told.findings[-1].drivers
 
 
 @pytest.mark.parametrize(
@@ -126,8 +114,9 @@ def test_which_part_is_told(
 
 def diagnosis_of(effect: str, log: Log, model: FittedModel) -> Diagnosis:
     """Return a diagnosis that tells an effect, or nothing."""
-    kind = "discrepancy" if effect == "discrepancy" else "process"
-    finding = Finding(effect, kind, (), {}, None, 0.0, (effect,), (), "")
+    finding = Finding(
+        effect, "discrepancy" if effect == "discrepancy" else "process", (), {}, None, 0.0, (effect,), (), ""
+    )
     time = log.telemetry.time
     findings = (finding,) if effect else ()
     return Diagnosis(SITE.name, "nothing", time[0], time[-1], 10, 4, findings, {}, (), model, model, log=log)

@@ -18,6 +18,7 @@ import yaml
 from scipy.signal import lfilter
 
 from igrow.core import sun
+from igrow.core.air import LATENT_HEAT
 from igrow.core.arrays import Floats
 from igrow.core.effects import EFFECTS, Effect
 from igrow.core.effects.definition import Parameter
@@ -38,6 +39,7 @@ SHAPES: Mapping[str, Mapping[str, Sequence[float]]] = _TABLE["shapes"]
 CHANNELS: Mapping[str, Mapping[str, Any]] = _TABLE["channels"]
 """In what a pattern may act: `size` of one unit of it and `unit`, `name`, and `balances` that it moves."""
 UNIT_FLUX: Mapping[str, float] = {name: one["size"] for name, one in CHANNELS.items()}
+EVAPORATION, WEEKLY = "evaporation", "weekly"
 WEEKDAYS = ("Monday", "Tuesday", "Wednesday", "Thursday", "Friday", "Saturday", "Sunday")
 _VISIBLE = 1e-9
 """Sensitivity below which a log shows nothing of a candidate."""
@@ -88,6 +90,16 @@ class Pattern:
     def key(self) -> str:
         """Name of the column, ``channel:when``."""
         return f"{self.channel}:{self.when}"
+
+    @property
+    def is_weekly(self) -> bool:
+        """It acts on one day of the week."""
+        return any(day in self.when for day in WEEKDAYS)
+
+    @property
+    def kind(self) -> str:
+        """Its channel; ``weekly`` where it acts on few days, and in which hardly matters to what chance brings."""
+        return WEEKLY if self.is_weekly else self.channel
 
 
 @dataclass(frozen=True)
@@ -185,24 +197,59 @@ def patterns(record: Record, longitude: float) -> list[tuple[str, tuple[str, ...
 
 def pattern_fluxes(record: Record, longitude: float, amplitudes: Mapping[Pattern, float]) -> dict[str, Floats]:
     """Return the fluxes of patterns by channel, (n,); amplitudes are in units of `UNIT_FLUX`."""
-    courses = {when: course for when, _, course in patterns(record, longitude)}
+    table = (*patterns(record, longitude), *weekly_patterns(record, longitude))
+    courses = {when: course for when, _, course in table}
     fluxes: dict[str, Floats] = {}
     for pattern, amplitude in amplitudes.items():
-        flux = amplitude * UNIT_FLUX[pattern.channel] * courses[pattern.when]
-        fluxes[pattern.channel] = fluxes.get(pattern.channel, 0.0) + flux
+        for channel, flux in _fluxes(pattern.channel, amplitude * courses[pattern.when]).items():
+            fluxes[channel] = fluxes.get(channel, 0.0) + flux
     return fluxes
 
 
+def _fluxes(channel: str, course: Floats) -> dict[str, Floats]:
+    """Return what a pattern of a course, in units of its channel, brings into the balances."""
+    flux = UNIT_FLUX[channel] * course
+    return {"vapour": flux, "heat": -LATENT_HEAT * flux} if channel == EVAPORATION else {channel: flux}
+
+
+def weekly_patterns(record: Record, longitude: float) -> list[tuple[str, tuple[str, ...], Floats]]:
+    """Return (when, drivers, course (n,)) of four hours on one day of the week, from every other hour on."""
+    hour, day = np.asarray(record.inputs["hour"]), sun.weekday(sun.solar_day(record.time, longitude))
+    return [
+        (
+            f"{first:02d} to {first + 4:02d} h on {name}s",
+            ("hour", "weekday"),
+            ((hour >= first) & (hour < first + 4) & (day == index)).astype(np.float64),
+        )
+        for index, name in enumerate(WEEKDAYS)
+        for first in range(0, 22, 2)
+    ]
+
+
 def pattern_columns(line: Linearisation, longitude: float) -> tuple[tuple[Pattern, ...], Floats]:
-    """Return every pattern in every channel, and their columns of the errors, (p, 3, r, steps)."""
+    """Return every pattern in every channel but evaporation, and their columns of the errors, (p, 3, r, steps)."""
+    return _pattern_columns(line, patterns(line.record, longitude), [one for one in CHANNELS if one != EVAPORATION])
+
+
+def finer_columns(line: Linearisation, longitude: float) -> tuple[tuple[Pattern, ...], Floats]:
+    """Return the same of what a search leaves out: patterns of evaporation, and `weekly_patterns` in every channel."""
+    lasting = [one for one in patterns(line.record, longitude) if not Pattern(EVAPORATION, *one[:2]).is_weekly]
+    evaporating, one = _pattern_columns(line, lasting, [EVAPORATION])
+    weekly, other = _pattern_columns(line, weekly_patterns(line.record, longitude), list(CHANNELS))
+    return (*evaporating, *weekly), np.concatenate([one, other])
+
+
+def _pattern_columns(
+    line: Linearisation, table: Sequence[tuple[str, tuple[str, ...], Floats]], channels: Sequence[str]
+) -> tuple[tuple[Pattern, ...], Floats]:
     found: list[Pattern] = []
     fluxes: list[tuple[Mapping[str, Floats], float]] = []
-    for when, drivers, course in patterns(line.record, longitude):
+    for when, drivers, course in table:
         if not np.any(course):
             continue
-        for channel, size in UNIT_FLUX.items():
+        for channel in channels:
             found.append(Pattern(channel, when, drivers))
-            fluxes.append(({channel: size * course}, _PATTERN_DIFFERENCE))
+            fluxes.append((_fluxes(channel, course), _PATTERN_DIFFERENCE))
     columns = flux_sensitivities(line, fluxes)
     kept = [index for index, column in enumerate(columns) if _is_visible(line, column)]
     return tuple(found[index] for index in kept), columns[kept]

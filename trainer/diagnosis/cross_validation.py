@@ -22,7 +22,7 @@ from igrow.trainer.diagnosis.candidates import Pattern
 from igrow.trainer.diagnosis.compare import Round
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.linear import DailyGrams, LinearModel
-from igrow.trainer.diagnosis.null_gains import read_null_pattern_skills, read_null_skills
+from igrow.trainer.diagnosis.null_gains import read_null_skills
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.fit.gaussian import Gaussian
@@ -45,6 +45,10 @@ class CrossValidated:
         """Share of the squared error that goes: the geometric mean by history and by physics, or the lesser below 0."""
         return float(_skill(self.falls))
 
+    def p_value(self, rules: DecisionRules, rng: np.random.Generator) -> float:
+        """Return the share of bootstrap draws of days in which it makes them no better."""
+        return float(np.mean(_drawn([self], rules, rng) <= 0.0))
+
 
 def find(design: Design, by_physics: Gaussian, rng: np.random.Generator) -> Round | None:
     """Return the round in which unseen days name a change; None where none makes them better by enough.
@@ -61,22 +65,6 @@ def find(design: Design, by_physics: Gaussian, rng: np.random.Generator) -> Roun
     return _by_days(design, null, found, rng)
 
 
-def unexplained(design: Design, by_physics: Gaussian, rng: np.random.Generator) -> Hypothesis | None:
-    """Return the pattern by which unseen days show that something goes on, where nothing has a name; None for none.
-
-    Args:
-        design: of the log, with its greenhouse's history.
-        by_physics: where the parameters may lie if they have changed as physics alone lets expect.
-        rng: for flips.
-    """
-    found = best(cross_validated(design, by_physics, promising_patterns(design, rng)))
-    if found is None:
-        return None
-    assert isinstance(found.hypothesis.cause, Pattern)
-    needed = read_null_pattern_skills().needed(found.hypothesis.cause.channel)
-    return found.hypothesis if found.skill >= needed else None
-
-
 def best(found: Sequence[CrossValidated]) -> CrossValidated | None:
     """Return the hypothesis that takes most off unseen days; None for none."""
     return max(found, key=lambda one: one.skill, default=None)
@@ -86,8 +74,7 @@ def _by_days(design: Design, null: linear.Fit, found: CrossValidated, rng: np.ra
     """Return the round of a cause that unseen days tell: single steps say less of it."""
     told = change.round_of(design, null, found.hypothesis, rng)
     assert told.cause is not None
-    (skills,) = _drawn([found], design.rules, rng)
-    return replace(told, cause=replace(told.cause, bootstrap_p=float(np.mean(skills <= 0.0))))
+    return replace(told, cause=replace(told.cause, bootstrap_p=found.p_value(design.rules, rng)))
 
 
 def settled(design: Design, by_physics: Gaussian, told: Round, rng: np.random.Generator) -> Round:
@@ -141,13 +128,6 @@ def promising(design: Design, rng: np.random.Generator) -> list[Hypothesis]:
     scored = search.score_candidates(design, null, [None], rng)
     asked = (one for one in scored if one.effect not in design.history.without)
     return [one for one in asked if change.net_gain(design, one) >= design.rules.least_unproven_change]
-
-
-def promising_patterns(design: Design, rng: np.random.Generator) -> list[Hypothesis]:
-    """Return the patterns that gain enough to be asked of unseen days, as if they had been there all the time."""
-    null = linear.fit(design.grams, design.null_model())
-    scored = search.score_patterns(design, null, [None], rng)
-    return [one for one in scored if change.net_gain(design, one) >= design.rules.least_unproven_change]
 
 
 def cross_validated(design: Design, by_physics: Gaussian, hypotheses: Sequence[Hypothesis]) -> list[CrossValidated]:

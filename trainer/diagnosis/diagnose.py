@@ -113,6 +113,8 @@ class _Question:
     nuisance: NuisanceSubspace | None
     null_gains: NullGains | None
     progress: Progress
+    is_later: bool = False
+    """Asked of later weeks than those next to the calibration."""
 
     def in_turn(self, log: Log) -> Diagnosis:
         """Return the diagnosis of a log: of a long one its weeks in turn, each by what those before it have told."""
@@ -123,7 +125,7 @@ class _Question:
         for weeks in later:
             earlier = [from_before(one, first.telemetry.time[0]) for one in told.causes]
             seen = replace(self.model, history=latest.history or self.model.history)
-            latest = replace(self, model=seen).answer(weeks, told.parameter, earlier=earlier)
+            latest = replace(self, model=seen, is_later=True).answer(weeks, told.parameter, earlier=earlier)
             if _bears_out(latest, told, self.rules):
                 told = latest
         found, beside = told.diagnosis, (wording.IN_TURN if told is latest else wording.EARLIER,) if later else ()
@@ -166,7 +168,7 @@ class _Question:
         # Of a crop that may be another by now nothing is asked, nor of the light, which its leaves take up.
         of_crop = LEAVES_AND_LIGHT if rules.crop_drift > self.rules.crop_drift else frozenset[str]()
         hidden = self.without | (frozenset({"co2_drift"}) if off else frozenset()) | of_crop | of_vents
-        search = search_of(days, site, knowledge, hidden, rules, self.nuisance, self.null_gains)
+        search = search_of(days, site, knowledge, hidden, rules, self.nuisance, self.null_gains, is_later=self.is_later)
         progress("searching for causes")
         first, last, found = search.run(rng, earlier)
         unseen = hidden_by_missing_weather(first.design.line)

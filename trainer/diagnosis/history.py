@@ -21,7 +21,6 @@ from igrow.core.site import Site
 from igrow.trainer.data.splits import DaySplit, split_days
 from igrow.trainer.diagnosis import candidates, linear, noise, search, sensitivity
 from igrow.trainer.diagnosis.amplitudes import columns, drift_over, drift_within, keys, omission
-from igrow.trainer.diagnosis.candidates import WEEKDAYS
 from igrow.trainer.diagnosis.design import Design, History, of_parts
 from igrow.trainer.diagnosis.freerun import LogDays
 from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, ActiveTerm, activate, knowledge_of
@@ -130,7 +129,7 @@ def lay_out(
     average = averaging(line, record.step, rules)
     found = candidates.effect_columns(line)
     every, courses = candidates.pattern_columns(line, longitude)
-    lasting = [place for place, one in enumerate(every) if not any(day in one.when for day in WEEKDAYS)]
+    lasting = [place for place, one in enumerate(every) if not one.is_weekly]
     patterns = tuple(every[place] for place in lasting)
     labels = tuple(one.key for one in found.candidates)
     slopes = sensitivity.parameter_sensitivities(line, prior.names, prior.standard_deviation)

@@ -8,7 +8,7 @@ days, is learned from later logs of virtual greenhouses with nothing missing, in
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from igrow.trainer.diagnosis.rules import came_with_the_trainer
@@ -23,8 +23,7 @@ class NullGains:
     """What is gained where nothing has changed: log-likelihoods in nats, or shares of the error of unseen days."""
 
     largest: Mapping[str, float]
-    """In any such log, of an effect, a parameter (``parameter:name``) or a channel of patterns; of shares 1.3 times
-    that."""
+    """In any such log, of effects, parameters (``parameter:name``) or kinds of patterns; of shares 1.3 times that."""
     least: float
     """What any change must gain: of such logs none or nearly none is given a name then, each by the gains of others."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
@@ -33,6 +32,12 @@ class NullGains:
     def needed(self, name: str) -> float:
         """Return what a change must gain: more than it did in any greenhouse in which nothing had changed."""
         return max(self.least, self.largest.get(name, 0.0))
+
+    def times(self, factor: float) -> NullGains:
+        """Return so many times as much, for logs in which more is gained where nothing has changed."""
+        return replace(
+            self, largest={name: factor * gain for name, gain in self.largest.items()}, least=factor * self.least
+        )
 
 
 def read_null_gains() -> NullGains:
@@ -46,5 +51,5 @@ def read_null_skills() -> NullGains:
 
 
 def read_null_pattern_skills() -> NullGains:
-    """Return the same of patterns without a name, by the channel that they act in."""
+    """Return the same of patterns without a name, by their `Pattern.kind`."""
     return NullGains(**came_with_the_trainer(PATTERN_SKILLS_FILE))

@@ -9,7 +9,7 @@ import numpy as np
 
 from igrow.core.arrays import Floats
 from igrow.core.site import Site
-from igrow.trainer.diagnosis import cross_validation, history, parameter_change
+from igrow.trainer.diagnosis import cross_validation, history, parameter_change, unexplained
 from igrow.trainer.diagnosis.change import changed
 from igrow.trainer.diagnosis.compare import Round, compare
 from igrow.trainer.diagnosis.design import Design, prepare
@@ -17,7 +17,7 @@ from igrow.trainer.diagnosis.estimate import Estimated, estimate, with_refitted,
 from igrow.trainer.diagnosis.freerun import LogDays
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, activate
 from igrow.trainer.diagnosis.nuisance import NuisanceSubspace, read_nuisance
-from igrow.trainer.diagnosis.null_gains import NullGains
+from igrow.trainer.diagnosis.null_gains import NullGains, read_null_gains
 from igrow.trainer.diagnosis.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.refit import are_identifiable, refit
 from igrow.trainer.diagnosis.rules import HOUR, DecisionRules
@@ -136,6 +136,8 @@ class Change(Search):
     """What the model is expected to miss in this log."""
     null_gains: NullGains | None
     """Of greenhouses in which nothing has changed; None: what came with the trainer."""
+    is_later: bool = False
+    """It is not the weeks next to the calibration, from which these gains were learned."""
     _latest: list[tuple[list[ActiveTerm], Design]] = field(default_factory=list)
     """Terms that the log was laid out with last: it is asked in two ways, and laid out once."""
 
@@ -147,7 +149,7 @@ class Change(Search):
         by_physics = self.knowledge.by_physics(self.rules)
         if judged.cause is not None:
             return cross_validation.settled(design, by_physics, judged, rng)
-        return cross_validation.find(design, by_physics, rng) or judged
+        return judged if self.is_later else cross_validation.find(design, by_physics, rng) or judged
 
     def design(self, terms: Sequence[ActiveTerm], interval: float) -> Design:
         """Return the design of a model with terms, about the calibrated parameters."""
@@ -169,7 +171,10 @@ class Change(Search):
 
     def unexplained(self, rng: np.random.Generator) -> tuple[Hypothesis, ...]:
         """Return the pattern that unseen days tell where nothing else is told."""
-        found = cross_validation.unexplained(self.resolved(), self.knowledge.by_physics(self.rules), rng)
+        if self.is_later:
+            return ()
+        by_physics = self.knowledge.by_physics(self.rules)
+        found = unexplained.find(self.resolved(), self.site.longitude, by_physics, rng)
         return () if found is None else (found,)
 
     def _expected(self, laid_out: Design) -> Design:
@@ -195,8 +200,14 @@ def search_of(
     rules: DecisionRules,
     nuisance: NuisanceSubspace | None,
     null_gains: NullGains | None,
+    *,
+    is_later: bool = False,
 ) -> Search:
-    """Return the search that fits what is known: of changes where the greenhouse's history applies to the log."""
+    """Return the search that fits what is known: of changes where the greenhouse's history applies to the log.
+
+    What a change must gain was learned from the weeks next to a calibration. In later ones a season makes more of what
+    a calibration misses, so that only what gains far more is told, and nothing that unseen days alone tell.
+    """
     common = (days, site, knowledge, without, rules, nuisance or read_nuisance())
     known = knowledge.history
     if known is None:
@@ -204,7 +215,9 @@ def search_of(
     plain = history.laid_out(days, site, known, (), rules)
     if not history.applies(known, plain):
         return Search(*common)
-    return Change(*common, known, plain, history.expected_misfit(known, plain), null_gains)
+    if is_later:
+        null_gains = (null_gains or read_null_gains()).times(rules.far_over_null)
+    return Change(*common, known, plain, history.expected_misfit(known, plain), null_gains, is_later)
 
 
 def _explained(found: Sequence[Estimated]) -> float:

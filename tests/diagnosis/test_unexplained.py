@@ -1,0 +1,112 @@
+"""What has no name: told by the pattern that makes days better which no fit has seen, more than chance does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from igrow.core.air import LATENT_HEAT
+from igrow.core.arrays import Floats
+from igrow.core.telemetry import Telemetry
+from igrow.trainer.data import Log
+from igrow.trainer.diagnosis import DEFAULT, candidates, diagnose, sensitivity, unexplained
+from igrow.trainer.diagnosis.candidates import UNIT_FLUX, Pattern
+from igrow.trainer.diagnosis.freerun import log_days
+from igrow.trainer.diagnosis.knowledge import knowledge_of
+from igrow.trainer.diagnosis.null_gains import NullGains
+from igrow.trainer.diagnosis.rounds import Change, search_of
+from igrow.trainer.fit import FittedModel
+from tests.diagnosis.known_greenhouse import DAYS, STEP, calibrated, later, weeks
+from tests.virtual_log import SITE
+
+UNHEARD = replace(DEFAULT, least_pattern_change=1e6)
+"""Steps are asked for more than any log can give, as if what hides were small."""
+HOURS = np.arange(DAYS * 96) * STEP / 3600.0
+WEEKDAY = (5 + np.floor(HOURS / 24.0)) % 7
+"""The log begins on a Saturday."""
+
+
+@pytest.fixture(scope="module")
+def plain() -> Telemetry:
+    return weeks()
+
+
+@pytest.fixture(scope="module")
+def model() -> FittedModel:
+    return calibrated()
+
+
+def search(log: Log, model: FittedModel) -> Change:
+    known = knowledge_of(model, SITE, DEFAULT)
+    found = search_of(log_days(log, model), SITE, known, frozenset(), DEFAULT, None, None)
+    assert isinstance(found, Change)
+    return found
+
+
+def within(first: float, last: float) -> Floats:
+    inside: Floats = ((first <= HOURS % 24.0) & (last > HOURS % 24.0)).astype(np.float64)
+    return inside
+
+
+def test_a_door_that_steps_do_not_tell_unseen_days_tell(plain: Telemetry, model: FittedModel) -> None:
+    opened = within(7.0, 16.0) * (WEEKDAY < 5)
+    told = diagnose(later(plain, weeks(added={"air_exchange": 0.003 * opened})), model, rules=UNHEARD)
+    assert told.verdict == "unexplained"
+    (found,) = told.findings
+    assert "hour" in found.drivers
+    assert found.p_value < 0.05
+    (size,) = found.parameters.values()
+    assert size.low > 0.0
+
+
+def test_a_floor_that_is_hosed_on_thursdays_evaporates(
+    plain: Telemetry, model: FittedModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Vapour that comes and heat that goes are one thing. Three Thursdays take less off twenty days than is asked."""
+    hosed = 1e-5 * within(6.0, 10.0) * (WEEKDAY == 3)
+    seen = later(plain, weeks(added={"vapour": hosed, "heat": -LATENT_HEAT * hosed}))
+    monkeypatch.setattr(unexplained, "read_null_pattern_skills", lambda: NullGains({}, 0.02))
+    (found,) = search(seen, model).unexplained(np.random.default_rng(0))
+    assert isinstance(found.cause, Pattern)
+    assert (found.cause.channel, found.cause.when) == ("evaporation", "06 to 10 h on Thursdays")
+    # Much of it condenses again.
+    assert 0.3e-5 < found.amplitude * UNIT_FLUX["evaporation"] < 1.5e-5
+    told = diagnose(seen, model, rules=UNHEARD)
+    assert "06 to 10 h on Thursdays" in told.findings[-1].sentence
+
+
+def test_nothing_is_unexplained_where_nothing_is_missing(plain: Telemetry, model: FittedModel) -> None:
+    assert search(later(plain, plain), model).unexplained(np.random.default_rng(0)) == ()
+
+
+def test_evaporation_is_vapour_and_the_heat_that_it_takes(plain: Telemetry, model: FittedModel) -> None:
+    design = search(later(plain, plain), model).resolved()
+    finer, columns = candidates.finer_columns(design.line, SITE.longitude)
+    assert {one.channel for one in finer if not one.is_weekly} == {"evaporation"}
+    (place,) = (row for row, one in enumerate(finer) if one.key == "evaporation:07 to 16 h")
+    course = {when: course for when, _, course in candidates.patterns(design.line.record, SITE.longitude)}["07 to 16 h"]
+    flux = UNIT_FLUX["evaporation"] * course
+    (run,) = sensitivity.flux_sensitivities(design.line, [({"vapour": flux, "heat": -LATENT_HEAT * flux}, 0.1)])
+    assert np.array_equal(columns[place], run, equal_nan=True)
+    added = candidates.pattern_fluxes(design.line.record, SITE.longitude, {finer[place]: 2.0})
+    assert np.allclose(added["vapour"], 2.0 * flux)
+    assert np.allclose(added["heat"], -2.0 * LATENT_HEAT * flux)
+
+
+def test_what_acts_on_one_day_of_the_week_has_a_bound_of_its_own(
+    plain: Telemetry, model: FittedModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened = within(7.0, 16.0) * (WEEKDAY < 5)
+    change = search(later(plain, weeks(added={"air_exchange": 0.003 * opened})), model)
+    monkeypatch.setattr(unexplained, "read_null_pattern_skills", lambda: NullGains({"weekly": 0.9}, 0.02))
+    (found,) = change.unexplained(np.random.default_rng(0))
+    assert isinstance(found.cause, Pattern)
+    assert (found.cause.channel, found.cause.kind) == ("air_exchange", "air_exchange")
+    others = dict.fromkeys(candidates.CHANNELS, 0.9)
+    monkeypatch.setattr(unexplained, "read_null_pattern_skills", lambda: NullGains(others, 0.0))
+    (found,) = change.unexplained(np.random.default_rng(0))
+    assert isinstance(found.cause, Pattern)
+    assert found.cause.kind == "weekly"
+    assert not found.cause.when.endswith(("Saturdays", "Sundays"))
