@@ -208,7 +208,7 @@ RESULTS = {
     ),
     "diagnosis-same": Result(
         "The same greenhouse later",
-        ("benchmarks.diagnosis", "same", "--greenhouses", "4", "--cases", "240", "--history-only"),
+        ("benchmarks.diagnosis", "same", "--greenhouses", "4", "--cases", "160", "--history-only"),
         "Calibrated on eight weeks of its own, diagnosed weeks later by its history.",
         "300000 and on",
         long=True,
