@@ -5,7 +5,7 @@ log, model --> knowledge --> actuators --> design --> compare --> estimate --> r
                                              +------------ the cause put in -----------+
 
 Beside the causes it is asked which parameter has changed; of one that began within the log the days since then are
-diagnosed by themselves.
+diagnosed by themselves. A long log is asked in parts, the oldest first.
 """
 
 from __future__ import annotations
@@ -113,8 +113,8 @@ class _Question:
     nuisance: NuisanceSubspace | None
     null_gains: NullGains | None
     progress: Progress
-    is_later: bool = False
-    """Asked of later weeks than those next to the calibration."""
+    history: Discrepancy | None = None
+    """Of the greenhouse, the weeks before seen too; None of the weeks next to the calibration."""
 
     def in_turn(self, log: Log) -> Diagnosis:
         """Return the diagnosis of a log: of a long one its weeks in turn, each by what those before it have told."""
@@ -122,21 +122,14 @@ class _Question:
         since, left_out = of_one_crop(since, self.rules)
         first, *later = weeks_in_turn(since, self.model, self.rules)
         told = latest = self.answer(first)
-        for weeks in later:
-            earlier = [from_before(one, first.telemetry.time[0]) for one in told.causes]
-            seen = replace(self.model, history=latest.history or self.model.history)
-            latest = replace(self, model=seen, is_later=True).answer(weeks, told.parameter, earlier=earlier)
+        for number, weeks in enumerate(later, 2):
+            self.progress(f"part {number} of {len(later) + 1}")
+            earlier = [from_before(one, told.diagnosis.start) for one in told.causes]
+            latest = replace(self, history=latest.history).answer(weeks, told.parameter, earlier=earlier)
             if _bears_out(latest, told, self.rules):
                 told = latest
-        found, beside = told.diagnosis, (wording.IN_TURN if told is latest else wording.EARLIER,) if later else ()
-        # What is shipped asks the next log by the calibration, as it asks one that is not long.
-        corrected = replace(found.corrected, history=self.model.history)
-        return replace(
-            found,
-            model=self.model,
-            corrected=remembering(corrected, told.parameter, self.rules),
-            notes=(*notes, *left_out, *found.notes, *beside),
-        )
+        beside = (wording.IN_TURN if told is latest else wording.EARLIER,) if later else ()
+        return replace(told.diagnosis, notes=(*notes, *left_out, *told.diagnosis.notes, *beside))
 
     def answer(
         self,
@@ -155,20 +148,24 @@ class _Question:
         """
         model, rules, progress, site = self.model, self.rules, self.progress, log.known_site
         new_crop, rules = has_new_crop(log.telemetry.time, site, model), with_its_drift(rules, log, model)
-        knowledge = knowledge_of(model, site, rules)
+        # What is shipped asks the next log by the calibration.
+        known = replace(model, history=self.history or model.history)
+        knowledge = knowledge_of(known, site, rules)
         progress("completing the log")
         logged, rng = log_days(log, model), np.random.default_rng(self.seed)
         of_vents = frozenset[str]()
         if history.vents_hardly_open(knowledge.history, logged.record, rules):
             of_vents, rules = VENTS, replace(rules, vent_drift=rules.narrow_vent_drift)
-            knowledge = knowledge_of(model, site, rules)
+            knowledge = knowledge_of(known, site, rules)
         completed = complete(log, logged, model, knowledge, rules)
         days, opened = completed.days, under_open_vents(logged.record, rules)
         off = opened is not None and opened.is_offset(rules)
         # Of a crop that may be another by now nothing is asked, nor of the light, which its leaves take up.
         of_crop = LEAVES_AND_LIGHT if rules.crop_drift > self.rules.crop_drift else frozenset[str]()
         hidden = self.without | (frozenset({"co2_drift"}) if off else frozenset()) | of_crop | of_vents
-        search = search_of(days, site, knowledge, hidden, rules, self.nuisance, self.null_gains, is_later=self.is_later)
+        search = search_of(
+            days, site, knowledge, hidden, rules, self.nuisance, self.null_gains, is_later=self.history is not None
+        )
         progress("searching for causes")
         first, last, found = search.run(rng, earlier)
         unseen = hidden_by_missing_weather(first.design.line)
@@ -237,7 +234,7 @@ class _Question:
             errors=errors,
             screened=log.screened,
             model=model,
-            corrected=corrected,
+            corrected=remembering(corrected, result.parameter, rules),
             # What a cause may as well be is told already.
             untestable=tuple(name for name in EFFECTS if name in not_asked and name not in possible),
             missing=logged.record.missing,
@@ -247,8 +244,8 @@ class _Question:
             ),
             log=log,
         ).settled()
-        followed = remembering(model, result.parameter, rules).history
-        seen = search.history_after(result.kept) if result.parameter is None else followed
+        followed = remembering(known, result.parameter, rules).history
+        seen = followed if new_crop or result.parameter is not None else search.history_after(result.kept)
         return _Answer(diagnosis, result.kept, result.parameter, seen)
 
     def _since(
