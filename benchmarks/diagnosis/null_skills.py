@@ -1,7 +1,8 @@
 """Learn what a change that only unseen days tell must take off their errors: more than where there is none.
 
 Asked of the same logs in which nothing is missing that teach what a change must gain (`null-gains`). An effect must
-exceed `OVER_NULL` times what it took off in any of these logs, a pattern without a name what any of its kind did.
+exceed `OVER_NULL` times what it took off in any of these logs, a pattern without a name `PATTERN_OVER_NULL` times what
+any of its kind did.
 Above that stands what every change must take off: the least with which none of these logs is told to lack one, each
 greenhouse judged by the others; of patterns the same. No case of a benchmark has these seeds.
 """
@@ -35,7 +36,9 @@ from igrow.trainer.diagnosis.rounds import Change, search_of
 
 COMMAND = "python -m benchmarks.diagnosis null-skills"
 OVER_NULL = 1.3
-"""Times the most that an effect, or a pattern, takes off where nothing has changed."""
+"""Times the most that an effect takes off where nothing has changed."""
+PATTERN_OVER_NULL = 2.0
+"""The same of a pattern: many are asked, and what is there takes off more."""
 Skills = Mapping[str, float]
 """Share of the squared error of unseen days that each takes off; the largest first."""
 
@@ -74,21 +77,22 @@ def _ranked(found: Sequence[CrossValidated]) -> list[CrossValidated]:
     return sorted(found, key=lambda one: -one.skill)
 
 
-def of_each(skills: Sequence[Skills]) -> dict[str, float]:
+def of_each(skills: Sequence[Skills], over_null: float) -> dict[str, float]:
     """Return what each effect, or each kind of patterns, must exceed by itself."""
-    taken = largest([{name: OVER_NULL * skill for name, skill in one.items()} for one in skills])
+    taken = largest([{name: over_null * skill for name, skill in one.items()} for one in skills])
     return {name: skill for name, skill in taken.items() if skill > 0.0}
 
 
-def least_skill(found: Sequence[tuple[str, Skills]]) -> float:
+def least_skill(found: Sequence[tuple[str, Skills]], over_null: float) -> float:
     """Return the least that every change must take off, so that no log is told to lack one by what others take off.
 
     Args:
         found: greenhouse and skills of every log.
+        over_null: times what others take off that are told.
     """
     told = [0.0]
     for greenhouse, skills in found:
-        by_others = of_each([other for name, other in found if name != greenhouse])
+        by_others = of_each([other for name, other in found if name != greenhouse], over_null)
         best, skill = next(iter(skills.items()), ("", 0.0))
         if skill >= by_others.get(best, 0.0):
             told.append(skill)
@@ -99,12 +103,12 @@ def learned(found: Sequence[Told]) -> dict[str, NullGains]:
     """Return the bounds of effects and of patterns, by their file."""
     made = provenance(COMMAND, dict(SEEDS))
     by_file = {
-        null_gains.SKILLS_FILE: [(one.greenhouse, one.skills) for one in found],
-        null_gains.PATTERN_SKILLS_FILE: [(one.greenhouse, one.patterns) for one in found],
+        null_gains.SKILLS_FILE: ([(one.greenhouse, one.skills) for one in found], OVER_NULL),
+        null_gains.PATTERN_SKILLS_FILE: ([(one.greenhouse, one.patterns) for one in found], PATTERN_OVER_NULL),
     }
     return {
-        file: NullGains(of_each([skills for _, skills in those]), least_skill(those), made)
-        for file, those in by_file.items()
+        file: NullGains(of_each([skills for _, skills in those], factor), least_skill(those, factor), made)
+        for file, (those, factor) in by_file.items()
     }
 
 

@@ -48,10 +48,10 @@ def draw(kind: str, first: int, count: int, units: Mapping[str, Mapping[str, flo
     rng = np.random.default_rng(first)
     turn, beyond = Turn(rng, list(EFFECTS)), Turn(rng, list(UNCATALOGUED))
     greenhouses = itertools.cycle(units)
-    changes = itertools.cycle(CHANGES)
+    changes = list(CHANGES)
     cases: list[Case] = []
     for group, size, share in GROUPS:
-        for _ in range(max(1, round(share * count))):
+        for place in range(max(1, round(share * count))):
             greenhouse, number = next(greenhouses), len(cases)
             causes: tuple[str, ...] = ()
             if size:
@@ -70,7 +70,8 @@ def draw(kind: str, first: int, count: int, units: Mapping[str, Mapping[str, flo
                     onset_day=float(rng.uniform(7.0, 20.0)) if group == "onset" else None,
                     heavy_tails=bool(rng.random() < 0.5),
                     wrong_noise=group == "noise",
-                    changed=next(changes) if group == "parameter" else "",
+                    # In every greenhouse another each time round.
+                    changed=changes[(place + place // len(units)) % len(changes)] if group == "parameter" else "",
                 )
             )
     return cases

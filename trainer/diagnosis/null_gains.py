@@ -23,7 +23,7 @@ class NullGains:
     """What is gained where nothing has changed: log-likelihoods in nats, or shares of the error of unseen days."""
 
     largest: Mapping[str, float]
-    """In any such log, of effects, parameters (``parameter:name``) or kinds of patterns; of shares 1.3 times that."""
+    """In any such log, of effects, parameters (``parameter:name``) or kinds of patterns; of shares some times that."""
     least: float
     """What any change must gain: of such logs none or nearly none is given a name then, each by the gains of others."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
