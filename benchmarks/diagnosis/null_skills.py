@@ -2,9 +2,8 @@
 
 Asked of the same logs in which nothing is missing that teach what a change must gain (`null-gains`). An effect must
 exceed `OVER_NULL` times what it took off in any of these logs, a pattern without a name `PATTERN_OVER_NULL` times what
-any of its kind did.
-Above that stands what every change must take off: the least with which none of these logs is told to lack one, each
-greenhouse judged by the others; of patterns the same. No case of a benchmark has these seeds.
+any of its kind did. Above that stands what every change must take off: the least with which none of these logs is told
+to lack one, each greenhouse judged by the others; of patterns the same. No case of a benchmark has these seeds.
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ COMMAND = "python -m benchmarks.diagnosis null-skills"
 OVER_NULL = 1.3
 """Times the most that an effect takes off where nothing has changed."""
 PATTERN_OVER_NULL = 2.0
-"""The same of a pattern: many are asked, and what is there takes off more."""
+"""The same of a pattern, set on tuning greenhouses: many are asked, and what is there takes off more."""
 Skills = Mapping[str, float]
 """Share of the squared error of unseen days that each takes off; the largest first."""
 

@@ -9,9 +9,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import Log, prepare_log
 from igrow.trainer.diagnosis import Diagnosis, diagnose
 from igrow.trainer.fit import FittedModel, Gaussian
+from tests.diagnosis import known_greenhouse
 from tests.made_once import made_once
 from tests.virtual_log import GREENHOUSE, SITE, virtual_log, weather
 
@@ -83,3 +85,15 @@ def door_log() -> Log:
     weekday = (5 + np.floor(hours / 24.0)) % 7
     opened = (hours % 24.0 >= 7.0) & (hours % 24.0 < 16.0) & (weekday < 5)
     return greenhouse_log(3, {"air_exchange": 0.003 * opened})
+
+
+@pytest.fixture(scope="session")
+def known_weeks() -> Telemetry:
+    """All weeks of the greenhouse that was calibrated on its own, as it was."""
+    return known_greenhouse.weeks()
+
+
+@pytest.fixture(scope="session")
+def known_model() -> FittedModel:
+    """What was calibrated on the first of them, with its history."""
+    return known_greenhouse.calibrated()

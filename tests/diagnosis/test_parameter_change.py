@@ -30,7 +30,7 @@ from igrow.trainer.fit import FittedModel
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.report import sentences
 from igrow.trainer.report.worth import worth
-from tests.diagnosis.known_greenhouse import DAYS, KNOWN, calibrated, later, weeks
+from tests.diagnosis.known_greenhouse import DAYS, KNOWN, later, weeks
 from tests.diagnosis.synthetic_design import BALANCES, PLAIN, Truth, make_design
 from tests.virtual_log import GREENHOUSE, SITE
 
@@ -157,12 +157,6 @@ def log() -> tuple[Telemetry, Telemetry]:
     return weeks(), weeks(GREENHOUSE | {"transmissivity": 0.67 * GREENHOUSE["transmissivity"]})
 
 
-@pytest.fixture(scope="module")
-def model() -> FittedModel:
-    """Calibrated on the weeks before, with its history."""
-    return calibrated()
-
-
 def costs(told: Diagnosis, finding: Finding) -> None:
     """A darker greenhouse needs more heat, and the lamps' electricity for the sun's light that it lost."""
     found = worth(told, finding)
@@ -187,10 +181,10 @@ def costs(told: Diagnosis, finding: Finding) -> None:
 
 
 def test_a_painted_cover_is_told_and_is_no_news_afterwards(
-    log: tuple[Telemetry, Telemetry], model: FittedModel
+    log: tuple[Telemetry, Telemetry], known_model: FittedModel
 ) -> None:
     seen = later(*log, 0)
-    told = diagnose(seen, model)
+    told = diagnose(seen, known_model)
     assert told.verdict == "named"
     (finding,) = told.findings
     assert (finding.effect, finding.kind, finding.onset) == ("transmissivity", "parameter", None)
@@ -203,16 +197,16 @@ def test_a_painted_cover_is_told_and_is_no_news_afterwards(
     assert sentences.checks(finding, speak("en", SITE.time_zone))
     costs(told, finding)
     # Pipes that nobody logged can look like a cover that changed.
-    assert all(one.kind != "parameter" for one in diagnose(seen.without("rail_pipe_temperature"), model).findings)
+    assert all(one.kind != "parameter" for one in diagnose(seen.without("rail_pipe_temperature"), known_model).findings)
     again = diagnose(seen, told.corrected)
     assert all(one.effect != "transmissivity" for one in again.findings)
 
 
 def test_a_cover_that_is_painted_within_the_log_has_a_date(
-    log: tuple[Telemetry, Telemetry], model: FittedModel
+    log: tuple[Telemetry, Telemetry], known_model: FittedModel
 ) -> None:
     seen = later(*log, 9)
-    told = diagnose(seen, model)
+    told = diagnose(seen, known_model)
     (finding,) = told.findings
     assert finding.effect == "transmissivity" and finding.onset is not None
     painted = seen.telemetry.time[0] + np.timedelta64(9, "D")
@@ -223,12 +217,12 @@ def test_a_cover_that_is_painted_within_the_log_has_a_date(
 
 
 def test_leaves_that_wilt_within_the_log_have_a_date_and_are_no_sensor(
-    log: tuple[Telemetry, Telemetry], model: FittedModel
+    log: tuple[Telemetry, Telemetry], known_model: FittedModel
 ) -> None:
     plain, values = log[0], GREENHOUSE
     wilted = values | {name: 0.4 * values[name] for name in members("transpiration")}
     after = weeks(wilted)
-    told = diagnose(later(plain, after, 9), model)
+    told = diagnose(later(plain, after, 9), known_model)
     (finding,) = told.findings
     assert finding.effect == "transpiration" and finding.onset is not None
     assert abs(finding.onset.time - plain.time[0] - np.timedelta64(KNOWN + 9, "D")) <= np.timedelta64(2, "D")
@@ -250,15 +244,15 @@ def test_leaves_that_wilt_within_the_log_have_a_date_and_are_no_sensor(
     ],
 )
 def test_a_cover_that_was_painted_some_days_ago_waits_for_a_later_log(
-    log: tuple[Telemetry, Telemetry], model: FittedModel, left: float
+    log: tuple[Telemetry, Telemetry], known_model: FittedModel, left: float
 ) -> None:
     # Fewer days than a diagnosis needs: no set of parameters is right for this log.
     painted = GREENHOUSE | {"transmissivity": left * GREENHOUSE["transmissivity"]}
     after = weeks(painted)
-    told = diagnose(later(log[0], after, DAYS - KNOWN - 6), model)
+    told = diagnose(later(log[0], after, DAYS - KNOWN - 6), known_model)
     assert told.findings == ()
     assert wording.WAITING in told.notes
 
 
-def test_the_cover_as_it_was_is_not_named(log: tuple[Telemetry, Telemetry], model: FittedModel) -> None:
-    assert diagnose(later(*log, DAYS), model).verdict == "nothing"
+def test_the_cover_as_it_was_is_not_named(log: tuple[Telemetry, Telemetry], known_model: FittedModel) -> None:
+    assert diagnose(later(*log, DAYS), known_model).verdict == "nothing"

@@ -18,7 +18,7 @@ from igrow.trainer.diagnosis.knowledge import knowledge_of
 from igrow.trainer.diagnosis.null_gains import NullGains
 from igrow.trainer.diagnosis.rounds import Change, search_of
 from igrow.trainer.fit import FittedModel
-from tests.diagnosis.known_greenhouse import DAYS, STEP, calibrated, later, weeks
+from tests.diagnosis.known_greenhouse import DAYS, STEP, later, weeks
 from tests.virtual_log import SITE
 
 UNHEARD = replace(DEFAULT, least_pattern_change=1e6)
@@ -26,16 +26,6 @@ UNHEARD = replace(DEFAULT, least_pattern_change=1e6)
 HOURS = np.arange(DAYS * 96) * STEP / 3600.0
 WEEKDAY = (5 + np.floor(HOURS / 24.0)) % 7
 """The log begins on a Saturday."""
-
-
-@pytest.fixture(scope="module")
-def plain() -> Telemetry:
-    return weeks()
-
-
-@pytest.fixture(scope="module")
-def model() -> FittedModel:
-    return calibrated()
 
 
 def search(log: Log, model: FittedModel) -> Change:
@@ -50,9 +40,9 @@ def within(first: float, last: float) -> Floats:
     return inside
 
 
-def test_a_door_that_steps_do_not_tell_unseen_days_tell(plain: Telemetry, model: FittedModel) -> None:
+def test_a_door_that_steps_do_not_tell_unseen_days_tell(known_weeks: Telemetry, known_model: FittedModel) -> None:
     opened = within(7.0, 16.0) * (WEEKDAY < 5)
-    told = diagnose(later(plain, weeks(added={"air_exchange": 0.003 * opened})), model, rules=UNHEARD)
+    told = diagnose(later(known_weeks, weeks(added={"air_exchange": 0.003 * opened})), known_model, rules=UNHEARD)
     assert told.verdict == "unexplained"
     (found,) = told.findings
     assert "hour" in found.drivers
@@ -62,27 +52,27 @@ def test_a_door_that_steps_do_not_tell_unseen_days_tell(plain: Telemetry, model:
 
 
 def test_a_floor_that_is_hosed_on_thursdays_evaporates(
-    plain: Telemetry, model: FittedModel, monkeypatch: pytest.MonkeyPatch
+    known_weeks: Telemetry, known_model: FittedModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Vapour that comes and heat that goes are one thing. Three Thursdays take less off twenty days than is asked."""
     hosed = 1e-5 * within(6.0, 10.0) * (WEEKDAY == 3)
-    seen = later(plain, weeks(added={"vapour": hosed, "heat": -LATENT_HEAT * hosed}))
+    seen = later(known_weeks, weeks(added={"vapour": hosed, "heat": -LATENT_HEAT * hosed}))
     monkeypatch.setattr(unexplained, "read_null_pattern_skills", lambda: NullGains({}, 0.02))
-    (found,) = search(seen, model).unexplained(np.random.default_rng(0))
+    (found,) = search(seen, known_model).unexplained(np.random.default_rng(0))
     assert isinstance(found.cause, Pattern)
     assert (found.cause.channel, found.cause.when) == ("evaporation", "06 to 10 h on Thursdays")
     # Much of it condenses again.
     assert 0.3e-5 < found.amplitude * UNIT_FLUX["evaporation"] < 1.5e-5
-    told = diagnose(seen, model, rules=UNHEARD)
+    told = diagnose(seen, known_model, rules=UNHEARD)
     assert "06 to 10 h on Thursdays" in told.findings[-1].sentence
 
 
-def test_nothing_is_unexplained_where_nothing_is_missing(plain: Telemetry, model: FittedModel) -> None:
-    assert search(later(plain, plain), model).unexplained(np.random.default_rng(0)) == ()
+def test_nothing_is_unexplained_where_nothing_is_missing(known_weeks: Telemetry, known_model: FittedModel) -> None:
+    assert search(later(known_weeks, known_weeks), known_model).unexplained(np.random.default_rng(0)) == ()
 
 
-def test_evaporation_is_vapour_and_the_heat_that_it_takes(plain: Telemetry, model: FittedModel) -> None:
-    design = search(later(plain, plain), model).resolved()
+def test_evaporation_is_vapour_and_the_heat_that_it_takes(known_weeks: Telemetry, known_model: FittedModel) -> None:
+    design = search(later(known_weeks, known_weeks), known_model).resolved()
     finer, columns = candidates.finer_columns(design.line, SITE.longitude)
     assert {one.channel for one in finer if not one.is_weekly} == {"evaporation"}
     (place,) = (row for row, one in enumerate(finer) if one.key == "evaporation:07 to 16 h")
@@ -96,10 +86,10 @@ def test_evaporation_is_vapour_and_the_heat_that_it_takes(plain: Telemetry, mode
 
 
 def test_what_acts_on_one_day_of_the_week_has_a_bound_of_its_own(
-    plain: Telemetry, model: FittedModel, monkeypatch: pytest.MonkeyPatch
+    known_weeks: Telemetry, known_model: FittedModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     opened = within(7.0, 16.0) * (WEEKDAY < 5)
-    change = search(later(plain, weeks(added={"air_exchange": 0.003 * opened})), model)
+    change = search(later(known_weeks, weeks(added={"air_exchange": 0.003 * opened})), known_model)
     monkeypatch.setattr(unexplained, "read_null_pattern_skills", lambda: NullGains({"weekly": 0.9}, 0.02))
     (found,) = change.unexplained(np.random.default_rng(0))
     assert isinstance(found.cause, Pattern)

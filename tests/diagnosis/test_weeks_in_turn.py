@@ -11,11 +11,12 @@ import pytest
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import Log, prepare_log
 from igrow.trainer.diagnosis import DEFAULT, Diagnosis, Finding, amplitudes, diagnose, history, linear, wording
+from igrow.trainer.diagnosis.answers import Answer
 from igrow.trainer.diagnosis.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, knowledge_of
 from igrow.trainer.diagnosis.rounds import Change, search_of
 from igrow.trainer.fit import FittedModel
-from tests.diagnosis.known_greenhouse import KNOWN, calibrated, later, weeks
+from tests.diagnosis.known_greenhouse import KNOWN, later
 from tests.virtual_log import SITE
 
 IN_PARTS = replace(DEFAULT, long_days=11.5)
@@ -23,63 +24,55 @@ IN_PARTS = replace(DEFAULT, long_days=11.5)
 module = sys.modules[diagnose.__module__]
 
 
-@pytest.fixture(scope="module")
-def plain() -> Telemetry:
-    return weeks()
-
-
-@pytest.fixture(scope="module")
-def model() -> FittedModel:
-    return calibrated()
-
-
 def warm(telemetry: Telemetry, kelvin: float) -> Telemetry:
     """Return a log whose air sensor reads too much."""
     return telemetry.with_columns({"air_temperature": telemetry["air_temperature"] + kelvin})
 
 
-def test_what_the_oldest_part_tells_is_told_of_the_newest(plain: Telemetry, model: FittedModel) -> None:
-    told = diagnose(later(plain, warm(plain, 1.2)), model, rules=IN_PARTS)
+def test_what_the_oldest_part_tells_is_told_of_the_newest(known_weeks: Telemetry, known_model: FittedModel) -> None:
+    told = diagnose(later(known_weeks, warm(known_weeks, 1.2)), known_model, rules=IN_PARTS)
     (finding,) = told.findings
     assert (finding.effect, finding.onset) == ("air_temperature_offset", None)
     assert finding.parameters["offset"].value == pytest.approx(1.2, abs=0.15)
     assert wording.IN_TURN in told.notes
-    assert told.start >= plain.time[0] + np.timedelta64(KNOWN + 9, "D")
+    assert told.start >= known_weeks.time[0] + np.timedelta64(KNOWN + 9, "D")
     # The errors before and after are those of the model in force, and what is shipped has its history.
-    assert told.model is model
-    assert told.corrected.history is model.history
+    assert told.model is known_model
+    assert told.corrected.history is known_model.history
     day = told.errors["air_temperature"]["24_h"]
     assert day["corrected"] < 0.8 * day["deployed"]
 
 
-def test_what_is_no_longer_so_is_told_of_the_part_that_told_it(plain: Telemetry, model: FittedModel) -> None:
-    seen = later(warm(plain, 1.2), plain, begins=10)
-    told = diagnose(seen, model, rules=IN_PARTS)
+def test_what_is_no_longer_so_is_told_of_the_part_that_told_it(
+    known_weeks: Telemetry, known_model: FittedModel
+) -> None:
+    seen = later(warm(known_weeks, 1.2), known_weeks, begins=10)
+    told = diagnose(seen, known_model, rules=IN_PARTS)
     (finding,) = told.findings
     assert finding.effect == "air_temperature_offset"
     assert wording.EARLIER in told.notes
-    assert told.end <= plain.time[0] + np.timedelta64(KNOWN + 10, "D")
+    assert told.end <= known_weeks.time[0] + np.timedelta64(KNOWN + 10, "D")
 
 
-def test_weeks_in_which_nothing_is_told_teach_what_to_expect(plain: Telemetry, model: FittedModel) -> None:
+def test_weeks_in_which_nothing_is_told_teach_what_to_expect(known_weeks: Telemetry, known_model: FittedModel) -> None:
     """The mean moves to where the log put it, and is known more surely; what the log says nothing of stays."""
-    assert model.history is not None
-    known = knowledge_of(model, SITE, DEFAULT)
-    log = later(plain, plain)
-    search = search_of(log_days(log, model), SITE, known, frozenset(), DEFAULT, None, None)
+    assert known_model.history is not None
+    known = knowledge_of(known_model, SITE, DEFAULT)
+    log = later(known_weeks, known_weeks)
+    search = search_of(log_days(log, known_model), SITE, known, frozenset(), DEFAULT, None, None)
     assert isinstance(search, Change)
     seen = search.history_after(())
     assert seen is not None
-    before, now = model.history.amplitudes, seen.amplitudes
+    before, now = known_model.history.amplitudes, seen.amplitudes
     assert set(before.names) <= set(now.names)
     design = search.resolved()
     solution = linear.fit(design.grams, design.null_model()).solution
     name = PARAMETER_PREFIX + "transmissivity"
     moved = now.values[name] - before.values[name]
     assert moved == pytest.approx(dict(zip(amplitudes.keys(design), solution.coefficients, strict=True))[name])
-    expected = history.drifted(model.history, search.plain)
+    expected = history.drifted(known_model.history, search.plain)
     assert now.deviations[name] < expected.deviations[name]
-    assert seen.middle > model.history.middle
+    assert seen.middle > known_model.history.middle
     # By what it was taught the same log has less that is new.
     again = history.expected(seen, search.plain, history.expected_misfit(seen, search.plain))
     assert np.sum(again.values[0] ** 2) < np.sum(design.values[0] ** 2)
@@ -97,17 +90,24 @@ def test_weeks_in_which_nothing_is_told_teach_what_to_expect(plain: Telemetry, m
     ],
 )
 def test_which_part_is_told(
-    parts: list[str], told: str, note: str, model: FittedModel, plain: Telemetry, monkeypatch: pytest.MonkeyPatch
+    parts: list[str],
+    told: str,
+    note: str,
+    known_model: FittedModel,
+    known_weeks: Telemetry,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    nothing = diagnosis_of("", later(plain, plain), model)
+    nothing = diagnosis_of("", later(known_weeks, known_weeks), known_model)
     asked = iter(parts)
 
     def answer(_question: object, log: Log, *_: object, **__: object) -> object:
-        return module._Answer(replace(diagnosis_of(next(asked), log, model), notes=nothing.notes))
+        return Answer(replace(diagnosis_of(next(asked), log, known_model), notes=nothing.notes))
 
     monkeypatch.setattr(module._Question, "answer", answer)
     monkeypatch.setattr(module, "weeks_in_turn", lambda log, *_: [log, log, log])
-    found = diagnose(prepare_log(plain.select(end=plain.time[0] + np.timedelta64(20, "D")), SITE), model)
+    found = diagnose(
+        prepare_log(known_weeks.select(end=known_weeks.time[0] + np.timedelta64(20, "D")), SITE), known_model
+    )
     assert [one.effect for one in found.findings] == [told] * bool(told)
     assert found.notes[-1] == note
 

@@ -10,7 +10,7 @@ diagnosed by themselves. A long log is asked in parts, the oldest first.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +20,7 @@ from igrow.core.errors import IgrowError
 from igrow.trainer.data.log import Log
 from igrow.trainer.diagnosis import history, wording
 from igrow.trainer.diagnosis.actuators import Completed, complete, may_hide_in_parameters
+from igrow.trainer.diagnosis.answers import Answer, bears_out, begun, is_same
 from igrow.trainer.diagnosis.candidates import hidden_by_missing_weather
 from igrow.trainer.diagnosis.correction import (
     Corrected,
@@ -33,14 +34,14 @@ from igrow.trainer.diagnosis.correction import (
 from igrow.trainer.diagnosis.crop import LEAVES_AND_LIGHT, has_new_crop, of_one_crop, with_its_drift
 from igrow.trainer.diagnosis.diagnosed_days import since_calibration, weeks_in_turn
 from igrow.trainer.diagnosis.estimate import Estimated, from_before, normal_quantile
-from igrow.trainer.diagnosis.evidence import Evidence
-from igrow.trainer.diagnosis.freerun import HORIZONS, FreeRuns, LogDays, Stage, log_days, mean_absolute_errors
+from igrow.trainer.diagnosis.evidence import Evidence, errors_of, runs_of, stages_of
+from igrow.trainer.diagnosis.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import VENTS, ActiveTerm, knowledge_of
 from igrow.trainer.diagnosis.nuisance import NuisanceSubspace
 from igrow.trainer.diagnosis.null_gains import NullGains
 from igrow.trainer.diagnosis.open_vents import under_open_vents
 from igrow.trainer.diagnosis.parameter_change import ParameterChange
-from igrow.trainer.diagnosis.result import DISCREPANCY, Diagnosis, Finding, Verdict
+from igrow.trainer.diagnosis.result import Diagnosis, Finding, Verdict
 from igrow.trainer.diagnosis.rounds import search_of
 from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules
 from igrow.trainer.diagnosis.search import Hypothesis
@@ -92,17 +93,6 @@ def diagnose(
 
 
 @dataclass(frozen=True)
-class _Answer:
-    """What a log, or some weeks of it, tell."""
-
-    diagnosis: Diagnosis
-    causes: tuple[Estimated, ...] = ()
-    parameter: ParameterChange | None = None
-    history: Discrepancy | None = None
-    """Of the greenhouse, these weeks seen; None where it has none."""
-
-
-@dataclass(frozen=True)
 class _Question:
     """What is asked of a log, and of parts of it; fields as the arguments of `diagnose`."""
 
@@ -126,7 +116,7 @@ class _Question:
             self.progress(f"part {number} of {len(later) + 1}")
             earlier = [from_before(one, told.diagnosis.start) for one in told.causes]
             latest = replace(self, history=latest.history).answer(weeks, told.parameter, earlier=earlier)
-            if _bears_out(latest, told, self.rules):
+            if bears_out(latest, told, self.rules):
                 told = latest
         beside = (wording.IN_TURN if told is latest else wording.EARLIER,) if later else ()
         return replace(told.diagnosis, notes=(*notes, *left_out, *told.diagnosis.notes, *beside))
@@ -137,7 +127,7 @@ class _Question:
         asked: ParameterChange | None = None,
         rivals: Sequence[ActiveTerm] = (),
         earlier: Sequence[Estimated] = (),
-    ) -> _Answer:
+    ) -> Answer:
         """Return what a log tells.
 
         Args:
@@ -205,10 +195,10 @@ class _Question:
         if not (explained or nothing_asked) and (patterns := search.unexplained(rng)):
             result = correct(days, knowledge, (), patterns, site.longitude, rules)
         verdict, findings = _verdict(completed, result, patterns, rules)
-        stages = _stages(result, completed, logged)
+        stages = stages_of(result, completed, logged)
         progress("predicting unseen days")
-        runs = _runs(stages)
-        errors = _errors(runs)
+        runs = runs_of(stages)
+        errors = errors_of(runs)
         start, end = log.telemetry.time[0], log.telemetry.time[-1]
         moved = model.posterior.values, result.stages["corrected"].posterior.values
         crop = growth_since(log, days.record, moved, model.crop or built_in_crop())
@@ -246,7 +236,7 @@ class _Question:
         ).settled()
         followed = remembering(known, result.parameter, rules).history
         seen = followed if new_crop or result.parameter is not None else search.history_after(result.kept)
-        return _Answer(diagnosis, result.kept, result.parameter, seen)
+        return Answer(diagnosis, result.kept, result.parameter, seen)
 
     def _since(
         self,
@@ -254,7 +244,7 @@ class _Question:
         begin: np.datetime64,
         log: Log,
         rivals: Sequence[ActiveTerm] = (),
-    ) -> _Answer | None:
+    ) -> Answer | None:
         """Return what the days since a parameter has changed tell; None where these alone do not bear it out.
 
         One set of parameters is none for a log of two greenhouses: the one that is there now counts.
@@ -280,34 +270,6 @@ class _Question:
         return replace(told, diagnosis=replace(diagnosis, findings=findings, notes=(*diagnosis.notes, wording.SINCE)))
 
 
-def _bears_out(later: _Answer, earlier: _Answer, rules: DecisionRules) -> bool:
-    """Tell whether later weeks tell all that earlier ones have named, or anything where these had no name for it."""
-    told = {one.effect for one in later.diagnosis.findings}
-    named = [one for one in earlier.diagnosis.findings if one.kind != DISCREPANCY]
-    if not named:
-        return bool(told) or not earlier.diagnosis.findings
-    sizes = {one.effect: one.term.amplitude for one in later.causes}
-    return all(told.intersection(_same_as(one)) for one in named) and all(
-        sizes.get(one.effect, 0.0) / one.term.amplitude >= rules.regime_share for one in earlier.causes
-    )
-
-
-def _same_as(one: Finding) -> tuple[str, ...]:
-    """Return the names under which later weeks may tell a finding: of parameters, of all that change alike."""
-    return one.confounded if one.kind == "parameter" else (one.effect,)
-
-
-def is_same(later: Finding, change: ParameterChange) -> bool:
-    """Tell whether the days since a parameter has changed tell it, or one that explains as much."""
-    return later.kind == "parameter" and (later.effect in change.confounded or change.parameter in later.confounded)
-
-
-def begun(later: Finding, change: ParameterChange) -> Finding:
-    """Return what the days since a change tell, with the beginning that the whole log tells."""
-    share = later.parameters["change"]
-    return wording.parameter(replace(change, parameter=later.effect, share=share, confounded=later.confounded))
-
-
 def remembering(model: FittedModel, change: ParameterChange | None, rules: DecisionRules) -> FittedModel:
     """Return a model whose history knows that a parameter has changed, so that it is no news in the next log."""
     if change is None or model.history is None:
@@ -330,35 +292,6 @@ def _verdict(
     if not findings:
         return "nothing", ()
     return ("ambiguous" if any(len(one.confounded) > 1 for one in findings) else "named"), findings
-
-
-def _stages(result: Corrected, completed: Completed, logged: LogDays) -> dict[str, tuple[Stage, LogDays]]:
-    """Return every stage with the log that it sees: an actuator that the log lacks counts from the correction on."""
-    stages = {name: (stage, completed.days) for name, stage in result.stages.items()}
-    if completed.recalibrated is not None:
-        stages |= {
-            "deployed": (result.stages["deployed"], logged),
-            "recalibrated": (completed.recalibrated, logged),
-        }
-    return stages
-
-
-def _runs(stages: Mapping[str, tuple[Stage, LogDays]]) -> dict[str, dict[str, FreeRuns]]:
-    """Return the free runs on held-out days: horizon -> stage, where one fits."""
-    return {
-        horizon: {name: run for name, (stage, seen) in stages.items() if (run := seen.run(stage, horizon)) is not None}
-        for horizon in HORIZONS
-    }
-
-
-def _errors(runs: Mapping[str, Mapping[str, FreeRuns]]) -> Mapping[str, Mapping[str, Mapping[str, float]]]:
-    """Return the mean absolute errors on held-out days: quantity -> horizon -> stage."""
-    table: dict[str, dict[str, dict[str, float]]] = {}
-    for horizon, by_stage in runs.items():
-        for name, run in by_stage.items():
-            for quantity, error in mean_absolute_errors(run).items():
-                table.setdefault(quantity, {}).setdefault(horizon, {})[name] = error
-    return table
 
 
 def _data_fault(log: Log, model: FittedModel) -> Diagnosis:
