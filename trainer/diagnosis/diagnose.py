@@ -34,7 +34,7 @@ from igrow.trainer.diagnosis.correction import (
 from igrow.trainer.diagnosis.crop import LEAVES_AND_LIGHT, has_new_crop, of_one_crop, with_its_drift
 from igrow.trainer.diagnosis.diagnosed_days import since_calibration, weeks_in_turn
 from igrow.trainer.diagnosis.estimate import Estimated, from_before, normal_quantile
-from igrow.trainer.diagnosis.evidence import Evidence, errors_of, runs_of, stages_of
+from igrow.trainer.diagnosis.evidence import Evidence
 from igrow.trainer.diagnosis.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import VENTS, ActiveTerm, knowledge_of
 from igrow.trainer.diagnosis.nuisance import NuisanceSubspace
@@ -45,6 +45,7 @@ from igrow.trainer.diagnosis.result import Diagnosis, Finding, Verdict
 from igrow.trainer.diagnosis.rounds import search_of
 from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules
 from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.diagnosis.unseen_errors import errors_of, runs_of, stages_of
 from igrow.trainer.diagnosis.visible_parameters import members
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.growth import built_in_crop, growth_since
