@@ -7,9 +7,9 @@ each with a model calibrated on its own first weeks; `transferred` diagnoses the
 little since their calibration, and asks what has changed in them; `omission` takes terms out of the model before the
 calibration (with DATA: of the public logs) and asks the calibration log for them; `real` diagnoses the public logs.
 `nuisance` learns anew what greenhouses show though nothing is missing, and `rules` fits the bounds that are fitted,
-both from seeds that no case has, and `null-gains` what a change must gain, `null-skills` what it must take
-off unseen days where only these tell it; `separating` asks what tests of the plant bring, and `thresholds` prints all
-rules. Everything is made afresh: an hour or so on two cores, most of it for simulated weeks.
+both from seeds that no case has, and `null-bounds` what a change must gain, and what it must take off unseen days;
+`separating` asks what tests of the plant bring, and `thresholds` prints all rules. Everything is made afresh: an hour
+or so on two cores, most of it for simulated weeks.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import sys
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from benchmarks.diagnosis import matched, nuisance, null_gains, null_skills, omission, real, rules, same, separating
+from benchmarks.diagnosis import matched, nuisance, null_bounds, omission, real, rules, same, separating
 from benchmarks.diagnosis.cases import SEASONS, draw
 from benchmarks.diagnosis.greenhouses import of_seasons, others
 from benchmarks.diagnosis.logs import built_in, reference, simulated_cases
@@ -39,8 +39,7 @@ WHAT = (
     "same",
     "omission",
     "real",
-    "null-gains",
-    "null-skills",
+    "null-bounds",
     "separating",
 )
 OTHER_GREENHOUSES = 8
@@ -73,10 +72,8 @@ def main() -> int:
         return matched.main(options.processes)
     if options.what == "nuisance":
         return nuisance.main(options.processes)
-    if options.what == "null-gains":
-        return null_gains.main(options.processes)
-    if options.what == "null-skills":
-        return null_skills.main(options.processes)
+    if options.what == "null-bounds":
+        return null_bounds.main(options.processes)
     if options.what == "rules":
         return rules.main(options.processes)
     if options.what == "thresholds":

@@ -1,29 +1,23 @@
 """Learn what a change that only unseen days tell must take off their errors: more than where there is none.
 
-Asked of the same logs in which nothing is missing that teach what a change must gain (`null-gains`). An effect must
-exceed `OVER_NULL` times what it took off in any of these logs, a pattern without a name `PATTERN_OVER_NULL` times what
-any of its kind did. Above that stands what every change must take off: the least with which none of these logs is told
-to lack one, each greenhouse judged by the others; of patterns the same. No case of a benchmark has these seeds.
+An effect must exceed `OVER_NULL` times what it took off in any of these logs, a pattern without a name
+`PATTERN_OVER_NULL` times what any of its kind did. Above that stands what every change must take off: the least with
+which none of these logs is told to lack one, each greenhouse judged by the others; of patterns the same.
 """
 
 from __future__ import annotations
 
-import json
 import math
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from importlib.resources import files
-from pathlib import Path
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from benchmarks.diagnosis.cases import Case
-from benchmarks.diagnosis.logs import Reference
-from benchmarks.diagnosis.null_gains import SEEDS, largest, unchanged
+from benchmarks.diagnosis.null_gains import largest
+from benchmarks.diagnosis.null_logs import Later
 from benchmarks.jobs import Jobs
-from benchmarks.provenance import provenance
-from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import prepare_log
 from igrow.trainer.diagnosis import DEFAULT, cross_validation, null_gains, unexplained
 from igrow.trainer.diagnosis.candidates import Pattern
@@ -33,7 +27,6 @@ from igrow.trainer.diagnosis.knowledge import knowledge_of
 from igrow.trainer.diagnosis.null_gains import NullGains
 from igrow.trainer.diagnosis.rounds import Change, search_of
 
-COMMAND = "python -m benchmarks.diagnosis null-skills"
 OVER_NULL = 1.3
 """Times the most that an effect takes off where nothing has changed."""
 PATTERN_OVER_NULL = 2.0
@@ -54,7 +47,7 @@ class Told:
     """The same of the best pattern of each kind."""
 
 
-def told(job: tuple[Reference, Case, Telemetry]) -> Told:
+def told(job: Later) -> Told:
     """Ask a log, as a diagnosis does where its time steps tell nothing, whether or not those of this one do."""
     reference, case, telemetry = job
     site, rng = reference.greenhouse.site, np.random.default_rng(0)
@@ -98,9 +91,13 @@ def least_skill(found: Sequence[tuple[str, Skills]], over_null: float) -> float:
     return (math.floor(1000.0 * max(told)) + 1.0) / 1000.0
 
 
-def learned(found: Sequence[Told]) -> dict[str, NullGains]:
-    """Return the bounds of effects and of patterns, by their file."""
-    made = provenance(COMMAND, dict(SEEDS))
+def learned(found: Sequence[Told], made: Mapping[str, Any]) -> dict[str, NullGains]:
+    """Return the bounds of effects and of patterns, by their file.
+
+    Args:
+        found: what unseen days tell of every log.
+        made: provenance of these logs.
+    """
     by_file = {
         null_gains.SKILLS_FILE: ([(one.greenhouse, one.skills) for one in found], OVER_NULL),
         null_gains.PATTERN_SKILLS_FILE: ([(one.greenhouse, one.patterns) for one in found], PATTERN_OVER_NULL),
@@ -111,19 +108,20 @@ def learned(found: Sequence[Told]) -> dict[str, NullGains]:
     }
 
 
-def main(processes: int) -> int:
-    """Write the bounds into the package."""
+def learn(jobs: Jobs, logs: Sequence[Later], made: Mapping[str, Any]) -> dict[str, NullGains]:
+    """Return the skills that come with the trainer, of effects and of patterns, by their file.
+
+    Args:
+        jobs: that ask the unseen days.
+        logs: in which nothing has changed.
+        made: provenance of them.
+    """
     found: list[Told] = []
-    with Jobs("diagnosis null-skills", processes) as jobs:
-        for one in jobs.each(told, unchanged(jobs)):
-            found.append(one)
-            print(f"{len(found)}: {one}", file=sys.stderr, flush=True)
+    for one in jobs.each(told, logs):
+        found.append(one)
+        print(f"skills of {len(found)} of {len(logs)} logs", file=sys.stderr, flush=True)
     for one in sorted(found, key=lambda one: -max(one.skills.values(), default=0.0)):
         of_patterns = {f"pattern of {name}": skill for name, skill in one.patterns.items()}
         for name, skill in (one.skills | of_patterns).items():
             print(f"{one.greenhouse:24} {one.group:8} {name:32} {skill:6.3f}")
-    for file, bounds in learned(found).items():
-        path = Path(str(files("igrow.trainer.diagnosis"))) / file
-        path.write_text(json.dumps(asdict(bounds), indent=1) + "\n", encoding="utf-8")
-        print(f"{len(found)} logs; least skill {bounds.least:g}; wrote {path}")
-    return 0
+    return learned(found, made)

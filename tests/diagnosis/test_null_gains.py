@@ -46,7 +46,7 @@ def test_patterns_have_bounds_of_their_own_by_kind() -> None:
         Told("one", "nothing", {"lamp_heat": 0.03}, {"heat": 0.05, "weekly": 0.01}),
         Told("two", "noise", {"lamp_heat": 0.02}, {"heat": 0.02}),
     ]
-    of_effects, of_patterns = (skills.learned(found)[file] for file in (SKILLS_FILE, PATTERN_SKILLS_FILE))
+    of_effects, of_patterns = (skills.learned(found, {})[file] for file in (SKILLS_FILE, PATTERN_SKILLS_FILE))
     assert (of_effects.largest, of_effects.least) == ({"lamp_heat": 0.039}, 0.031)
     assert (of_patterns.largest, of_patterns.least) == ({"heat": 0.1, "weekly": 0.02}, 0.051)
     assert set(read_null_pattern_skills().largest) <= {*CHANNELS, "weekly"}

@@ -1,0 +1,64 @@
+"""Logs of greenhouses in which nothing has changed since their calibration: what a change must exceed comes of these.
+
+In every nursery (one a season) each greenhouse is calibrated on eight weeks, and then logged three times more, with
+nothing missing but a little drift, once with wrong noise or a cleaned cover. No case of a benchmark has these seeds.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from benchmarks.diagnosis.cases import Case
+from benchmarks.diagnosis.logs import Reference
+from benchmarks.diagnosis.nurseries import calibrated, calibration_logs, later_logs, nursery
+from benchmarks.jobs import Jobs
+from igrow.core.telemetry import Telemetry
+
+SEEDS = {"spring": 110_000, "autumn": 120_000, "winter": 130_000}
+GREENHOUSES, DAYS = 16, 28
+Later = tuple[Reference, Case, Telemetry]
+"""A log in which nothing is missing, of a greenhouse that was calibrated before."""
+
+
+def null_cases(season: str, known: Sequence[Reference]) -> list[list[Case]]:
+    """Return three cases of every greenhouse in which nothing is missing."""
+    found = []
+    for place, one in enumerate(known):
+        groups = ("nothing", "nothing", "clean" if place % 2 else "noise")
+        found.append([
+            Case(
+                name=f"{season}-{place}-{number}", group=group, greenhouse=one.greenhouse.site.name,
+                seed=SEEDS[season] + 500 + 3 * place + number, heavy_tails=bool(number), wrong_noise=group == "noise",
+            )
+            for number, group in enumerate(groups)
+        ])  # fmt: skip
+    return found
+
+
+def unchanged(jobs: Jobs) -> list[Later]:
+    """Simulate the nurseries and calibrate their greenhouses; return the later logs in which nothing is missing."""
+    known = {season: nursery(season, GREENHOUSES, first) for season, first in SEEDS.items()}
+    weeks = jobs.each(calibration_logs, known.values())
+    own = [
+        pair
+        for one, logs in zip(known.values(), weeks, strict=True)
+        for pair in zip(one.greenhouses, logs, strict=True)
+    ]
+    references: list[Reference] = []
+    for one in jobs.each(calibrated, own):
+        references.append(one)
+        print(f"{len(references)} of {len(own)} calibrated", file=sys.stderr, flush=True)
+    by_season = [references[place : place + GREENHOUSES] for place in range(0, len(references), GREENHOUSES)]
+    cases = [null_cases(season, greenhouses) for season, greenhouses in zip(SEEDS, by_season, strict=True)]
+    later = jobs.each(_later, list(zip(by_season, cases, strict=True)))
+    return [
+        (one, case, log)
+        for greenhouses, asked, logs in zip(by_season, cases, later, strict=True)
+        for one, mine, seen in zip(greenhouses, asked, logs, strict=True)
+        for case, log in zip(mine, seen, strict=True)
+    ]
+
+
+def _later(job: tuple[Sequence[Reference], Sequence[Sequence[Case]]]) -> list[list[Telemetry]]:
+    return later_logs(*job, DAYS)
