@@ -71,6 +71,22 @@ def test_what_follows_an_hour_late_settles_at_what_it_follows(courses: dict[str,
     assert late[begun + 3] - late[begun - 1] * np.exp(-1.0) == pytest.approx(level * (1.0 - np.exp(-1.0)), rel=1e-6)
 
 
+def test_a_store_of_a_day_remembers_the_light(courses: dict[str, Floats], record: Record) -> None:
+    stored = courses["light of the last days"]
+    light = (0.3 * np.asarray(record.inputs["global_radiation"]) + 0.5 * np.asarray(record.inputs["lamp_power"])) / 15.0
+    day = round(86_400.0 / record.step)
+    # It begins with its first day's mean, moves by a share of its distance from the light, and keeps the mean.
+    assert stored[0] == pytest.approx(light[:day].mean(), rel=0.05)
+    moved = np.diff(stored) / (1.0 - np.exp(-record.step / 86_400.0))
+    np.testing.assert_allclose(moved, (light - np.append(light[:day].mean(), stored[:-1]))[1:], atol=1e-9)
+    assert stored.mean() == pytest.approx(light.mean(), rel=0.1)
+
+
+def test_without_a_pyranometer_nothing_remembers_the_light(quiet_log: Log) -> None:
+    dark = quiet_log.without("global_radiation").record(0.0)
+    assert "light of the last days" not in {when for when, _, _ in candidates.patterns(dark, SITE.longitude)}
+
+
 def test_nothing_that_control_answers_to_drives_a_pattern(record: Record) -> None:
     drivers = {driver for _, names, _ in candidates.patterns(record, SITE.longitude) for driver in names}
     assert not drivers & {
