@@ -89,6 +89,41 @@ def test_a_later_log_may_have_drifted_as_far_as_a_walk_goes() -> None:
     assert np.all(soon >= amplitudes.drift_within(design))
 
 
+def test_what_a_calibration_log_hardly_shows_may_be_off_by_as_much_as_it_typically_is() -> None:
+    design = in_real_parameters(make_design(seed=2))
+    column = design.block("effect").columns[[*design.block("effect").labels].index("lamp_heat")]
+    values = design.values.copy()
+    errors = np.sqrt(np.mean(values[0] ** 2, axis=(1, 2)))
+    size = np.sqrt(np.mean((np.sqrt(np.mean(values[column] ** 2, axis=(1, 2))) / errors) ** 2))
+    typical = EFFECTS["lamp_heat"].amplitude.typical
+    for part, shows in ((0.9, False), (1.1, True)):
+        values[column] *= part * DEFAULT.least_shown / (typical * size)
+        unseen = amplitudes.hardly_shown(replace(design, values=values))
+        assert ("lamp_heat" not in unseen) == shows
+        spread = amplitudes.omission(("lamp_heat", PATTERN), DEFAULT, unseen)
+        share = DEFAULT.omission_effect if shows else DEFAULT.unseen_effect
+        np.testing.assert_allclose(spread, [share * typical, DEFAULT.omission_pattern])
+        values = design.values.copy()
+
+
+def test_of_an_effect_that_is_new_in_a_later_log_the_calibration_has_said_nothing() -> None:
+    design = in_real_parameters(make_design(seed=2))
+    names = amplitudes.keys(design)
+    known = tuple(name for name in names if name != "lamp_heat")
+    before = Discrepancy(
+        dict.fromkeys(design.prior.names, 1.0),
+        Gaussian(known, np.zeros(len(known)), np.eye(len(known))),
+        {},
+        3600.0,
+        {},
+        design.line.record.time[0],
+    )
+    now, drift = history.drifted(before, design), amplitudes.drift_within(design)
+    place = names.index("lamp_heat")
+    usual = DEFAULT.unseen_effect * EFFECTS["lamp_heat"].amplitude.typical
+    assert now.standard_deviation[place] == pytest.approx(np.hypot(usual, drift[place]))
+
+
 def test_vents_that_hardly_open_any_more_are_told() -> None:
     record = site_record(virtual_log(3, seed=3, step=900.0), SITE, 900.0)
     opening = history.opening_of(record)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -53,11 +53,35 @@ def drift_over(design: Design, days: float) -> Floats:
     return change
 
 
-def omission(names: Sequence[str], rules: DecisionRules) -> Floats:
-    """Return the prior deviation of effects and patterns before any log, (k,)."""
+def omission(names: Sequence[str], rules: DecisionRules, unseen: Collection[str] = ()) -> Floats:
+    """Return the prior deviation of effects and patterns before any log, (k,).
+
+    Args:
+        names: keys.
+        rules: how much may be missing.
+        unseen: of these, effects that the calibration log does not show: a law that it could not try may be far off.
+    """
     effects = (EFFECTS.get(name.partition(":")[0]) for name in names)
-    typical = (None if one is None else abs(one.amplitude.typical) for one in effects)
-    return np.array([rules.omission_pattern if one is None else rules.omission_effect * one for one in typical])
+    typical = [None if one is None else abs(one.amplitude.typical) for one in effects]
+    shares = [rules.unseen_effect if name in unseen else rules.omission_effect for name in names]
+    return np.array([
+        rules.omission_pattern if one is None else share * one for one, share in zip(typical, shares, strict=True)
+    ])  # fmt: skip
+
+
+def hardly_shown(design: Design) -> frozenset[str]:
+    """Return the keys of effects that at their typical size would be small beside the errors of a log."""
+    errors = _root_mean_square(design.values[0])
+    ratios = _root_mean_square(design.values[design.block("effect").columns]) / np.maximum(errors, 1e-300)
+    sizes = _typical(design) * np.sqrt(np.mean(ratios**2, axis=-1))
+    labels = design.block("effect").labels
+    return frozenset(key for key, size in zip(labels, sizes, strict=True) if size < design.rules.least_shown)
+
+
+def _root_mean_square(columns: Floats) -> Floats:
+    """Return that of every balance, (..., b, r, intervals) -> (..., b)."""
+    found: Floats = np.sqrt(np.mean(columns**2, axis=(-2, -1)))
+    return found
 
 
 def _typical(design: Design) -> Floats:

@@ -20,7 +20,7 @@ from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
 from igrow.trainer.data.splits import DaySplit, split_days
 from igrow.trainer.diagnosis import candidates, linear, noise, search, sensitivity
-from igrow.trainer.diagnosis.amplitudes import columns, drift_over, drift_within, keys, omission
+from igrow.trainer.diagnosis.amplitudes import columns, drift_over, drift_within, hardly_shown, keys, omission
 from igrow.trainer.diagnosis.design import Design, History, of_parts
 from igrow.trainer.diagnosis.freerun import LogDays
 from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, ActiveTerm, activate, knowledge_of
@@ -97,7 +97,7 @@ def jointly(
     plain = lay_out(record, whole, posterior, effects or {}, site.longitude, rules)
     shared, names = population or Population({}, {}, 0), keys(plain)[len(posterior.names) :]
     described = held(posterior, shared.prior(site).marginal(posterior.names))
-    centre, spread = shared.scaled(names, omission(names, rules))
+    centre, spread = shared.scaled(names, omission(names, rules, hardly_shown(plain)))
     mean = np.concatenate([described.mean - posterior.mean, centre])
     deviation = np.concatenate([described.standard_deviation, spread])
     prior = Gaussian(keys(plain), mean, np.diag(deviation**2))
@@ -209,14 +209,15 @@ def expected(
 def drifted(known: Discrepancy, plain: Design) -> Gaussian:
     """Return how far everything may now lie from what is expected: the covariance of the history, and a drift.
 
-    What is new in this log has the covariance that it had before any log.
+    Of what is new in this log the calibration has said nothing.
     """
     wanted = keys(plain)
     place = {key: row for row, key in enumerate(known.amplitudes.names)}
     seen = [row for row, key in enumerate(wanted) if key in place]
     rows = [place[wanted[row]] for row in seen]
+    unseen = set(wanted) - set(place)
     count = len(plain.prior.names)
-    prior = np.concatenate([plain.prior.standard_deviation, omission(wanted[count:], plain.rules)])
+    prior = np.concatenate([plain.prior.standard_deviation, omission(wanted[count:], plain.rules, unseen)])
     assert all(row in seen for row in range(count))
     covariance = np.diag(prior**2)
     covariance[np.ix_(seen, seen)] = known.amplitudes.covariance[np.ix_(rows, rows)]

@@ -55,6 +55,10 @@ class DecisionRules:
     history: bool = _chosen(True, "ask what has changed since, and not what greenhouses with nothing missing show")
     least_history_days: float = _chosen(21.0, "days of a calibration log from which on a history is learned")
     omission_effect: float = _tuned(0.3, "prior deviation of an effect in the discrepancy, in typical amplitudes")
+    unseen_effect: float = _chosen(1.0, "the same of one that the calibration log hardly shows, or not at all")
+    least_shown: float = _chosen(
+        0.1, "size of an effect at its typical amplitude, over the errors, from which on it shows"
+    )
     omission_pattern: float = _tuned(0.05, "the same of a pattern, in its units")
     least_omission_gain: float = _chosen(4.0, "gain in the linear model from which on an omitted term is fitted")
     most_omission_fits: int = _chosen(4, "terms that are fitted beside the parameters, those that gain most")
