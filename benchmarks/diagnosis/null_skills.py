@@ -1,8 +1,8 @@
 """Learn what a change that only unseen days tell must take off their errors: more than where there is none.
 
-An effect must exceed `OVER_NULL` times what it took off in any of these logs, a pattern without a name
-`PATTERN_OVER_NULL` times what any of its kind did. Above that stands what every change must take off: the least with
-which none of these logs is told to lack one, each greenhouse judged by the others; of patterns the same.
+An effect must exceed `OVER_NULL` times what it took off in any of these logs, a pattern without a name the same of any
+of its kind. Above that stands what every change must take off: the least with which these logs, each greenhouse judged
+by the others, are told to lack one no more often than they may; of patterns the same.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.diagnosis.null_gains import largest
+from benchmarks.diagnosis.null_gains import FALSE_CLAIMS, largest
 from benchmarks.diagnosis.null_logs import Later
 from benchmarks.jobs import Jobs
 from igrow.trainer.data import prepare_log
@@ -28,9 +28,7 @@ from igrow.trainer.diagnosis.null_gains import NullGains
 from igrow.trainer.diagnosis.rounds import Change, search_of
 
 OVER_NULL = 1.3
-"""Times the most that an effect takes off where nothing has changed."""
-PATTERN_OVER_NULL = 2.0
-"""The same of a pattern, set on tuning greenhouses: many are asked, and what is there takes off more."""
+"""Times the most that an effect, or a kind of patterns, takes off where nothing has changed."""
 Skills = Mapping[str, float]
 """Share of the squared error of unseen days that each takes off; the largest first."""
 
@@ -69,26 +67,27 @@ def _ranked(found: Sequence[CrossValidated]) -> list[CrossValidated]:
     return sorted(found, key=lambda one: -one.skill)
 
 
-def of_each(skills: Sequence[Skills], over_null: float) -> dict[str, float]:
+def of_each(skills: Sequence[Skills]) -> dict[str, float]:
     """Return what each effect, or each kind of patterns, must exceed by itself."""
-    taken = largest([{name: over_null * skill for name, skill in one.items()} for one in skills])
+    taken = largest([{name: OVER_NULL * skill for name, skill in one.items()} for one in skills])
     return {name: skill for name, skill in taken.items() if skill > 0.0}
 
 
-def least_skill(found: Sequence[tuple[str, Skills]], over_null: float) -> float:
-    """Return the least that every change must take off, so that no log is told to lack one by what others take off.
+def least_skill(found: Sequence[tuple[str, Skills]]) -> float:
+    """Return the least that every change must take off, so that few enough logs are told one by what others take off.
 
     Args:
         found: greenhouse and skills of every log.
-        over_null: times what others take off that are told.
     """
-    told = [0.0]
+    told = []
     for greenhouse, skills in found:
-        by_others = of_each([other for name, other in found if name != greenhouse], over_null)
+        by_others = of_each([other for name, other in found if name != greenhouse])
         best, skill = next(iter(skills.items()), ("", 0.0))
-        if skill >= by_others.get(best, 0.0):
+        if skill > 0.0 and skill >= by_others.get(best, 0.0):
             told.append(skill)
-    return (math.floor(1000.0 * max(told)) + 1.0) / 1000.0
+    may = int(FALSE_CLAIMS * len(found))
+    least = sorted((0.0, *told), reverse=True)[min(may, len(told))]
+    return (math.floor(1000.0 * least) + 1.0) / 1000.0
 
 
 def learned(found: Sequence[Told], made: Mapping[str, Any]) -> dict[str, NullGains]:
@@ -99,12 +98,12 @@ def learned(found: Sequence[Told], made: Mapping[str, Any]) -> dict[str, NullGai
         made: provenance of these logs.
     """
     by_file = {
-        null_gains.SKILLS_FILE: ([(one.greenhouse, one.skills) for one in found], OVER_NULL),
-        null_gains.PATTERN_SKILLS_FILE: ([(one.greenhouse, one.patterns) for one in found], PATTERN_OVER_NULL),
+        null_gains.SKILLS_FILE: [(one.greenhouse, one.skills) for one in found],
+        null_gains.PATTERN_SKILLS_FILE: [(one.greenhouse, one.patterns) for one in found],
     }
     return {
-        file: NullGains(of_each([skills for _, skills in those], factor), least_skill(those, factor), made)
-        for file, (those, factor) in by_file.items()
+        file: NullGains(of_each([skills for _, skills in those]), least_skill(those), made)
+        for file, those in by_file.items()
     }
 
 

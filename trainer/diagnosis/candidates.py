@@ -190,8 +190,8 @@ def patterns(record: Record, longitude: float) -> list[tuple[str, tuple[str, ...
             keep = float(np.exp(-record.step / 3600.0))
             table.append((f"an hour after {text}", (driver,), lfilter([1.0 - keep], [1.0, -keep], running)))
     if "global_radiation" not in record.missing:
-        # What a crop grows of goes on being respired when the light is gone: a share of what it has assimilated
-        # (McCree 1970, Prediction and Measurement of Photosynthetic Productivity, Pudoc, 221-229).
+        # A crop that grows respires a share of what it has assimilated, by night too (McCree 1970, Prediction and
+        # Measurement of Photosynthetic Productivity, Pudoc, 221-229).
         table.append(("light of the last days", ("global_radiation", "lamp_power"), light_of_the_last_days(record)))
     days = np.arange(len(record)) * record.step / 86_400.0
     table.append(("from day to day", ("time",), np.asarray(days / 30.0)))
