@@ -231,18 +231,7 @@ def test_leaves_that_wilt_within_the_log_have_a_date_and_are_no_sensor(
     assert worth(told, finding) is None
 
 
-@pytest.mark.parametrize(
-    "left",
-    [
-        0.6,
-        pytest.param(
-            0.67,
-            marks=pytest.mark.xfail(
-                strict=True, reason="since stomata close a third of the light is told from day 8 on"
-            ),
-        ),
-    ],
-)
+@pytest.mark.parametrize("left", [0.6, 0.67])
 def test_a_cover_that_was_painted_some_days_ago_waits_for_a_later_log(
     log: tuple[Telemetry, Telemetry], known_model: FittedModel, left: float
 ) -> None:
