@@ -102,7 +102,7 @@ class DecisionRules:
     least_leading_change: float = _chosen(0.1, "share of its value by which a parameter that leads must have changed")
     least_other_change: float = _chosen(0.2, "the same of one that explains no more than an effect does")
     least_parameter_gain: float = _tuned(20.0, "gain that its change must bring")
-    parameter_over_null: float = _tuned(1.3, "times its largest gain where nothing had changed that it must bring")
+    parameter_over_null: float = _tuned(2.0, "times its largest gain where nothing had changed that it must bring")
     parameter_over_effect: float = _tuned(
         1.1, "times the largest gain of an effect at which it goes before all effects"
     )
