@@ -18,6 +18,7 @@ from igrow.trainer.diagnosis.null_gains import NullGains
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
+from igrow.trainer.fit.model import FittedModel
 from tests.diagnosis.synthetic_design import BALANCES, PLAIN, Truth, make_design
 from tests.virtual_log import SITE, virtual_log
 
@@ -104,6 +105,17 @@ def test_what_a_calibration_log_hardly_shows_may_be_off_by_as_much_as_it_typical
         share = DEFAULT.omission_effect if shows else DEFAULT.unseen_effect
         np.testing.assert_allclose(spread, [share * typical, DEFAULT.omission_pattern])
         values = design.values.copy()
+
+
+def test_a_calibration_in_winter_says_which_effects_it_hardly_showed(known_model: FittedModel) -> None:
+    known = known_model.history
+    assert known is not None
+    of_heat = "photosynthesis_heat_limit:threshold=23"
+    assert of_heat in known.unseen
+    assert "rain_cooling" not in known.unseen
+    left = dict(zip(known.amplitudes.names, known.amplitudes.standard_deviation, strict=True))[of_heat]
+    usual = EFFECTS["photosynthesis_heat_limit"].amplitude.typical
+    assert left > 2.0 * DEFAULT.omission_effect * usual, "it is as little known as before the log"
 
 
 def test_of_an_effect_that_is_new_in_a_later_log_the_calibration_has_said_nothing() -> None:

@@ -35,6 +35,13 @@ def test_the_discrepancy_is_shared_with_what_was_known_before_divided_out() -> N
     assert told.variance == {EFFECT: pytest.approx(1.0 / 3.0)}
 
 
+def test_what_a_log_hardly_showed_is_not_shared() -> None:
+    # Before the log it was known less surely than what is shared, and would seem far larger than it is.
+    model = model_that_misses(0.6, 0.25)
+    assert model.history is not None
+    assert learned_from(replace(model, history=replace(model.history, unseen=(EFFECT,)))).shift == {}
+
+
 def test_what_several_greenhouses_miss_is_expected_of_a_further_one() -> None:
     population = learn_population([Learned({EFFECT: 0.8}, {EFFECT: 0.05})] * 6)
     before = omission((EFFECT, PATTERN), DEFAULT)

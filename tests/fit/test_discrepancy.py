@@ -24,14 +24,15 @@ def known() -> Discrepancy:
     covariance = np.array([[4.0, 1.0], [1.0, 9.0]])
     amplitudes = Gaussian(("parameter:leakage_wind", "heat:cold weather"), np.array([0.5, -2.0]), covariance)
     return Discrepancy(
-        {"leakage_wind": 0.06}, amplitudes, {0: (2.0, 4.5), 2: (1.0, 3.0)}, 900.0, {"lamp_heat": 7.5}, MIDDLE, 12.5
-    )
+        {"leakage_wind": 0.06}, amplitudes, {0: (2.0, 4.5), 2: (1.0, 3.0)}, 900.0, {"lamp_heat": 7.5}, MIDDLE, 12.5,
+        ("heating_valve_leak:threshold=3",),
+    )  # fmt: skip
 
 
 def test_what_is_written_is_read_back() -> None:
     read = Discrepancy.from_bytes(known().to_bytes(), where="discrepancy.npz")
-    assert (read.parameters, read.filters, read.step, read.own_gains, read.middle, read.opening) == (
-        known().parameters, known().filters, known().step, known().own_gains, MIDDLE, 12.5,
+    assert (read.parameters, read.filters, read.step, read.own_gains, read.middle, read.opening, read.unseen) == (
+        known().parameters, known().filters, known().step, known().own_gains, MIDDLE, 12.5, known().unseen,
     )  # fmt: skip
     assert read.amplitudes.names == known().amplitudes.names
     np.testing.assert_array_equal(read.amplitudes.mean, known().amplitudes.mean)

@@ -67,6 +67,7 @@ def history_of(
         own_gains=own_gains(design),
         middle=_middle(record),
         opening=opening_of(record),
+        unseen=tuple(sorted(hardly_shown(design))),
     )
 
 

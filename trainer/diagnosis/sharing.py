@@ -22,7 +22,9 @@ def learned_from(model: FittedModel) -> Learned:
     if model.history is None:
         return found
     found_missing = model.history.amplitudes
-    names = tuple(name for name in found_missing.names if not name.startswith(PARAMETER_PREFIX))
+    # What a log hardly showed it has nothing to tell of.
+    unseen = set(model.history.unseen)
+    names = tuple(name for name in found_missing.names if not (name.startswith(PARAMETER_PREFIX) or name in unseen))
     before = Gaussian(names, np.zeros(len(names)), np.diag(amplitudes.omission(names, DEFAULT) ** 2))
     missing = learned_of(before, found_missing.marginal(names))
     return Learned({**found.shift, **missing.shift}, {**found.variance, **missing.variance})

@@ -41,6 +41,8 @@ class Discrepancy:
     """Of the calibration log, UTC."""
     opening: float = 0.0
     """Of both rows of vents together, %, its mean over the calibration log; 0: not known."""
+    unseen: tuple[str, ...] = ()
+    """Keys of effects that the calibration log hardly showed: less was known of them before it."""
 
     def to_bytes(self) -> bytes:
         """Return the content of a file that holds it: plain arrays and JSON, never a pickle."""
@@ -52,6 +54,7 @@ class Discrepancy:
             "own_gains": dict(self.own_gains),
             "middle": str(self.middle.astype("datetime64[s]")),
             "opening": self.opening,
+            "unseen": self.unseen,
         }
         buffer, below = io.BytesIO(), np.tril_indices(len(self.amplitudes.names), -1)
         np.savez_compressed(
@@ -90,6 +93,7 @@ class Discrepancy:
                 {str(key): float(gain) for key, gain in plain["own_gains"].items()},
                 np.datetime64(plain["middle"], "s"),
                 float(plain.get("opening", 0.0)),
+                tuple(map(str, plain.get("unseen", ()))),
             )
         except Exception as error:
             # A damaged archive raises from zipfile, zlib or numpy; for the user it is one fault.
