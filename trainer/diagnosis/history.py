@@ -19,7 +19,7 @@ from igrow.core.simulator.hybrid.climate import ActiveEffects
 from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
 from igrow.trainer.data.splits import DaySplit, split_days
-from igrow.trainer.diagnosis import candidates, linear, noise, search, sensitivity
+from igrow.trainer.diagnosis import candidates, linear, noise, parameter_change, search, sensitivity
 from igrow.trainer.diagnosis.amplitudes import columns, drift_over, drift_within, hardly_shown, keys, omission
 from igrow.trainer.diagnosis.design import Design, History, of_parts
 from igrow.trainer.diagnosis.freerun import LogDays
@@ -271,11 +271,13 @@ def _middle(record: Record) -> np.datetime64:
 
 
 def own_gains(design: Design) -> dict[str, float]:
-    """Return the largest gain of every effect and pattern in a window of a log, when all is learned on the rest.
+    """Return the largest gain of every effect, pattern and parameter in a window of a log, when all is learned on the
+    rest.
 
     Args:
         design: of the calibration log, under its noise.
     """
+    design = parameter_change.joined(design)
     null, days = design.null_model(), design.split.days
     assert design.history is not None
     change, largest = drift_within(design), dict[str, float]()
@@ -288,7 +290,7 @@ def own_gains(design: Design) -> dict[str, float]:
             window = replace(design, grams=DailyGrams(design.grams.products, inside))
             current = linear.fit(window.grams, LinearModel(null.base, after.precision, after.mean))
             rng = np.random.default_rng(0)
-            for score in (search.score_candidates, search.score_patterns):
+            for score in (search.score_candidates, search.score_patterns, parameter_change.score):
                 for one in score(window, current, [None], rng):
                     largest[one.key] = max(largest.get(one.key, 0.0), one.gain)
     return {key: float(f"{gain:.4g}") for key, gain in largest.items()}

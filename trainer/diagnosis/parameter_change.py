@@ -3,7 +3,7 @@
 A whitened cover, lamps that were taken down, a blocked dosing line: the model has all of it, and only its numbers are
 no longer those of the greenhouse. Recalibration follows such a change without saying so. Asked here is which parameter
 alone explains it: each is left free while everything else has changed since the calibration as physics alone lets
-expect, and must gain more than it did in any greenhouse in which nothing had changed.
+expect, and must gain more than it did in this greenhouse's own calibration log, and in any in which nothing had changed.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ def _told(
         best: the change.
         scored: changes of all parameters.
         net: by parameter, what each gains beyond what it must.
-        largest: gain of an effect.
+        largest: net gain of an effect.
         rng: for the flips.
     """
     rules, onsets = design.rules, search.onset_days(design)
@@ -107,7 +107,7 @@ def _told(
         return None
     design, best = at_its_size(design, best, onsets, rng)
     null = linear.fit(design.grams, design.null_model())
-    leads = best.gain >= rules.parameter_over_effect * largest
+    leads = change.net_gain(design, best) >= rules.parameter_over_effect * largest
     named = linear.fit(design.grams, null.model.with_term(best.term))
     value, low, high = _range(design, best.parameter)
     wide = reach(rules) * linear.deviation_by_day(design.grams, named)

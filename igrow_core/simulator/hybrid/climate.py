@@ -96,9 +96,11 @@ def forcing(xp: Any, inputs: Drivers, parameters: Values, lamp_efficacy: Array) 
     radiation_inside = parameters["transmissivity"] * shade * sun
     sun_par = radiation_inside * _PAR_PER_GLOBAL
     par = sun_par + lamp_efficacy * inputs["lamp_power"]
-    screens = (1.0 - 0.01 * parameters["energy_screen_saving"] * inputs["energy_screen"]) * (
-        1.0 - 0.01 * parameters["blackout_screen_saving"] * inputs["blackout_screen"]
-    )
+    # Two closed screens save less than each does of what the other lets pass.
+    energy = 1.0 - 0.01 * parameters["energy_screen_saving"] * inputs["energy_screen"]
+    blackout = 1.0 - 0.01 * parameters["blackout_screen_saving"] * inputs["blackout_screen"]
+    second = parameters["second_screen_share"]
+    screens = second * energy * blackout + (1.0 - second) * xp.minimum(energy, blackout)
     outdoor = inputs["outdoor_temperature"]
     surroundings = outdoor + parameters["sky_share"] * (inputs["sky_temperature"] - outdoor)
     drivers = dict(inputs) | {

@@ -81,6 +81,17 @@ _ROWS = (
     ),
     ("blackout_screen_saving", "1", 0.4, 0.3, 0.0, 0.9, "the same for the blackout screen", "Bailey (1988)"),
     (
+        "second_screen_share",
+        "1",
+        0.6,
+        0.5,
+        0.0,
+        1.0,
+        "share of its own saving that the lesser of two closed screens adds: 0.7 where both are resistances in "
+        "series, 0 where they are as one",
+        "ISO 6946 (2017)",
+    ),
+    (
         "rail_pipe_heat_transfer",
         "W m-2 K-1",
         2.1,
