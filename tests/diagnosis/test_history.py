@@ -110,11 +110,11 @@ def test_what_a_calibration_log_hardly_shows_may_be_off_by_as_much_as_it_typical
 def test_a_calibration_in_winter_says_which_effects_it_hardly_showed(known_model: FittedModel) -> None:
     known = known_model.history
     assert known is not None
-    of_heat = "photosynthesis_heat_limit:threshold=23"
-    assert of_heat in known.unseen
+    of_midsummer = "structure_shade:azimuth=80:width=12"
+    assert of_midsummer in known.unseen
     assert "rain_cooling" not in known.unseen
-    left = dict(zip(known.amplitudes.names, known.amplitudes.standard_deviation, strict=True))[of_heat]
-    usual = EFFECTS["photosynthesis_heat_limit"].amplitude.typical
+    left = dict(zip(known.amplitudes.names, known.amplitudes.standard_deviation, strict=True))[of_midsummer]
+    usual = EFFECTS["structure_shade"].amplitude.typical
     assert left > 2.0 * DEFAULT.omission_effect * usual, "it is as little known as before the log"
 
 
@@ -152,6 +152,16 @@ def test_own_gains_tell_what_comes_and_goes_in_a_log_without_a_change() -> None:
     assert history.own_gains(steady).get("lamp_heat", 0.0) < 6.0
     assert history.own_gains(comes)["lamp_heat"] > 30.0
     assert history.own_gains(comes).get("rain_cooling", 0.0) < 6.0
+
+
+def test_own_gains_are_of_parameters_too() -> None:
+    steady, other = (make_design(Truth({}, {}, (0.0, share, 0.0)), days=56, seed=4) for share in (0.0, 1.2))
+    values = steady.values.copy()
+    values[0][:, 28:] = other.values[0][:, 28:]
+    calm, comes = (with_history(in_real_parameters(one)) for one in (steady, replace(steady, values=values)))
+    assert history.own_gains(calm).get("parameter:respiration", 0.0) < 6.0
+    assert history.own_gains(comes)["parameter:respiration"] > 30.0
+    assert history.own_gains(comes).get("parameter:vent_wind", 0.0) < 6.0
 
 
 def test_a_change_beyond_the_history_is_named_and_its_own_gain_is_taken_off() -> None:

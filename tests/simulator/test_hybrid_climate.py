@@ -65,6 +65,24 @@ def test_at_rest_every_balance_is_closed() -> None:
     assert abs(fluxes["co2_concentration"][0]) < 1e-10
 
 
+@pytest.mark.parametrize(
+    ("share", "passed"),
+    [(1.0, 0.55 * 0.6), (0.0, 0.55), (0.671, 1.0 / (1.0 / 0.55 + 1.0 / 0.6 - 1.0))],
+    ids=["each of what the other lets pass", "as one", "resistances in series"],
+)
+def test_two_closed_screens_save_less_than_both_and_no_less_than_the_better(share: float, passed: float) -> None:
+    values = nominal(SITE) | {
+        "energy_screen_saving": 0.45, "blackout_screen_saving": 0.4, "second_screen_share": share,
+    }  # fmt: skip
+
+    def let_pass(**closed: float) -> float:
+        return float(climate.forcing(np, steady_inputs(**closed), values, 1.2).drivers["screens"])
+
+    assert let_pass(energy_screen=100.0, blackout_screen=100.0) == pytest.approx(passed, abs=1e-3)
+    assert let_pass(energy_screen=50.0) == pytest.approx(1.0 - 0.5 * 0.45)
+    assert let_pass(blackout_screen=50.0) == pytest.approx(1.0 - 0.5 * 0.4)
+
+
 def test_co2_adds_up_in_a_tight_greenhouse_on_a_still_night() -> None:
     values = nominal(SITE) | {"leakage_still": 0.0, "respiration": 0.36}
     inputs = steady_inputs(wind_speed=0.0, global_radiation=0.0)
