@@ -3,7 +3,7 @@
 A whitened cover, lamps that were taken down, a blocked dosing line: the model has all of it, and only its numbers are
 no longer those of the greenhouse. Recalibration follows such a change without saying so. Asked here is which parameter
 alone explains it: each is left free while everything else has changed since the calibration as physics alone lets
-expect, and must gain more than it did in this greenhouse's own calibration log, and in any in which nothing had changed.
+expect, and must gain more than in this greenhouse's own calibration log, and in any in which nothing had changed.
 """
 
 from __future__ import annotations
