@@ -111,6 +111,21 @@ def settled(design: Design, by_physics: Gaussian, told: Round, rng: np.random.Ge
     return told if chosen is first else change.round_of(design, null, chosen, rng)
 
 
+def clearest(design: Design, by_physics: Gaussian, told: Round, rng: np.random.Generator) -> Round:
+    """Return a round with that pattern which makes unseen days best, among those that gain about as much as its own.
+
+    Arguments are as of `settled`, of a round with a pattern.
+    """
+    (first,) = told.patterns
+    gain = change.net_gain(design, first)
+    least = gain - design.rules.confounded_within(gain)
+    onsets = search.onset_days(design)[:: design.rules.pattern_onset_stride]
+    scored = search.score_patterns(design, linear.fit(design.grams, design.null_model()), onsets, rng)
+    others = [one for one in scored if one.key != first.key and change.net_gain(design, one) >= least]
+    chosen = best(cross_validated(design, by_physics, [first, *others]))
+    return told if chosen is None else replace(told, patterns=(chosen.hypothesis,))
+
+
 def rivals(design: Design, null: linear.Fit, first: Hypothesis, rng: np.random.Generator) -> list[Hypothesis]:
     """Return the hypotheses of other effects that gain nearly as much as the first, or more, with their beginnings."""
     assert design.history is not None

@@ -67,45 +67,45 @@ def find(design: Design, rng: np.random.Generator) -> ParameterChange | None:
     best = max(visible, key=lambda one: net[one.parameter], default=None)
     if best is None or net[best.parameter] < 0.0:
         return None
-    # Of what one thing changes together, and each of it alone, that which explains most: days that scatter say less.
-    # What explains as much alone is still what one thing changes together.
-    own = [
-        one
-        for one in visible
-        if net[one.parameter] >= 0.0 and set(members(one.parameter)) & set(members(best.parameter))
-    ]
-    together = {one.parameter: rules.confounded_gain for one in own if one.parameter in TOGETHER}
-    own.sort(key=lambda one: change.net_gain(design, one) + together.get(one.parameter, 0.0), reverse=True)
+    # Of what one thing changes together, and each of it alone, that which explains most, at its size: a slope says too
+    # little of what changes much. What explains as much alone is still what one thing changes together.
+    family = [one for one in visible if set(members(one.parameter)) & set(members(best.parameter))]
+    sized = [at_its_size(design, one, onsets, rng) for one in family if _may_be(one, net)]
+    # What stands by its slope stands.
+    net |= {
+        one.parameter: max(net[one.parameter], change.proven_gain(its, one) - _needed_gain(its, one))
+        for its, one in sized
+    }
+    together = dict.fromkeys(TOGETHER, rules.confounded_gain)
+    sized.sort(key=lambda two: change.net_gain(*two) + together.get(two[1].parameter, 0.0), reverse=True)
     effects = search.score_candidates(design, null, onsets, rng)
     largest = max((change.net_gain(design, one) for one in effects), default=0.0)
-    told = (_told(design, one, scored, net, largest, rng) for one in own)
+    told = (_told(its, one, scored, net, largest) for its, one in sized if net[one.parameter] >= 0.0)
     return next((one for one in told if one is not None), None)
 
 
+def _may_be(one: Hypothesis, net: Mapping[str, float]) -> bool:
+    """Tell whether a parameter may gain what it must; of what changes together a slope alone does not tell."""
+    return one.parameter in TOGETHER or net[one.parameter] >= 0.0
+
+
 def _told(
-    design: Design,
-    best: Hypothesis,
-    scored: Sequence[Hypothesis],
-    net: Mapping[str, float],
-    largest: float,
-    rng: np.random.Generator,
+    design: Design, best: Hypothesis, scored: Sequence[Hypothesis], net: Mapping[str, float], largest: float
 ) -> ParameterChange | None:
-    """Return a parameter's change at its size; None where it cannot be, or one that nobody can look at explains more.
+    """Return a parameter's change; None where it cannot be, or one that nobody can look at explains more.
 
     Args:
-        design: of the log, with groups of parameters.
+        design: of the log, with the change at its size.
         best: the change.
         scored: changes of all parameters.
         net: by parameter, what each gains beyond what it must.
         largest: net gain of an effect.
-        rng: for the flips.
     """
-    rules, onsets = design.rules, search.onset_days(design)
+    rules = design.rules
     margin = rules.confounded_within(best.gain)
     if max(net.values()) > net[best.parameter] + margin:
         # One that nobody can look at explains it clearly better.
         return None
-    design, best = at_its_size(design, best, onsets, rng)
     null = linear.fit(design.grams, design.null_model())
     leads = change.net_gain(design, best) >= rules.parameter_over_effect * largest
     named = linear.fit(design.grams, null.model.with_term(best.term))

@@ -144,9 +144,11 @@ class Change(Search):
     def judge(self, design: Design, found: Sequence[Estimated], rng: np.random.Generator, *, causes: bool) -> Round:
         """Return what one round finds; where time steps tell nothing, or not which, unseen days are asked."""
         judged = changed(design, _explained(found), rng, causes=causes)
-        if judged.patterns or not causes:
-            return judged
         by_physics = self.knowledge.by_physics(self.rules)
+        if judged.patterns:
+            return cross_validation.clearest(design, by_physics, judged, rng)
+        if not causes:
+            return judged
         if judged.cause is not None:
             return cross_validation.settled(design, by_physics, judged, rng)
         return judged if self.is_later else cross_validation.find(design, by_physics, rng) or judged
