@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from igrow.core.bundle import Estimate
+from igrow.core.effects import EFFECTS
 from igrow.trainer.diagnosis import change, linear, search, sensitivity
 from igrow.trainer.diagnosis.design import Block, Design
 from igrow.trainer.diagnosis.estimate import OnsetInterval, onset_interval, reach
@@ -78,9 +79,16 @@ def find(design: Design, rng: np.random.Generator) -> ParameterChange | None:
     }
     together = dict.fromkeys(TOGETHER, rules.confounded_gain)
     sized.sort(key=lambda two: change.net_gain(*two) + together.get(two[1].parameter, 0.0), reverse=True)
-    effects = search.score_candidates(design, null, onsets, rng)
-    largest = max((change.net_gain(design, one) for one in effects), default=0.0)
-    told = (_told(its, one, scored, net, largest) for its, one in sized if net[one.parameter] >= 0.0)
+    effects = {one.effect: change.net_gain(design, one) for one in search.score_candidates(design, null, onsets, rng)}
+    by_slope = {one.parameter: change.net_gain(design, one) for one in scored}
+
+    def leads(its: Design, one: Hypothesis) -> bool:
+        # An effect that is more of the same is as little linear: these two are compared by their slopes.
+        gains = {True: by_slope[one.parameter], False: change.net_gain(its, one)}
+        same = {name: not set(EFFECTS[name].resembles).isdisjoint(members(one.parameter)) for name in effects}
+        return all(gains[same[name]] >= rules.parameter_over_effect * gain for name, gain in effects.items())
+
+    told = (_told(its, one, scored, net, leads=leads(its, one)) for its, one in sized if net[one.parameter] >= 0.0)
     return next((one for one in told if one is not None), None)
 
 
@@ -90,7 +98,7 @@ def _may_be(one: Hypothesis, net: Mapping[str, float]) -> bool:
 
 
 def _told(
-    design: Design, best: Hypothesis, scored: Sequence[Hypothesis], net: Mapping[str, float], largest: float
+    design: Design, best: Hypothesis, scored: Sequence[Hypothesis], net: Mapping[str, float], *, leads: bool
 ) -> ParameterChange | None:
     """Return a parameter's change; None where it cannot be, or one that nobody can look at explains more.
 
@@ -99,7 +107,7 @@ def _told(
         best: the change.
         scored: changes of all parameters.
         net: by parameter, what each gains beyond what it must.
-        largest: net gain of an effect.
+        leads: it goes before all effects.
     """
     rules = design.rules
     margin = rules.confounded_within(best.gain)
@@ -107,7 +115,6 @@ def _told(
         # One that nobody can look at explains it clearly better.
         return None
     null = linear.fit(design.grams, design.null_model())
-    leads = change.net_gain(design, best) >= rules.parameter_over_effect * largest
     named = linear.fit(design.grams, null.model.with_term(best.term))
     value, low, high = _range(design, best.parameter)
     wide = reach(rules) * linear.deviation_by_day(design.grams, named)
