@@ -231,6 +231,17 @@ def test_leaves_that_wilt_within_the_log_have_a_date_and_are_no_sensor(
     assert worth(told, finding) is None
 
 
+def test_a_leak_keeps_its_name_beside_the_parameter_that_it_is_more_of(
+    log: tuple[Telemetry, Telemetry], known_model: FittedModel
+) -> None:
+    """At its size a parameter gains more than an effect does along its slope, though both are one."""
+    leaking = weeks(GREENHOUSE | {"leakage_wind": GREENHOUSE["leakage_wind"] + 0.12})
+    (finding,) = diagnose(later(log[0], leaking, 9), known_model).findings
+    assert finding.effect == "wind_infiltration"
+    size = finding.parameters["air_changes"]
+    assert size.low < 0.12 < size.high
+
+
 @pytest.mark.parametrize("left", [0.6, 0.67])
 def test_a_cover_that_was_painted_some_days_ago_waits_for_a_later_log(
     log: tuple[Telemetry, Telemetry], known_model: FittedModel, left: float
