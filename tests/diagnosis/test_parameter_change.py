@@ -128,6 +128,17 @@ def test_a_parameter_must_gain_far_more_than_where_nothing_had_changed() -> None
 
 
 @pytest.mark.usefixtures("linear")
+def test_what_a_parameter_must_gain_tells_whether_it_is_told_and_not_before_which() -> None:
+    """Both have changed; of the one that explains more of the log more is asked."""
+    design = with_parameters(Truth({}, {}, (-3.0, 0.0, -2.7)), 1)
+    assert design.history is not None
+    for usual in (0.0, 60.0):
+        gains = replace(design.history, null_gains=NullGains({"parameter:transmissivity": usual}, 8.0))
+        found = find(replace(design, history=gains), np.random.default_rng(0))
+        assert found is not None and found.parameter == "transmissivity"
+
+
+@pytest.mark.usefixtures("linear")
 def test_a_change_to_less_than_nothing_is_none() -> None:
     assert find(with_parameters(Truth({}, {}, (-11.0, 0.0, 0.0)), 6), np.random.default_rng(0)) is None
 

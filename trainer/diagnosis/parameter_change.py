@@ -65,8 +65,10 @@ def find(design: Design, rng: np.random.Generator) -> ParameterChange | None:
         and unasked.isdisjoint(members(one.parameter))
         and _range(design, one.parameter)[0] > 0.0
     ]
-    best = max(visible, key=lambda one: net[one.parameter], default=None)
-    if best is None or net[best.parameter] < 0.0:
+    # What each must gain tells which may be told, and not which.
+    proven = (one for one in visible if net[one.parameter] >= 0.0)
+    best = max(proven, key=lambda one: change.proven_gain(design, one), default=None)
+    if best is None:
         return None
     # Of what one thing changes together, and each of it alone, that which explains most, at its size: a slope says too
     # little of what changes much. What explains as much alone is still what one thing changes together.
