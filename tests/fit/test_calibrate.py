@@ -146,7 +146,7 @@ def test_the_alignment_of_the_actuators_is_recovered(telemetry: Telemetry, rows:
 
 
 def test_a_model_tells_what_it_is(model: FittedModel) -> None:
-    assert repr(model) == "FittedModel(virtual: 34 parameters, calibrated on virtual)"
+    assert repr(model) == "FittedModel(virtual: 35 parameters, calibrated on virtual)"
     assert {one.quantity for one in model.errors} == {"air_temperature", "air_humidity", "air_co2"}
     assert all(one.after < one.before for one in model.errors if one.horizon == "24_h")
     text = model.summary()
