@@ -155,12 +155,13 @@ def test_what_gains_little_is_not_asked_of_unseen_days(size: float, told: list[s
 def test_a_rival_may_have_begun_within_the_log() -> None:
     design = with_parameters(Truth({"lamp_heat": 1.0}, {}, onset=16), 1)
     null = linear.fit(design.grams, design.null_model())
-    (rival,) = cross_validation.rivals(design, null, hypothesis("rain_cooling"), rng())
+    scored = search.score_candidates(design, null, search.onset_days(design), rng())
+    (rival,) = cross_validation.rivals(design, hypothesis("rain_cooling"), scored)
     assert (rival.effect, rival.term.onset) == ("lamp_heat", 16)
-    assert cross_validation.rivals(design, null, of(design, "lamp_heat"), rng()) == []
+    assert cross_validation.rivals(design, of(design, "lamp_heat"), scored) == []
     assert design.history is not None
     hidden = replace(design, history=replace(design.history, without=frozenset({"lamp_heat"})))
-    assert cross_validation.rivals(hidden, null, hypothesis("rain_cooling"), rng()) == []
+    assert cross_validation.rivals(hidden, hypothesis("rain_cooling"), scored) == []
 
 
 def test_beside_a_cause_that_was_found_before_unseen_days_are_asked_with_it(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -93,7 +93,8 @@ def settled(design: Design, by_physics: Gaussian, told: Round, rng: np.random.Ge
     assert told.cause is not None and design.history is not None and design.history.null_gains is not None
     rules, null, known = design.rules, linear.fit(design.grams, design.null_model()), read_null_skills()
     nothing, first = Round(design, null, null, None, ()), told.cause.hypothesis
-    own, *others = cross_validated(design, by_physics, [first, *rivals(design, null, first, rng)])
+    scored = search.score_candidates(design, null, search.onset_days(design), rng)
+    own, *others = cross_validated(design, by_physics, [first, *rivals(design, first, scored)])
     rival = best(others)
     # What makes days worse that no fit saw is no rival.
     if rival is not None and rival.skill > max(own.skill, 0.0):
@@ -117,22 +118,24 @@ def clearest(design: Design, by_physics: Gaussian, told: Round, rng: np.random.G
     Arguments are as of `settled`, of a round with a pattern.
     """
     (first,) = told.patterns
-    gain = change.net_gain(design, first)
-    least = gain - design.rules.confounded_within(gain)
-    onsets = search.onset_days(design)[:: design.rules.pattern_onset_stride]
-    scored = search.score_patterns(design, linear.fit(design.grams, design.null_model()), onsets, rng)
-    others = [one for one in scored if one.key != first.key and change.net_gain(design, one) >= least]
-    chosen = best(cross_validated(design, by_physics, [first, *others]))
+    null, onsets = linear.fit(design.grams, design.null_model()), search.onset_days(design)
+    scored = search.score_patterns(design, null, onsets[:: design.rules.pattern_onset_stride], rng)
+    chosen = best(cross_validated(design, by_physics, [first, *rivals(design, first, scored)]))
     return told if chosen is None else replace(told, patterns=(chosen.hypothesis,))
 
 
-def rivals(design: Design, null: linear.Fit, first: Hypothesis, rng: np.random.Generator) -> list[Hypothesis]:
-    """Return the hypotheses of other effects that gain nearly as much as the first, or more, with their beginnings."""
+def rivals(design: Design, first: Hypothesis, scored: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Return the other hypotheses that gain nearly as much as the first, or more, and may be told.
+
+    Args:
+        design: of the log, with its greenhouse's history.
+        first: an effect or a pattern.
+        scored: effects or patterns, each with its beginning.
+    """
     assert design.history is not None
     gain = change.net_gain(design, first)
     least = gain - design.rules.confounded_within(gain)
-    scored = search.score_candidates(design, null, search.onset_days(design), rng)
-    asked = (one for one in scored if one.effect not in {first.effect, *design.history.without})
+    asked = (one for one in scored if one.key != first.key and one.effect not in design.history.without)
     return [one for one in asked if change.net_gain(design, one) >= least]
 
 
