@@ -13,7 +13,7 @@ from igrow.core.arrays import Floats
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.trainer.data.splits import folds
 from igrow.trainer.diagnosis import DEFAULT, change, cross_validation, linear, rounds, search
-from igrow.trainer.diagnosis.candidates import Candidate
+from igrow.trainer.diagnosis.candidates import Candidate, Pattern
 from igrow.trainer.diagnosis.compare import Contender, Round
 from igrow.trainer.diagnosis.cross_validation import CrossValidated, cross_validated
 from igrow.trainer.diagnosis.design import Design
@@ -222,6 +222,36 @@ def test_what_gains_little_more_than_it_must_unseen_days_must_show(
     assert settled_as(begun, ([0.0] * 4, [0.014] * 4), proven, monkeypatch) == ""
     assert settled_as(begun, ([0.0] * 4, [0.016] * 4), proven, monkeypatch) == "other"
     assert settled_as(begun, ([0.0] * 4, [0.014] * 4), proven + 14.0, monkeypatch) == "other"
+
+
+@pytest.mark.parametrize(
+    ("pattern", "proven", "told"),
+    [
+        ([0.05, 0.06, 0.05, 0.06], 15.0, "pattern"),
+        # It must do so by as much as a cause must, and surely.
+        ([0.042, 0.041, 0.042, 0.041], 15.0, "first"),
+        ([0.3, -0.01, -0.02, -0.03], 15.0, "first"),
+        # Steps tell the name by far.
+        ([0.05, 0.06, 0.05, 0.06], 21.0, "first"),
+    ],
+)
+def test_a_pattern_that_outdoes_a_name_on_unseen_days_stands_in_its_place(
+    pattern: list[float], proven: float, told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plain = with_parameters(Truth({}, {}), 1)
+    assert plain.history is not None
+    design = replace(plain, history=replace(plain.history, null_gains=NullGains({}, 8.0)))
+    null, first = linear.fit(design.grams, design.null_model()), hypothesis("first")
+    course = replace(first, cause=Pattern("heat", "05 to 09 h", ("hour",)))
+    asked = [CrossValidated(first, np.full((2, 4), 0.04)), CrossValidated(course, np.array([pattern, pattern]))]
+    monkeypatch.setattr(search, "score_patterns", lambda *_: [course])
+    monkeypatch.setattr(cross_validation, "cross_validated", lambda *_: asked)
+    monkeypatch.setattr(change, "proven_gain", lambda *_: proven)
+    judged = Round(design, null, null, contender(first), ())
+    found = cross_validation.unless_outdone(design, BY_PHYSICS, judged, rng())
+    assert (found is judged) == (told == "first")
+    assert [one.key for one in found.patterns] == ([] if told == "first" else ["heat:05 to 09 h"])
+    assert (found.cause is None) == (told == "pattern")
 
 
 def test_both_that_is_known_of_everything_else_counts() -> None:

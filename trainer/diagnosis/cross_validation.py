@@ -90,19 +90,17 @@ def settled(design: Design, by_physics: Gaussian, told: Round, rng: np.random.Ge
         told: a round with a cause.
         rng: for flips and bootstraps.
     """
-    assert told.cause is not None and design.history is not None and design.history.null_gains is not None
+    assert told.cause is not None
     rules, null, known = design.rules, linear.fit(design.grams, design.null_model()), read_null_skills()
     nothing, first = Round(design, null, null, None, ()), told.cause.hypothesis
     scored = search.score_candidates(design, null, search.onset_days(design), rng)
     own, *others = cross_validated(design, by_physics, [first, *rivals(design, first, scored)])
     rival = best(others)
     # What makes days worse that no fit saw is no rival.
-    if rival is not None and rival.skill > max(own.skill, 0.0):
-        skills = _drawn([own, rival], rules, rng)
-        if np.mean(skills[1] > skills[0]) >= rules.confidence:
-            own = rival
+    if rival is not None and rival.skill > max(own.skill, 0.0) and _is_surely_better(rival, own, rules, rng):
+        own = rival
     chosen, begun = own.hypothesis, own.hypothesis.term.onset is not None
-    over_null = change.proven_gain(design, chosen) / design.history.null_gains.needed(chosen.effect)
+    over_null = _over_null(design, chosen)
     if over_null < 1.0:
         return nothing if begun or own.skill < known.needed(chosen.effect) else _by_days(design, null, own, rng)
     # A beginning was searched for among all days.
@@ -110,6 +108,27 @@ def settled(design: Design, by_physics: Gaussian, told: Round, rng: np.random.Ge
     if over_null < rules.far_over_null and own.skill < least:
         return nothing
     return told if chosen is first else change.round_of(design, null, chosen, rng)
+
+
+def unless_outdone(design: Design, by_physics: Gaussian, told: Round, rng: np.random.Generator) -> Round:
+    """Return a round with a cause, or with a pattern in its place that surely makes unseen days better by more.
+
+    What the catalogue does not hold borrows the name that comes nearest. That something has changed the name's own gain
+    or skill has shown; a pattern that outdoes it by what a cause must do for itself says better what. Where steps tell
+    a name by far, days hardly say more: no law is quite the plant's, and a pattern may be off by less.
+
+    Arguments are as of `settled`.
+    """
+    assert told.cause is not None
+    rules, null, first = design.rules, linear.fit(design.grams, design.null_model()), told.cause.hypothesis
+    if _over_null(design, first) >= rules.far_over_null:
+        return told
+    patterns = search.score_patterns(design, null, [None], rng)
+    own, *others = cross_validated(design, by_physics, [first, *patterns])
+    rival = best(others)
+    if rival is None or rival.skill < own.skill + rules.least_skill or not _is_surely_better(rival, own, rules, rng):
+        return told
+    return Round(design, null, null, None, (rival.hypothesis,))
 
 
 def clearest(design: Design, by_physics: Gaussian, told: Round, rng: np.random.Generator) -> Round:
@@ -228,6 +247,19 @@ def _falls(
     whole = np.maximum(before.sum(axis=-1, keepdims=True), 1e-300)
     falls: Floats = np.mean((before - after) / whole, axis=1)
     return falls
+
+
+def _over_null(design: Design, one: Hypothesis) -> float:
+    """Return what an effect surely gains, over what it must."""
+    assert design.history is not None and design.history.null_gains is not None
+    return change.proven_gain(design, one) / design.history.null_gains.needed(one.effect)
+
+
+def _is_surely_better(
+    one: CrossValidated, other: CrossValidated, rules: DecisionRules, rng: np.random.Generator
+) -> bool:
+    one_drawn, other_drawn = _drawn([one, other], rules, rng)
+    return bool(np.mean(one_drawn > other_drawn) >= rules.confidence)
 
 
 def _drawn(found: Sequence[CrossValidated], rules: DecisionRules, rng: np.random.Generator) -> Floats:

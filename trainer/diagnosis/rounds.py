@@ -150,8 +150,10 @@ class Change(Search):
         if not causes:
             return judged
         if judged.cause is not None:
-            return cross_validation.settled(design, by_physics, judged, rng)
-        return judged if self.is_later else cross_validation.find(design, by_physics, rng) or judged
+            judged = cross_validation.settled(design, by_physics, judged, rng)
+        elif not self.is_later:
+            judged = cross_validation.find(design, by_physics, rng) or judged
+        return judged if judged.cause is None else cross_validation.unless_outdone(design, by_physics, judged, rng)
 
     def design(self, terms: Sequence[ActiveTerm], interval: float) -> Design:
         """Return the design of a model with terms, about the calibrated parameters."""
