@@ -20,6 +20,7 @@ from igrow.trainer.diagnosis.correction import (
     may_give_way,
     same_in_all_regimes,
     stands,
+    until_outdone,
     with_parameter,
 )
 from igrow.trainer.diagnosis.estimate import Estimated, OnsetInterval
@@ -154,6 +155,13 @@ def test_no_parameter_takes_the_place_of_a_cause_in_a_balance_whose_twin_it_may_
     assert may_give_way([of("humidity_offset")])
     assert not may_give_way([of("wind_infiltration")])
     assert not may_give_way([of("humidity_offset"), of("wind_infiltration")])
+
+
+def test_a_name_that_a_pattern_outdoes_goes_and_what_was_found_beside_it() -> None:
+    first, second, third = of("humidity_offset"), of("rain_cooling"), of("wind_infiltration")
+    course = Hypothesis(Pattern("co2", "05 to 09 h", ("hour",)), Term(0), 9.0, 1.0, 4.0, 0.001)
+    assert until_outdone([first, second]) == ([first, second], ())
+    assert until_outdone([first, replace(second, outdone_by=course), third]) == ([first], (course,))
 
 
 class DaysThatErr:

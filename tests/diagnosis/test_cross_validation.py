@@ -225,18 +225,18 @@ def test_what_gains_little_more_than_it_must_unseen_days_must_show(
 
 
 @pytest.mark.parametrize(
-    ("pattern", "proven", "told"),
+    ("pattern", "proven", "outdone"),
     [
-        ([0.05, 0.06, 0.05, 0.06], 15.0, "pattern"),
+        ([0.05, 0.06, 0.05, 0.06], 15.0, True),
         # It must do so by as much as a cause must, and surely.
-        ([0.042, 0.041, 0.042, 0.041], 15.0, "first"),
-        ([0.3, -0.01, -0.02, -0.03], 15.0, "first"),
+        ([0.042, 0.041, 0.042, 0.041], 15.0, False),
+        ([0.3, -0.01, -0.02, -0.03], 15.0, False),
         # Steps tell the name by far.
-        ([0.05, 0.06, 0.05, 0.06], 21.0, "first"),
+        ([0.05, 0.06, 0.05, 0.06], 21.0, False),
     ],
 )
-def test_a_pattern_that_outdoes_a_name_on_unseen_days_stands_in_its_place(
-    pattern: list[float], proven: float, told: str, monkeypatch: pytest.MonkeyPatch
+def test_a_pattern_may_outdo_a_name_on_unseen_days(
+    pattern: list[float], proven: float, outdone: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plain = with_parameters(Truth({}, {}), 1)
     assert plain.history is not None
@@ -248,10 +248,8 @@ def test_a_pattern_that_outdoes_a_name_on_unseen_days_stands_in_its_place(
     monkeypatch.setattr(cross_validation, "cross_validated", lambda *_: asked)
     monkeypatch.setattr(change, "proven_gain", lambda *_: proven)
     judged = Round(design, null, null, contender(first), ())
-    found = cross_validation.unless_outdone(design, BY_PHYSICS, judged, rng())
-    assert (found is judged) == (told == "first")
-    assert [one.key for one in found.patterns] == ([] if told == "first" else ["heat:05 to 09 h"])
-    assert (found.cause is None) == (told == "pattern")
+    found = cross_validation.with_what_outdoes_it(design, BY_PHYSICS, judged, rng())
+    assert found == replace(judged, outdone_by=course if outdone else None)
 
 
 def test_both_that_is_known_of_everything_else_counts() -> None:

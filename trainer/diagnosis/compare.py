@@ -65,6 +65,8 @@ class Round:
     cause: Contender | None
     patterns: tuple[Hypothesis, ...]
     """What fits in place of a cause, where none explains what is there."""
+    outdone_by: Hypothesis | None = None
+    """A pattern that unseen days tell better than the cause."""
 
 
 def compare(design: Design, explained: float, rng: np.random.Generator, *, causes: bool = True) -> Round:

@@ -129,6 +129,17 @@ def may_give_way(kept: Sequence[Estimated]) -> bool:
     return all(EFFECTS[one.effect].kind == "sensor" for one in kept)
 
 
+def until_outdone(kept: Sequence[Estimated]) -> tuple[Sequence[Estimated], tuple[Hypothesis, ...]]:
+    """Return the causes before the first that a pattern outdoes, and that pattern; all causes where none is outdone.
+
+    That name is borrowed, and what was found beside it may be too.
+    """
+    for place, one in enumerate(kept):
+        if one.outdone_by is not None:
+            return kept[:place], (one.outdone_by,)
+    return kept, ()
+
+
 def explains_as_well(kept: Sequence[Estimated], parameter: ParameterChange, rules: DecisionRules) -> bool:
     """Tell whether causes explain so much of a log that they may stand in the place of a parameter that leads.
 

@@ -110,25 +110,25 @@ def settled(design: Design, by_physics: Gaussian, told: Round, rng: np.random.Ge
     return told if chosen is first else change.round_of(design, null, chosen, rng)
 
 
-def unless_outdone(design: Design, by_physics: Gaussian, told: Round, rng: np.random.Generator) -> Round:
-    """Return a round with a cause, or with a pattern in its place that surely makes unseen days better by more.
+def with_what_outdoes_it(design: Design, by_physics: Gaussian, told: Round, rng: np.random.Generator) -> Round:
+    """Return a round with a cause, and with the pattern, if there is one, that surely makes unseen days better by more.
 
-    What the catalogue does not hold borrows the name that comes nearest. That something has changed the name's own gain
-    or skill has shown; a pattern that outdoes it by what a cause must do for itself says better what. Where steps tell
-    a name by far, days hardly say more: no law is quite the plant's, and a pattern may be off by less.
+    What the catalogue does not hold borrows the name that comes nearest. That something has changed a name shows that
+    stands; a pattern that outdoes it by what a cause must do for itself says better what. Where steps tell a name by
+    far, days hardly say more: no law is quite the plant's, and a pattern may be off by less.
 
     Arguments are as of `settled`.
     """
     assert told.cause is not None
-    rules, null, first = design.rules, linear.fit(design.grams, design.null_model()), told.cause.hypothesis
+    rules, first = design.rules, told.cause.hypothesis
     if _over_null(design, first) >= rules.far_over_null:
         return told
-    patterns = search.score_patterns(design, null, [None], rng)
+    patterns = search.score_patterns(design, linear.fit(design.grams, design.null_model()), [None], rng)
     own, *others = cross_validated(design, by_physics, [first, *patterns])
     rival = best(others)
     if rival is None or rival.skill < own.skill + rules.least_skill or not _is_surely_better(rival, own, rules, rng):
         return told
-    return Round(design, null, null, None, (rival.hypothesis,))
+    return replace(told, outdone_by=rival.hypothesis)
 
 
 def clearest(design: Design, by_physics: Gaussian, told: Round, rng: np.random.Generator) -> Round:

@@ -29,6 +29,7 @@ from igrow.trainer.diagnosis.correction import (
     explains_as_well,
     may_give_way,
     predicts_better,
+    until_outdone,
     with_parameter,
 )
 from igrow.trainer.diagnosis.crop import LEAVES_AND_LIGHT, has_new_crop, of_one_crop, with_its_drift
@@ -192,6 +193,9 @@ class _Question:
             rivals_it = bool(last.patterns) or explains_as_well(beside.kept, parameter, rules)
             if rivals_it and (result.parameter is None or predicts_better(days, beside, result, rules)):
                 result, patterns = beside, last.patterns
+        sure, outdoing = until_outdone(result.kept)
+        if outdoing and result.parameter is None and not patterns:
+            result, patterns = correct(days, knowledge, sure, outdoing, site.longitude, rules), outdoing
         explained = bool(completed.found or result.kept or result.parameter or patterns)
         if not (explained or nothing_asked) and (patterns := search.unexplained(rng)):
             result = correct(days, knowledge, (), patterns, site.longitude, rules)

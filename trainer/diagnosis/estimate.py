@@ -59,6 +59,8 @@ class Estimated:
     """The same of a change, where parameters change as physics alone lets expect."""
     over_null: float = 0.0
     """Gain of a change over what it must gain: more than it did wherever nothing had changed."""
+    outdone_by: Hypothesis | None = None
+    """A pattern that unseen days tell better."""
 
     @property
     def effect(self) -> str:
@@ -89,6 +91,7 @@ def estimate(found: Round, rng: np.random.Generator) -> Estimated | None:
         found.cause.bootstrap_p,
         dict(zip(design.prior.names, shift.tolist(), strict=True)),
         over_null=0.0 if known is None else change.proven_gain(design, hypothesis) / known.needed(hypothesis.effect),
+        outdone_by=found.outdone_by,
     )
 
 

@@ -153,7 +153,9 @@ class Change(Search):
             judged = cross_validation.settled(design, by_physics, judged, rng)
         elif not self.is_later:
             judged = cross_validation.find(design, by_physics, rng) or judged
-        return judged if judged.cause is None else cross_validation.unless_outdone(design, by_physics, judged, rng)
+        if judged.cause is None:
+            return judged
+        return cross_validation.with_what_outdoes_it(design, by_physics, judged, rng)
 
     def design(self, terms: Sequence[ActiveTerm], interval: float) -> Design:
         """Return the design of a model with terms, about the calibrated parameters."""
