@@ -40,8 +40,7 @@ def changed(design: Design, explained: float, rng: np.random.Generator, *, cause
         needed = max(rules.least_pattern_change, rules.pattern_over_change * gained, explained)
         if net_gain(design, pattern) >= needed and proven_gain(design, pattern) >= rules.least_proven_pattern:
             return replace(nothing, patterns=(pattern,))
-    assert design.history is not None and design.history.null_gains is not None
-    if cause is None or proven_gain(design, cause) < design.history.null_gains.needed(cause.effect):
+    if cause is None or over_null(design, cause) < 1.0:
         return nothing
     left = max(rules.least_left_by_hour, rules.left_by_hour_share * net_gain(design, cause))
     if pattern is not None and left_by_hour(design, null, cause, rng) >= left:
@@ -84,6 +83,13 @@ def proven_gain(design: Design, one: Hypothesis) -> float:
     if by_days >= by_noise or by_days <= 0.0:
         return min(by_noise, by_days)
     return math.sqrt(by_noise * by_days)
+
+
+def over_null(design: Design, one: Hypothesis) -> float:
+    """Return what an effect surely gains, over what it must; 0 where no history tells what that is."""
+    if design.history is None or design.history.null_gains is None:
+        return 0.0
+    return proven_gain(design, one) / design.history.null_gains.needed(one.effect)
 
 
 def round_of(design: Design, null: Fit, cause: Hypothesis, rng: np.random.Generator) -> Round:

@@ -100,7 +100,7 @@ def settled(design: Design, by_physics: Gaussian, told: Round, rng: np.random.Ge
     if rival is not None and rival.skill > max(own.skill, 0.0) and _is_surely_better(rival, own, rules, rng):
         own = rival
     chosen, begun = own.hypothesis, own.hypothesis.term.onset is not None
-    over_null = _over_null(design, chosen)
+    over_null = change.over_null(design, chosen)
     if over_null < 1.0:
         return nothing if begun or own.skill < known.needed(chosen.effect) else _by_days(design, null, own, rng)
     # A beginning was searched for among all days.
@@ -121,7 +121,7 @@ def with_what_outdoes_it(design: Design, by_physics: Gaussian, told: Round, rng:
     """
     assert told.cause is not None
     rules, first = design.rules, told.cause.hypothesis
-    if _over_null(design, first) >= rules.far_over_null:
+    if change.over_null(design, first) >= rules.far_over_null:
         return told
     patterns = search.score_patterns(design, linear.fit(design.grams, design.null_model()), [None], rng)
     own, *others = cross_validated(design, by_physics, [first, *patterns])
@@ -247,12 +247,6 @@ def _falls(
     whole = np.maximum(before.sum(axis=-1, keepdims=True), 1e-300)
     falls: Floats = np.mean((before - after) / whole, axis=1)
     return falls
-
-
-def _over_null(design: Design, one: Hypothesis) -> float:
-    """Return what an effect surely gains, over what it must."""
-    assert design.history is not None and design.history.null_gains is not None
-    return change.proven_gain(design, one) / design.history.null_gains.needed(one.effect)
 
 
 def _is_surely_better(

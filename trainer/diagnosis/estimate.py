@@ -80,7 +80,6 @@ def estimate(found: Round, rng: np.random.Generator) -> Estimated | None:
     shape = _shape(design, null, hypothesis)
     count = len(design.block("parameter"))
     shift = found.named.solution.coefficients[:count] - null.solution.coefficients[:count]
-    known = None if design.history is None else design.history.null_gains
     return Estimated(
         hypothesis,
         ActiveTerm(hypothesis.effect, amplitude, shape, None if onset is None else onset.time),
@@ -90,7 +89,7 @@ def estimate(found: Round, rng: np.random.Generator) -> Estimated | None:
         _confounded(design, null, hypothesis, gain, rng),
         found.cause.bootstrap_p,
         dict(zip(design.prior.names, shift.tolist(), strict=True)),
-        over_null=0.0 if known is None else change.proven_gain(design, hypothesis) / known.needed(hypothesis.effect),
+        over_null=change.over_null(design, hypothesis),
         outdone_by=found.outdone_by,
     )
 
