@@ -107,8 +107,9 @@ class LogDays:
         start: Mapping[str, float] | None,
         added: Mapping[str, Floats] | None,
     ) -> Gaussian:
-        record, runs, effects = self.record, self.runs, activate(self.record, terms)
-        counted = (runs.weight & self.split.fit[runs.day][None, :, None]).ravel()
+        record, effects = self.record, activate(self.record, terms)
+        runs = self.runs.on(self.split.fit)
+        counted = runs.weight.ravel()
         low, high = bounds(prior.names)
         begin = np.array([(start or prior.values)[name] for name in prior.names])
 

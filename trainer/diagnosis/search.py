@@ -79,6 +79,7 @@ def scan(
     days = np.flatnonzero(grams.fit)
     coefficients = np.concatenate([[1.0], current.solution.coefficients])
     joint = current.products[days]
+    among = np.ascontiguousarray(joint[:, 1:, 1:])
     # Products of every scored column with [residual, base, terms], by day.
     cross = _cross(grams, active, model.terms, columns)[days]
     own = grams.products[days][:, columns, columns]
@@ -102,7 +103,7 @@ def scan(
         day_curvature = (
             square
             - 2.0 * np.einsum("dcp,cp->dc", part[:, :, 1:], weights)
-            + np.einsum("cp,dpq,cq->dc", weights, joint[:, 1:, 1:], weights, optimize=True)
+            + np.einsum("dcq,cq->dc", weights @ among, weights)
         )
         score[place] = (part @ coefficients).sum(axis=0)
         curvature[place] = square.sum(axis=0) - np.einsum("cp,cp->c", part.sum(axis=0)[:, 1:], weights)

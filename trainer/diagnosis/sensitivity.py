@@ -12,7 +12,7 @@ Sensitivities to all parameters, effects and patterns come from batches of such 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -51,6 +51,11 @@ class DayRuns:
     def samples(self) -> Integers:
         """Sample of the record that each step ends at, (r, steps)."""
         return self.starts[:, None] + 1 + np.arange(self.steps)
+
+    def on(self, days: Mask) -> DayRuns:
+        """Return the runs of some days, (days,)."""
+        kept = days[self.day]
+        return replace(self, starts=self.starts[kept], day=self.day[kept], weight=self.weight[:, kept])
 
 
 def day_runs(record: Record, day: Integers) -> DayRuns:

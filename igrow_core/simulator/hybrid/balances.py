@@ -44,7 +44,7 @@ def balances(xp: Any, state: Values, drivers: Drivers, parameters: Values, added
         parameters: by name.
         added: what effects, a learned residual model or a disturbance add, by channel.
     """
-    temperature, vapour, co2, mass, soil = (state[name] for name in STATES)
+    temperature, vapour, co2, mass, _ = (state[name] for name in STATES)
     height = drivers["mean_height"]
     outdoor = drivers["outdoor_temperature"]
     low, top = exchanged(xp, drivers, added)
@@ -106,17 +106,12 @@ def balances(xp: Any, state: Values, drivers: Drivers, parameters: Values, added
     )
     co2_conductance = exchange + 0.5 * drivers["assimilation"] / xp.maximum(co2, 0.0 * co2 + _LEAST_CO2)
 
-    to_soil = parameters["soil_heat_transfer"] * (mass - soil)
-    mass_flux = to_mass + parameters["mass_solar_share"] * sun - to_soil
-    mass_conductance = parameters["mass_heat_transfer"] + parameters["soil_heat_transfer"]
-    mass_capacity = 1000.0 * parameters["mass_heat_capacity"]
     air_capacity = parameters["heat_capacity_factor"] * air.VOLUMETRIC_HEAT * height
     found = {
         "air_temperature": (heat, heat_conductance, air_capacity),
         "vapour_concentration": (vapour_flux, vapour_conductance, height),
         "co2_concentration": (co2_flux, co2_conductance, height),
-        "mass_temperature": (mass_flux, mass_conductance, mass_capacity),
-        "soil_temperature": (to_soil, parameters["soil_heat_transfer"], _SOIL_HEAT_CAPACITY + 0.0 * mass),
+        **below_the_air(state, sun, parameters),
     }
     # Without wind, vents, leaks and light nothing pulls CO2 back: its balance is then a plain sum.
     of = {
@@ -124,3 +119,24 @@ def balances(xp: Any, state: Values, drivers: Drivers, parameters: Values, added
         for name, (flux, conductance, capacity) in found.items()
     }
     return Balances(of, moistened)
+
+
+def below_the_air(state: Values, sun: Array, parameters: Values) -> dict[str, tuple[Array, Array, Array]]:
+    """Return the balances of floor and soil, as `Balances.of`; nothing else of the air than its temperature moves them.
+
+    Args:
+        state: `STATES` by name, of which the temperatures are read.
+        sun: radiation inside, W m-2.
+        parameters: by name.
+    """
+    temperature, mass, soil = (state[name] for name in ("air_temperature", "mass_temperature", "soil_temperature"))
+    to_mass, to_soil = parameters["mass_heat_transfer"], parameters["soil_heat_transfer"]
+    flux = to_soil * (mass - soil)
+    return {
+        "mass_temperature": (
+            to_mass * (temperature - mass) + parameters["mass_solar_share"] * sun - flux,
+            to_mass + to_soil,
+            1000.0 * parameters["mass_heat_capacity"],
+        ),
+        "soil_temperature": (flux, to_soil, _SOIL_HEAT_CAPACITY + 0.0 * mass),
+    }

@@ -89,12 +89,8 @@ class Forcing:
 
 def forcing(xp: Any, inputs: Drivers, parameters: Values, lamp_efficacy: Array) -> Forcing:
     """Return what of the drivers no state changes; arguments as `derive`'s."""
-    shade = (1.0 - 0.01 * _ENERGY_SCREEN_SHADE * inputs["energy_screen"]) * (
-        1.0 - 0.01 * _BLACKOUT_SCREEN_SHADE * inputs["blackout_screen"]
-    )
-    sun = xp.maximum(inputs["global_radiation"], 0.0 * inputs["global_radiation"])
-    radiation_inside = parameters["transmissivity"] * shade * sun
-    sun_par = radiation_inside * _PAR_PER_GLOBAL
+    radiation = radiation_inside(xp, inputs, parameters)
+    sun_par = radiation * _PAR_PER_GLOBAL
     par = sun_par + lamp_efficacy * inputs["lamp_power"]
     # Two closed screens save less than each does of what the other lets pass.
     energy = 1.0 - 0.01 * parameters["energy_screen_saving"] * inputs["energy_screen"]
@@ -106,7 +102,7 @@ def forcing(xp: Any, inputs: Drivers, parameters: Values, lamp_efficacy: Array) 
     drivers = dict(inputs) | {
         "par": par,
         "sun_share_of_par": sun_par / (par + 1e-3),
-        "radiation_inside": radiation_inside,
+        "radiation_inside": radiation,
         "outdoor_vapour_concentration": air.vapour_concentration(xp, outdoor, inputs["outdoor_humidity"]),
         "outdoor_co2_concentration": air.co2_concentration(outdoor, inputs["outdoor_co2"]),
         "screens": screens,
@@ -117,6 +113,15 @@ def forcing(xp: Any, inputs: Drivers, parameters: Values, lamp_efficacy: Array) 
         forcing_above(xp, screens, surroundings, inputs, parameters),
         forcing_canopy(xp, drivers, inputs, parameters),
     )
+
+
+def radiation_inside(xp: Any, inputs: Drivers, parameters: Values) -> Array:
+    """Return the short-wave radiation that passes cover and screens, W m-2."""
+    shade = (1.0 - 0.01 * _ENERGY_SCREEN_SHADE * inputs["energy_screen"]) * (
+        1.0 - 0.01 * _BLACKOUT_SCREEN_SHADE * inputs["blackout_screen"]
+    )
+    sun = xp.maximum(inputs["global_radiation"], 0.0 * inputs["global_radiation"])
+    return parameters["transmissivity"] * shade * sun
 
 
 def derive(xp: Any, state: Values, inputs: Drivers, parameters: Values, lamp_efficacy: Array) -> dict[str, Array]:
@@ -238,9 +243,8 @@ def initial_state(
         "mass_temperature": climate.get("mass_temperature", temperature),
         "soil_temperature": climate.get("soil_temperature", temperature),
     }
-    drivers = derive(xp, state, inputs, parameters, lamp_efficacy)
-    for name, values in effects.items():
-        memory = EFFECTS[name].memory
-        if memory is not None:
-            state[memory_name(name)] = memory.start(xp, drivers, values)
+    memories = {name: memory for name in effects if (memory := EFFECTS[name].memory) is not None}
+    if memories:
+        drivers = derive(xp, state, inputs, parameters, lamp_efficacy)
+        state |= {memory_name(name): memory.start(xp, drivers, effects[name]) for name, memory in memories.items()}
     return state

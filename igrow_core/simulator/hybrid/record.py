@@ -5,6 +5,7 @@ Row k of a record holds the measurements at its time, and the inputs from that t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -16,7 +17,7 @@ from igrow.core.arrays import Array, Floats, Integers, Mask, Times
 from igrow.core.effects import EFFECTS
 from igrow.core.effects.definition import Values
 from igrow.core.simulator.hybrid import climate, measurement
-from igrow.core.simulator.hybrid.balances import balances
+from igrow.core.simulator.hybrid.balances import below_the_air
 from igrow.core.simulator.hybrid.climate import ActiveEffects, Forcing, memory_name
 
 SUBSTEP = 900.0
@@ -93,9 +94,10 @@ def observe(record: Record, parameters: Values, effects: ActiveEffects) -> dict[
         errors = measurement.sensor_errors(np, raw_drivers, raw_state, effects)
         clean = {name: values - errors.get(name, 0.0) for name, values in clean.items()}
     state = climate.initial_state(np, clean, record.inputs, parameters, effects, record.lamp_efficacy)
-    drivers = climate.derive(np, state, record.inputs, parameters, record.lamp_efficacy)
-    state["mass_temperature"], state["soil_temperature"] = _run_below(record, state, drivers, parameters)
-    _run_memories(record, state, drivers, effects)
+    state["mass_temperature"], state["soil_temperature"] = _run_below(record, state, parameters)
+    if any(EFFECTS[name].memory is not None for name in effects):
+        drivers = climate.derive(np, state, record.inputs, parameters, record.lamp_efficacy)
+        _run_memories(record, state, drivers, effects)
     shape = (len(record),)
     return {name: np.broadcast_to(v, np.broadcast_shapes(np.shape(v), shape)) for name, v in state.items()}
 
@@ -203,10 +205,9 @@ def bridge(values: Floats, longest: int, *, smooth: bool) -> tuple[Floats, Mask]
     return (gaps.interpolated if smooth else gaps.held)(values), gaps.short_gaps(values, longest)
 
 
-def _run_below(record: Record, state: Values, drivers: Values, parameters: Values) -> tuple[Floats, Floats]:
+def _run_below(record: Record, state: Values, parameters: Values) -> tuple[Floats, Floats]:
     """Run the balances of floor and soil under the measured air; return both temperatures."""
-    added: dict[str, Array] = {}
-    parts = balances(np, state, drivers, parameters, added).of
+    parts = below_the_air(state, climate.radiation_inside(np, record.inputs, parameters), parameters)
     flux, conductance, capacity = parts["mass_temperature"]
     _, soil_conductance, soil_capacity = parts["soil_temperature"]
     # The floor is drawn to `aim`, less by so much as the soil is colder than where both stand now.
@@ -215,29 +216,53 @@ def _run_below(record: Record, state: Values, drivers: Values, parameters: Value
     share = 1.0 - np.exp(-record.step * conductance / capacity)
     soil_share = 1.0 - np.exp(-record.step * soil_conductance / soil_capacity)
     shape = np.broadcast_shapes(np.shape(aim), np.shape(share), (len(record),))
-    aims, shares, pulls, soil_shares = (np.broadcast_to(one, shape).T for one in (aim, share, pulled, soil_share))
     # Start where both would be that have long been under this air.
     rows = max(1, round(86_400.0 / record.step))
-    soil = aims[:rows].mean(axis=0) / (1.0 - pulls[0])
-    mass = soil
-    if len(shape) > 1:
-        course, soil_course = np.empty(shape).T, np.empty(shape).T
-        for k in range(len(record)):
-            course[k], soil_course[k] = mass, soil
-            mass, soil = (
-                mass + (aims[k] + pulls[k] * soil - mass) * shares[k],
-                soil + (mass - soil) * soil_shares[k],
-            )
-        return course.T, soil_course.T
-    # Floats are several times as fast as arrays of one element.
-    floors, soils, warm, below = [], [], float(mass), float(soil)
-    for towards, part, pull, soil_part in zip(
-        aims.tolist(), shares.tolist(), pulls.tolist(), soil_shares.tolist(), strict=True
-    ):
-        floors.append(warm)
-        soils.append(below)
-        warm, below = warm + (towards + pull * below - warm) * part, below + (warm - below) * soil_part
-    return np.array(floors), np.array(soils)
+    aims, pulls = (np.broadcast_to(one, shape).T for one in (aim, pulled))
+    below = aims[:rows].mean(axis=0) / (1.0 - pulls[0])
+    shares, soil_shares = (np.broadcast_to(one, shape).T for one in (share, soil_share))
+    mass, soil = _chained(below, aims, pulls, shares, soil_shares)
+    return mass.T, soil.T
+
+
+def _chained(below: Floats, aims: Floats, pulls: Floats, shares: Floats, soil_shares: Floats) -> tuple[Floats, Floats]:
+    """Return the courses of two temperatures, (n, ...), of which each step goes a share of the way to where it is drawn.
+
+    Stretches of the way run side by side, each from nothing and from a kelvin of either; then one leads to the next.
+
+    Args:
+        below: where both begin, (...).
+        aims: where the first is drawn to, less what the other pulls, (n, ...).
+        pulls: by the other, of its temperature, (n, ...).
+        shares: of the way that the first goes in a step, (n, ...).
+        soil_shares: of its way to the first that the other goes, (n, ...).
+    """
+    count, shape = len(aims), aims.shape[1:]
+    length = math.isqrt(count) + 1
+    stretches = -(-count // length)
+
+    def side_by_side(values: Floats) -> Floats:
+        padded = np.concatenate([values, np.zeros((stretches * length - count, *shape))])
+        return np.ascontiguousarray(padded.reshape(stretches, length, 1, *shape).swapaxes(0, 1))
+
+    share, soil_share = side_by_side(shares), side_by_side(soil_shares)
+    driven, pull = side_by_side(shares * aims), side_by_side(shares * pulls)
+    kept, soil_kept = 1.0 - share, 1.0 - soil_share
+    # From nothing with what drives it, from a kelvin of the first, from a kelvin of the other.
+    mass, soil = np.zeros((length + 1, stretches, 3, *shape)), np.zeros((length + 1, stretches, 3, *shape))
+    mass[0, :, 1], soil[0, :, 2] = 1.0, 1.0
+    for k in range(length):
+        mass[k + 1] = kept[k] * mass[k] + pull[k] * soil[k]
+        mass[k + 1, :, 0] += driven[k, :, 0]
+        soil[k + 1] = soil_kept[k] * soil[k] + soil_share[k] * mass[k]
+    begins = np.ones((stretches, 3, *shape))
+    begins[0, 1:] = below
+    for place in range(stretches - 1):
+        begins[place + 1, 1] = np.sum(mass[-1, place] * begins[place], axis=0)
+        begins[place + 1, 2] = np.sum(soil[-1, place] * begins[place], axis=0)
+    mass_course, soil_course = (np.sum(one[:-1] * begins, axis=2).swapaxes(0, 1) for one in (mass, soil))
+    whole = (stretches * length, *shape)
+    return mass_course.reshape(whole)[:count], soil_course.reshape(whole)[:count]
 
 
 def _run_memories(record: Record, state: dict[str, Array], drivers: Values, effects: ActiveEffects) -> None:
