@@ -17,9 +17,7 @@ def with_english_halves(text: str) -> str:
             return found[0]
         # A clock that counts from 0 to 11 has no 12.
         hour = re.sub(r"^0?0(?=\D)", "12", found["clock"])
-        halves = halves_of_day().items()
-        half = next(half for spelling, half in halves if re.fullmatch(_pattern(spelling), word, re.IGNORECASE))
-        return f"{hour}{' ' if found['before'] else found['blank']}{half}"
+        return f"{hour}{' ' if found['before'] else found['blank']}{_half(word)}"
 
     return text if text.isascii() and not any(map(str.isalpha, text)) else _clock().sub(english, text)
 
@@ -27,6 +25,13 @@ def with_english_halves(text: str) -> str:
 def is_half(text: str) -> bool:
     """Tell whether a text is a word for a half of the day, and nothing else."""
     return re.fullmatch("|".join(map(_pattern, halves_of_day())), text, re.IGNORECASE) is not None
+
+
+@cache
+def _half(word: str) -> str:
+    """Return ``am`` or ``pm`` for one of the words that `_clock` finds, as it is written."""
+    spellings = halves_of_day().items()
+    return next(half for spelling, half in spellings if re.fullmatch(_pattern(spelling), word, re.IGNORECASE))
 
 
 @cache

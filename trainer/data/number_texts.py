@@ -18,6 +18,9 @@ def number(text: str, decimal: str) -> float | None:
         text: such as ``1.234,5``, ``21.5 °C``, ``8e-06`` or ``4,5-``, where the minus stands behind.
         decimal: the sign before its decimals, ``.`` or ``,``; the other one and blanks are between thousands.
     """
+    # Most are plain, and there are many.
+    if decimal == "." and _PLAIN.fullmatch(text):
+        return float(text)
     text = text.replace("\u2212", "-")
     behind = _MINUS_BEHIND.fullmatch(text)
     if behind is not None:

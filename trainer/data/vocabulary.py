@@ -191,6 +191,7 @@ def compact(text: str) -> str:
     return re.sub(r"[\s.^*·()\[\]{}]", "", folded(text))
 
 
+@cache
 def words_in(name: str) -> frozenset[str]:
     """Return the words that a column's name is made of."""
     split = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)

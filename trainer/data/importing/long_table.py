@@ -28,9 +28,12 @@ def find_long(table: ExportTable, time: Collection[str | None], decimal: str) ->
         labels = set(table[name])
         if not 2 <= len(labels) <= _MOST_NAMES or len(labels) > 0.5 * len(table.lines):
             continue
+        # Numbers name nothing: asked first, since the words of many names take long.
+        if column_texts(table[name], decimal).numeric >= 0.2:
+            continue
         told = {match.quantity for match in names.find_matches(labels, {})}
         value = _value([one for one in others if one != name], table, decimal)
-        if len(told) >= 2 and value is not None and column_texts(table[name], decimal).numeric < 0.2:
+        if len(told) >= 2 and value is not None:
             return LongTable(name, value)
     return None
 
