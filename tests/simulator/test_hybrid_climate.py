@@ -184,6 +184,27 @@ def test_variants_in_one_batch_equal_runs_one_by_one() -> None:
         np.testing.assert_allclose(together["air_temperature"][:, position], alone["air_temperature"], rtol=1e-9)
 
 
+def test_floor_and_soil_follow_the_measured_air_as_the_balances_lead_them() -> None:
+    """Whatever the log's length is to the stretches that are run side by side."""
+    for samples in (1, 2, 150, 577):
+        record = site_record(virtual_log(7, step=900.0), SITE, 900.0).slice(0, samples)
+        values = nominal(SITE)
+        states = records.observe(record, values, {})
+        drivers = climate.derive(np, states, record.inputs, values, record.lamp_efficacy)
+        for k in range(len(record) - 1):
+            now = {name: course[k] for name, course in states.items()}
+            led = climate.step(
+                np,
+                now,
+                {name: np.broadcast_to(v, len(record))[k] for name, v in drivers.items()},
+                values,
+                {},
+                seconds=900.0,
+            )
+            for name in ("mass_temperature", "soil_temperature"):
+                assert states[name][k + 1] == pytest.approx(led[name], rel=1e-9), (name, k)
+
+
 def test_memories_of_variants_equal_those_of_each_alone() -> None:
     # A sensor that the sun warms is corrected by the light inside, which differs from variant to variant; what its
     # housing remembers then differs too.
