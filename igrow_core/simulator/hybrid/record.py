@@ -226,7 +226,7 @@ def _run_below(record: Record, state: Values, parameters: Values) -> tuple[Float
 
 
 def _chained(below: Floats, aims: Floats, pulls: Floats, shares: Floats, soil_shares: Floats) -> tuple[Floats, Floats]:
-    """Return the courses of two temperatures, (n, ...), of which each step goes a share of the way to where it is drawn.
+    """Return the courses of two temperatures, (n, ...), of which each step goes a share of the way to its aim.
 
     Stretches of the way run side by side, each from nothing and from a kelvin of either; then one leads to the next.
 
