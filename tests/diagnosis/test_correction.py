@@ -118,6 +118,13 @@ def test_a_cause_is_the_same_by_day_and_by_night_in_calm_and_in_wind(values: dic
     assert stands(replace(cause(), regimes=regimes), [], DEFAULT) is same
 
 
+@pytest.mark.parametrize(("reach", "same"), [(0.2, False), (0.4, True)])
+def test_a_size_that_is_hardly_known_speaks_against_no_other(reach: float, same: bool) -> None:
+    """By night little is seen of an error by the sun: where it is nothing, or below, may be chance."""
+    regimes = {"day": Estimate(1.0, 0.9, 1.1, "1"), "night": Estimate(-0.05, -0.05 - reach, -0.05 + reach, "1")}
+    assert same_in_all_regimes(regimes, DEFAULT) is same
+
+
 def test_the_corrected_model_keeps_correlations_adds_causes_and_remembers_where_it_was_fitted() -> None:
     model = model_in_force()
     old = EffectRecord("lamp_heat", "process", {"share": Estimate(0.1, 0.0, 0.2, "1")}, ("heat",))

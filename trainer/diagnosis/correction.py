@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -155,12 +156,20 @@ def predicts_better(log: LogDays, one: Corrected, other: Corrected, rules: Decis
 
 
 def same_in_all_regimes(regimes: Mapping[str, Estimate], rules: DecisionRules) -> bool:
-    """Tell whether a cause's size is about the same by day and by night, in calm and in wind, and so on.
+    """Tell whether a cause's size may be about the same by day and by night, in calm and in wind, and so on.
 
-    A regime in which the effect hardly shows has no size of its own.
+    A regime in which the effect hardly shows has no size of its own, and one in which it shows little has none that
+    speaks against another: at night an error by the sun may be anything.
     """
-    pairs = ([regimes[name].value for name in pair] for pair in REGIMES if all(name in regimes for name in pair))
-    return all(a * b > 0.0 and min(a / b, b / a) >= rules.regime_share for a, b in pairs)
+    pairs = ((regimes[one], regimes[other]) for one, other in REGIMES if one in regimes and other in regimes)
+    return not any(_are_apart(one, other, rules.regime_share) for one, other in pairs)
+
+
+def _are_apart(one: Estimate, other: Estimate, share: float) -> bool:
+    """Tell whether the lesser of two sizes is surely less than a share of the larger."""
+    lesser, larger = sorted((one, other), key=lambda size: abs(size.value))
+    short = share * abs(larger.value) - math.copysign(1.0, larger.value) * lesser.value
+    return short > 0.5 * math.hypot(lesser.high - lesser.low, share * (larger.high - larger.low))
 
 
 def _judged(log: LogDays, knowledge: Knowledge, one: Estimated, current: Stage, trial: Stage) -> Estimated:
