@@ -80,7 +80,8 @@ def moved_away(state: Path) -> None:
 
 def replaced_by_a_copy(state: Path) -> None:
     """As by a restore that was made by hand."""
-    shutil.copytree(state, state.with_name("copy"))
+    # A file that the daemon is just writing may be whole, and under its own name, before it is copied.
+    shutil.copytree(state, state.with_name("copy"), ignore=shutil.ignore_patterns("*.part"))
     state.rename(state.with_name("away"))
     state.with_name("copy").rename(state)
 
