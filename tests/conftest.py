@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import os
 from itertools import chain, islice, zip_longest
 from pathlib import Path
@@ -62,12 +61,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         share = list(chain.from_iterable(long[worker::workers]))
         ordered += [*share, *islice(others, max(0, len(items) // workers - len(share)))]
     items[:] = [*ordered, *others]
-
-
-def pytest_collection_finish() -> None:
-    """Leave what was collected to no garbage collection: thousands of tests, walked through again and again."""
-    gc.collect()
-    gc.freeze()
 
 
 @pytest.fixture(scope="session")

@@ -186,9 +186,9 @@ def test_variants_in_one_batch_equal_runs_one_by_one() -> None:
 
 def test_floor_and_soil_follow_the_measured_air_as_the_balances_lead_them() -> None:
     """Whatever the log's length is to the stretches that are run side by side."""
+    whole, values = site_record(virtual_log(7, step=900.0), SITE, 900.0), nominal(SITE)
     for samples in (1, 2, 150, 577):
-        record = site_record(virtual_log(7, step=900.0), SITE, 900.0).slice(0, samples)
-        values = nominal(SITE)
+        record = whole.slice(0, samples)
         states = records.observe(record, values, {})
         drivers = climate.derive(np, states, record.inputs, values, record.lamp_efficacy)
         for k in range(len(record) - 1):

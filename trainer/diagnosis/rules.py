@@ -160,7 +160,7 @@ class DecisionRules:
 
     # Regimes: a cause is the same in all of them.
     regime_share: float = _chosen(
-        0.25, "least ratio of a cause's sizes in two regimes, or by time steps and by free runs"
+        0.25, "ratio of a cause's sizes below which two regimes surely disagree, or time steps and free runs do"
     )
     regime_information: float = _chosen(0.02, "share of the information from which on a regime has a size")
     daylight: float = _chosen(20.0, "global radiation in W m-2 above which it is day")

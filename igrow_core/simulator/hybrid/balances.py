@@ -130,13 +130,10 @@ def below_the_air(state: Values, sun: Array, parameters: Values) -> dict[str, tu
         parameters: by name.
     """
     temperature, mass, soil = (state[name] for name in ("air_temperature", "mass_temperature", "soil_temperature"))
-    to_mass, to_soil = parameters["mass_heat_transfer"], parameters["soil_heat_transfer"]
-    flux = to_soil * (mass - soil)
+    above, below = parameters["mass_heat_transfer"], parameters["soil_heat_transfer"]
+    to_soil = below * (mass - soil)
+    mass_flux = above * (temperature - mass) + parameters["mass_solar_share"] * sun - to_soil
     return {
-        "mass_temperature": (
-            to_mass * (temperature - mass) + parameters["mass_solar_share"] * sun - flux,
-            to_mass + to_soil,
-            1000.0 * parameters["mass_heat_capacity"],
-        ),
-        "soil_temperature": (flux, to_soil, _SOIL_HEAT_CAPACITY + 0.0 * mass),
+        "mass_temperature": (mass_flux, above + below, 1000.0 * parameters["mass_heat_capacity"]),
+        "soil_temperature": (to_soil, below, _SOIL_HEAT_CAPACITY + 0.0 * mass),
     }
