@@ -77,11 +77,14 @@ def opening_of(record: Record) -> float:
 
 
 def vents_hardly_open(known: Discrepancy | None, record: Record, rules: DecisionRules) -> bool:
-    """Tell whether the vents stand open much less than in the calibration log.
+    """Tell whether the vents stand open much less than in the calibration log, or hardly opened then.
 
-    A law that wide openings taught says little of narrow ones: what changes then is its error, or the vents'.
+    A law that wide openings taught says little of narrow ones, and one that none did says nothing: what changes then is
+    its error, or the vents'.
     """
-    return known is not None and opening_of(record) < rules.least_opening_share * known.opening
+    if known is None:
+        return False
+    return known.opening < rules.least_opening or opening_of(record) < rules.least_opening_share * known.opening
 
 
 def jointly(
@@ -143,7 +146,8 @@ def lay_out(
         ("pattern", tuple(one.key for one in patterns), courses[lasting], none, None),
         *((name, (), nothing, none, np.zeros((0, 0))) for name in ("discrepancy", "nuisance", "drift")),
     ]
-    return of_parts(line, split, prior, rules, average, parts, found, patterns)
+    transition = sensitivity.transition(line)[np.ix_(average.balances, average.balances)]
+    return replace(of_parts(line, split, prior, rules, average, parts, found, patterns), transition=transition)
 
 
 def laid_out(
