@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -46,9 +46,8 @@ def gained(job: Later) -> Gained:
     known, site = reference.model.history, reference.greenhouse.site
     assert known is not None
     days = log_days(prepare_log(telemetry, site), reference.model)
-    rules, unasked = DEFAULT, frozenset[str]()
-    if history.vents_hardly_open(known, days.record, rules):
-        rules, unasked = replace(rules, vent_drift=rules.narrow_vent_drift), VENTS
+    rules = history.with_vents(known, days.record, DEFAULT)
+    unasked = VENTS if history.vents_hardly_open(known, days.record, DEFAULT) else frozenset[str]()
     plain = history.laid_out(days, site, known, (), rules)
     design = history.expected(known, plain, history.expected_misfit(known, plain))
     effects = _gains(design, search.score_candidates)

@@ -87,6 +87,12 @@ def vents_hardly_open(known: Discrepancy | None, record: Record, rules: Decision
     return known.opening < rules.least_opening or opening_of(record) < rules.least_opening_share * known.opening
 
 
+def with_vents(known: Discrepancy | None, record: Record, rules: DecisionRules) -> DecisionRules:
+    """Return the rules for a log: where its vents hardly open, their law may be off by more than physics lets drift."""
+    hardly = vents_hardly_open(known, record, rules)
+    return replace(rules, vent_drift=rules.narrow_vent_drift) if hardly else rules
+
+
 def jointly(
     record: Record,
     site: Site,
