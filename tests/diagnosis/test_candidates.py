@@ -13,7 +13,7 @@ from igrow.core.simulator.hybrid.nominal import nominal
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.data import Log
 from igrow.trainer.data.splits import split_days
-from igrow.trainer.diagnosis import candidates, noise, sensitivity
+from igrow.trainer.diagnosis import candidates, sensitivity
 from igrow.trainer.diagnosis.candidates import UNIT_FLUX, Candidate, Pattern
 from igrow.trainer.diagnosis.sensitivity import Linearisation
 from igrow.trainer.fit.solver import DivergenceError
@@ -192,22 +192,3 @@ def test_a_leak_may_be_hidden_where_the_log_has_no_wind_and_not_where_it_has(lin
     blind = replace(line, record=replace(line.record, missing=(*line.record.missing, "wind_speed", "wind_direction")))
     assert candidates.hidden_by_missing_weather(line) == ()
     assert candidates.hidden_by_missing_weather(blind) == ("wind_infiltration",)
-
-
-def test_of_a_pulse_the_models_tangent_leaves_the_step_it_was_given_in(line: Linearisation) -> None:
-    # At noon and at midnight of the fourth day: CO2 and vapour last otherwise under sun and vents.
-    pulse = np.zeros(len(line.record))
-    for hour in (0, 12):
-        pulse[line.runs.starts[3] + 4 * hour + 2] = 1.0
-    columns = sensitivity.flux_sensitivities(
-        line, [({"heat": pulse}, 1.0), ({"vapour": pulse}, 1e-5), ({"co2": pulse}, 1e-6)]
-    )
-    left = noise.one_step_errors(columns, sensitivity.transition(line))
-    for balance in range(3):
-        course = np.abs(left[balance, balance, 3])
-        given = [4 * hour + 2 for hour in (0, 12)]
-        after = np.delete(course, given)
-        assert course[given].min() > 0.0
-        assert after.max() < 0.06 * course[given].max()
-        # Whole errors stay for steps.
-        assert np.abs(columns[balance, balance, 3])[[place + 1 for place in given]].max() > 0.2 * course[given].max()

@@ -52,26 +52,6 @@ def test_balances_that_go_together_become_independent() -> None:
     assert abs(float(np.corrcoef(white.reshape(2, -1))[0, 1])) < 0.05
 
 
-def test_what_the_plant_carries_on_of_errors_is_taken_off_however_long_it_lasts() -> None:
-    # CO2 that leaves in minutes in the first half of each run, in hours in the other.
-    carried = np.where(np.arange(STEPS) < STEPS // 2, 0.2, 0.95) * np.ones((1, 1, RUNS, 1))
-    white, errors = coloured(0.0, 6)[None], np.zeros((1, RUNS, STEPS))
-    for step in range(STEPS):
-        before = errors[..., step - 1] if step else np.zeros((1, RUNS))
-        errors[..., step] = white[..., step] + carried[0, :, :, step] * before
-    np.testing.assert_allclose(noise.one_step_errors(errors, carried)[..., 1:], white[..., 1:])
-    assert noise.one_step_errors(errors, None) is errors
-
-    def lagged(whitening: Whitening) -> list[float]:
-        left = whitening(errors[None])[0, 0]
-        halves = (left[:, 2 : STEPS // 2], left[:, STEPS // 2 :])
-        return [abs(float(np.mean(one[:, 1:] * one[:, :-1]) / np.mean(one**2))) for one in halves]
-
-    assert max(lagged(noise.fit_noise(errors, COUNTED, COUNTED[:, :1], transition=carried))) < 0.06
-    # One filter for both is right for neither.
-    assert max(lagged(noise.fit_noise(errors, COUNTED, COUNTED[:, :1]))) > 0.15
-
-
 def test_the_likelihood_is_that_of_students_t() -> None:
     plain = NoiseFilter(np.ones(1), np.ones(1), (0.0,) * 5)
     whitening = Whitening((plain,), np.array([[1.0 / 0.7]]), np.ones((1, 3)))

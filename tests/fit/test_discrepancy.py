@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import json
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -15,7 +13,7 @@ from igrow.core.bundle import Span
 from igrow.core.errors import IgrowError
 from igrow.trainer.exporting import export, read_model
 from igrow.trainer.fit import FittedModel
-from igrow.trainer.fit.discrepancy import Discrepancy, OutdatedDiscrepancyError
+from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
 from tests.virtual_log import SITE
 
@@ -47,21 +45,6 @@ def test_a_damaged_file_is_named_in_one_line() -> None:
     assert "\n" not in str(raised.value)
 
 
-def of_an_earlier_version() -> bytes:
-    with np.load(io.BytesIO(known().to_bytes()), allow_pickle=False) as file:
-        content = dict(file)
-    plain = json.loads(str(content.pop("plain")))
-    plain["filters"] = plain.pop("one_step_filters")
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, allow_pickle=False, plain=np.array(json.dumps(plain)), **content)
-    return buffer.getvalue()
-
-
-def test_one_of_an_earlier_version_is_told_from_a_damaged_one() -> None:
-    with pytest.raises(OutdatedDiscrepancyError, match=r"x: an earlier version .* calibrate again"):
-        Discrepancy.from_bytes(of_an_earlier_version(), where="x")
-
-
 def test_keys_and_covariance_must_be_of_one_size() -> None:
     wrong = Gaussian(("a",), np.zeros(2), np.eye(2))
     content = Discrepancy({}, wrong, {}, 900.0, {}, MIDDLE).to_bytes()
@@ -84,16 +67,6 @@ def test_a_bundle_carries_it_as_a_file_that_its_manifest_lists(tmp_path: Path) -
     read = read_model(bundle, SITE).history
     assert read is not None and read.own_gains == known().own_gains
     assert read_model(export(replace(model, history=None), tmp_path / "plain"), SITE).history is None
-
-
-def test_what_an_earlier_version_learned_of_the_noise_makes_it_a_calibration_of_no_greenhouse(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    model = replace(FittedModel.described(SITE), calibrated_on=SITE.name, history=known(), discrepancy={"sky": 0.1})
-    earlier = of_an_earlier_version()
-    monkeypatch.setattr(Discrepancy, "to_bytes", lambda _: earlier)
-    read = read_model(export(model, tmp_path / "bundle"), SITE)
-    assert (read.calibrated_on, read.history, read.discrepancy) == ("", None, {})
 
 
 def test_what_was_fitted_to_other_balances_is_a_calibration_of_no_greenhouse(tmp_path: Path) -> None:

@@ -104,8 +104,6 @@ class Design:
     patterns: tuple[Pattern, ...]
     """Of the block of patterns."""
     untestable: tuple[str, ...]
-    transition: Floats | None = None
-    """Of errors from step to step, see `noise.one_step_errors`; None where they count by intervals."""
     null_amplitude: Mapping[str, float] = field(default_factory=dict)
     """Amplitude, by effect, that a log with nothing missing usually shows."""
     history: History | None = None
@@ -180,8 +178,8 @@ class Design:
             start: where to begin with the colour.
         """
         if self.history is not None and self.history.filters:
-            return noise.rescaled(self.history.filters, errors, self.observed, self.fitted, self.transition)
-        return noise.fit_noise(errors, self.observed, self.fitted, start, self.transition)
+            return noise.rescaled(self.history.filters, errors, self.observed, self.fitted)
+        return noise.fit_noise(errors, self.observed, self.fitted, start)
 
     def whitened(self, whitening: Whitening) -> Design:
         """Return the design as another noise shows it."""

@@ -77,20 +77,11 @@ def opening_of(record: Record) -> float:
 
 
 def vents_hardly_open(known: Discrepancy | None, record: Record, rules: DecisionRules) -> bool:
-    """Tell whether the vents stand open much less than in the calibration log, or hardly opened then.
+    """Tell whether the vents stand open much less than in the calibration log.
 
-    A law that wide openings taught says little of narrow ones, and one that none did says nothing: what changes then is
-    its error, or the vents'.
+    A law that wide openings taught says little of narrow ones: what changes then is its error, or the vents'.
     """
-    if known is None:
-        return False
-    return known.opening < rules.least_opening or opening_of(record) < rules.least_opening_share * known.opening
-
-
-def with_vents(known: Discrepancy | None, record: Record, rules: DecisionRules) -> DecisionRules:
-    """Return the rules for a log: where its vents hardly open, their law may be off by more than physics lets drift."""
-    hardly = vents_hardly_open(known, record, rules)
-    return replace(rules, vent_drift=rules.narrow_vent_drift) if hardly else rules
+    return known is not None and opening_of(record) < rules.least_opening_share * known.opening
 
 
 def jointly(
@@ -152,8 +143,7 @@ def lay_out(
         ("pattern", tuple(one.key for one in patterns), courses[lasting], none, None),
         *((name, (), nothing, none, np.zeros((0, 0))) for name in ("discrepancy", "nuisance", "drift")),
     ]
-    transition = sensitivity.transition(line)[np.ix_(average.balances, average.balances)]
-    return replace(of_parts(line, split, prior, rules, average, parts, found, patterns), transition=transition)
+    return of_parts(line, split, prior, rules, average, parts, found, patterns)
 
 
 def laid_out(

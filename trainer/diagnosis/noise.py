@@ -6,11 +6,6 @@ observer (Ljung 1999, System Identification, ch. 7); fitting it by maximum likel
 and the disturbance's colour to the site. The same filter applied to all sensitivities turns ordinary into
 generalised least squares. Every run starts afresh, so the filter does too.
 
-How long an error lasts is the plant's, and changes with it: CO2 stays for hours behind closed vents and for minutes
-behind open ones. Where errors count step by step, what the model itself carries on of them is taken off first (errors
-of one step, by its tangent, as an extended Kalman filter does; Jazwinski 1970, Stochastic Processes and Filtering
-Theory, ch. 8): a filter that was learned in one season then holds in another.
-
 Tails are taken as Student's t (Lange, Little and Taylor 1989, J. Am. Stat. Assoc. 84): rare large disturbances
 then count little.
 """
@@ -56,28 +51,11 @@ class Whitening:
     """Inverse Cholesky factor of the covariance of innovations, (b, b)."""
     weight: Floats
     """Square root of each sample's weight, 0 where it does not count, (r, steps)."""
-    transition: Floats | None = None
-    """Error of each balance a step later, for one of each now, (b, b, r, steps); None: none is taken off."""
 
     def __call__(self, values: Floats) -> Floats:
         """Turn errors or sensitivities, (c, b, r, steps), into weighted white noise of the same shape."""
-        added = one_step_errors(values, self.transition)
-        filtered = np.stack([one(added[:, balance]) for balance, one in enumerate(self.filters)], axis=1)
+        filtered = np.stack([one(values[:, balance]) for balance, one in enumerate(self.filters)], axis=1)
         return np.asarray(np.tensordot(self.root, filtered, axes=(1, 1)).swapaxes(0, 1) * self.weight)
-
-
-def one_step_errors(errors: Floats, transition: Floats | None) -> Floats:
-    """Return what every step adds to errors beside what is left of those before it.
-
-    Args:
-        errors: or sensitivities, of runs, (..., b, r, steps).
-        transition: of an error to the next step, (b, b, r, steps), by the step that it leads to; None: none is left.
-    """
-    if transition is None:
-        return errors
-    added = errors.copy()
-    added[..., 1:] -= np.einsum("bcrt,...crt->...brt", transition[..., 1:], errors[..., :-1])
-    return added
 
 
 def fit_filter(errors: Floats, counted: Mask, start: NoiseFilter | None = None) -> NoiseFilter:
@@ -108,18 +86,15 @@ def fit_filter(errors: Floats, counted: Mask, start: NoiseFilter | None = None) 
     return filter_of(tuple(float(value) for value in raw))
 
 
-def fit_whitening(
-    errors: Floats, counted: Mask, filters: tuple[NoiseFilter, ...], transition: Floats | None = None
-) -> Whitening:
+def fit_whitening(errors: Floats, counted: Mask, filters: tuple[NoiseFilter, ...]) -> Whitening:
     """Return the whitening for given filters: covariance and weights by a few rounds of reweighting.
 
     Args:
         errors: (b, r, steps), 0 where not observed.
         counted: samples that count, (r, steps).
         filters: one a balance.
-        transition: of errors, see `one_step_errors`.
     """
-    innovations = _innovations(filters, errors, transition)
+    innovations = np.stack([one(errors[balance]) for balance, one in enumerate(filters)])
     chosen = innovations[:, counted]
     size = len(filters)
     covariance = np.diag([_scale(values) ** 2 for values in chosen])
@@ -129,16 +104,10 @@ def fit_whitening(
         weight = (FREEDOM + size) / (FREEDOM + distance)
         covariance = (chosen * weight) @ chosen.T / chosen.shape[1]
     root: Floats = np.linalg.inv(np.linalg.cholesky(covariance)).astype(np.float64)
-    return extend(Whitening(filters, root, np.zeros(errors.shape[1:]), transition), errors, counted)
+    return extend(Whitening(filters, root, np.zeros(errors.shape[1:])), errors, counted)
 
 
-def fit_noise(
-    errors: Floats,
-    observed: Mask,
-    fitted: Mask,
-    start: Whitening | None = None,
-    transition: Floats | None = None,
-) -> Whitening:
+def fit_noise(errors: Floats, observed: Mask, fitted: Mask, start: Whitening | None = None) -> Whitening:
     """Fit colour and scale of the disturbances to errors on the fit days.
 
     Args:
@@ -146,28 +115,20 @@ def fit_noise(
         observed: intervals that count, (r, intervals).
         fitted: runs on days for fitting, (r, 1).
         start: where to begin.
-        transition: of errors, see `one_step_errors`.
     """
     errors = errors * observed
-    added = one_step_errors(errors, transition)
     counted = observed & fitted
     starts = start.filters if start else (None,) * len(errors)
-    filters = tuple(fit_filter(one, counted, start=begin) for one, begin in zip(added, starts, strict=True))
-    whitening = fit_whitening(errors, counted, filters, transition)
+    filters = tuple(fit_filter(one, counted, start=begin) for one, begin in zip(errors, starts, strict=True))
+    whitening = fit_whitening(errors, counted, filters)
     # Samples of held-out days are filtered and weighted too: the fit leaves them out by day.
     return extend(whitening, errors, observed)
 
 
-def rescaled(
-    filters: tuple[NoiseFilter, ...],
-    errors: Floats,
-    observed: Mask,
-    fitted: Mask,
-    transition: Floats | None = None,
-) -> Whitening:
+def rescaled(filters: tuple[NoiseFilter, ...], errors: Floats, observed: Mask, fitted: Mask) -> Whitening:
     """Return the whitening of known colour: covariance and weights alone are fitted; arguments as in `fit_noise`."""
     errors = errors * observed
-    return extend(fit_whitening(errors, observed & fitted, filters, transition), errors, observed)
+    return extend(fit_whitening(errors, observed & fitted, filters), errors, observed)
 
 
 def filter_of(raw: tuple[float, ...]) -> NoiseFilter:
@@ -196,14 +157,8 @@ def extend(whitening: Whitening, errors: Floats, counted: Mask) -> Whitening:
 
 def _distance(whitening: Whitening, errors: Floats) -> Floats:
     """Return the squared Mahalanobis distance of the innovations of errors (b, r, steps) from 0, (r, steps)."""
-    innovations = _innovations(whitening.filters, errors, whitening.transition)
+    innovations = np.stack([one(errors[balance]) for balance, one in enumerate(whitening.filters)])
     return np.asarray(np.sum(np.tensordot(whitening.root, innovations, axes=1) ** 2, axis=0))
-
-
-def _innovations(filters: tuple[NoiseFilter, ...], errors: Floats, transition: Floats | None) -> Floats:
-    """Return the innovations of errors, both (b, r, steps)."""
-    added = one_step_errors(errors, transition)
-    return np.stack([one(added[balance]) for balance, one in enumerate(filters)])
 
 
 def _coefficients(raw: Floats) -> tuple[Floats, Floats]:

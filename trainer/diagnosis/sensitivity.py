@@ -20,7 +20,6 @@ import numpy as np
 from igrow.core.arrays import Array, Floats, Integers, Mask
 from igrow.core.effects import EFFECTS, Effect
 from igrow.core.simulator.hybrid import climate, measurement
-from igrow.core.simulator.hybrid.balances import STATES
 from igrow.core.simulator.hybrid.climate import ActiveEffects
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.core.simulator.hybrid.record import SUBSTEP, Record, free_run, observe
@@ -30,8 +29,6 @@ PARAMETER_DIFFERENCE = 0.05
 """Finite difference of a parameter, in prior standard deviations."""
 EFFECT_DIFFERENCE = 0.1
 """The same of a sensor effect's amplitude, in typical ones."""
-_STATE_DIFFERENCE = 1e-3
-"""The same of a state, over its mean."""
 _SCALARS = SimpleNamespace(maximum=max, minimum=min, abs=abs, exp=np.exp, sqrt=np.sqrt, tanh=np.tanh)
 """The few functions that memories use, for plain floats: ten times faster than numpy's on scalars."""
 _BATCH = 160
@@ -170,30 +167,6 @@ def parameter_secant(line: Linearisation, names: Sequence[str], amount: float, s
     states = observe(line.record, varied, line.effects)
     shown = free_run(line.record, states, line.runs.starts, line.runs.steps, varied, line.effects, line.added)
     return np.asarray(-(_stacked(shown) - line.shown) / amount)
-
-
-def transition(line: Linearisation) -> Floats:
-    """Return the error of each quantity a step later for one of each now, (3, 3, r, steps), along the measured climate.
-
-    It is that of the step that leads to a run's sample: 0 in the first, which begins with what was measured.
-    """
-    record, states = line.record, dict(line.states)
-    moved = STATES[: len(measurement.PREDICTED)]
-    small = np.array([_STATE_DIFFERENCE * float(np.mean(states[name])) for name in moved])
-    for place, name in enumerate(moved):
-        variants = np.repeat(states[name][None], len(moved) + 1, axis=0)
-        variants[1 + place] += small[place]
-        states[name] = variants
-    drivers = climate.derive(np, states, record.inputs, line.parameters, record.lamp_efficacy)
-    before = measurement.measured(np, drivers, states, line.effects)
-    after = free_run(record, states, np.arange(len(record) - 1), 1, line.parameters, line.effects)
-    now = np.stack([before[name][:, :-1] for name in measurement.PREDICTED])
-    later = np.stack([after[name][0] for name in measurement.PREDICTED])
-    # By what was moved the changes of what is shown, now and a step later, (n, 3, moved).
-    now, later = ((one[:, 1:] - one[:, :1]).transpose(2, 0, 1) / small for one in (now, later))
-    share: Floats = (later @ np.linalg.inv(now)).transpose(1, 2, 0)[:, :, line.runs.samples - 1]
-    share[..., 0] = 0.0
-    return share
 
 
 def sensor_sensitivity(line: Linearisation, effect: Effect, shape: Mapping[str, float]) -> Floats:

@@ -34,7 +34,7 @@ from igrow.trainer.exporting.optimizer import export_optimizer, optimizer_signat
 from igrow.trainer.exporting.plan import plan_blocks, plan_model, settings
 from igrow.trainer.exporting.signatures import signatures
 from igrow.trainer.fit.climate import bounds, site_prior
-from igrow.trainer.fit.discrepancy import Discrepancy, OutdatedDiscrepancyError
+from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.growth import CROP_FILE, built_in_crop, crop_of
 from igrow.trainer.fit.model import FittedModel
@@ -123,8 +123,7 @@ def export(model: FittedModel, folder: Path | str, *, created: datetime | None =
 def read_model(bundle: Bundle | Path | str, site: Site) -> FittedModel:
     """Return the model that a bundle was made from, as the model of a site.
 
-    What an earlier version fitted, to other balances or under another noise, is a calibration of no greenhouse: it is
-    to be made anew.
+    What was fitted to other balances, by an earlier version, is a calibration of no greenhouse: it is to be made anew.
 
     Raises:
         BundleError: the bundle is of another variant, or lacks what a model needs.
@@ -135,17 +134,13 @@ def read_model(bundle: Bundle | Path | str, site: Site) -> FittedModel:
         raise BundleError(f"{bundle.folder}: is a {manifest.variant} bundle; a hybrid one is needed")
     given = manifest.simulator.get("parameters", {})
     of_these = fitted_to_these_balances(manifest.parameters)
-    try:
-        history = _history_of(bundle) if of_these else None
-    except OutdatedDiscrepancyError:
-        of_these, history = False, None
     return FittedModel(
         site=site,
         posterior=_posterior(bundle, site),
         calibrated_on=manifest.calibrated_on if of_these else "",
         alignment=manifest.alignment,
         discrepancy=manifest.discrepancy if of_these else {},
-        history=history,
+        history=_history_of(bundle) if of_these else None,
         effects=manifest.effects,
         actuation={name: float(given.get(f"actuation:{name}", rule.value)) for name, rule in actuation.RULES.items()},
         holding={name: float(given.get(f"holding:{name}", one.value)) for name, one in holding.PARAMETERS.items()},

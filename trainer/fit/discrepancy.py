@@ -23,10 +23,6 @@ _ARRAYS = ("mean", "deviation", "correlation")
 """Of the amplitudes; of the correlation the lower triangle in single precision, a tenth of the covariance's size."""
 
 
-class OutdatedDiscrepancyError(IgrowError):
-    """A discrepancy of an earlier version, whose filters are of errors that no one counts any more."""
-
-
 @dataclass(frozen=True)
 class Discrepancy:
     """What is known of a greenhouse beside its calibrated parameters."""
@@ -36,7 +32,7 @@ class Discrepancy:
     amplitudes: Gaussian
     """Of changes of the parameters (keys ``parameter:name``), of effects and of patterns, together."""
     filters: Mapping[int, tuple[float, ...]]
-    """Raw coefficients of the filter of errors of one step, by balance (0 heat, 1 vapour, 2 CO2)."""
+    """Raw coefficients of the noise filter, by balance (0 heat, 1 vapour, 2 CO2)."""
     step: float
     """Seconds between the errors that it was learned from."""
     own_gains: Mapping[str, float]
@@ -44,7 +40,7 @@ class Discrepancy:
     middle: np.datetime64
     """Of the calibration log, UTC."""
     opening: float = 0.0
-    """Of both rows of vents together, %, its mean over the calibration log."""
+    """Of both rows of vents together, %, its mean over the calibration log; 0: not known."""
     unseen: tuple[str, ...] = ()
     """Keys of effects that the calibration log hardly showed: less was known of them before it."""
 
@@ -53,7 +49,7 @@ class Discrepancy:
         plain = {
             "parameters": dict(self.parameters),
             "keys": self.amplitudes.names,
-            "one_step_filters": {str(balance): raw for balance, raw in self.filters.items()},
+            "filters": {str(balance): raw for balance, raw in self.filters.items()},
             "step": self.step,
             "own_gains": dict(self.own_gains),
             "middle": str(self.middle.astype("datetime64[s]")),
@@ -76,16 +72,11 @@ class Discrepancy:
         """Read a discrepancy.
 
         Raises:
-            OutdatedDiscrepancyError: an earlier version wrote it, and meant something else by it.
             IgrowError: it is not such a file; `where` names it.
         """
         try:
             with np.load(io.BytesIO(content), allow_pickle=False) as file:
                 plain, arrays = json.loads(str(file["plain"])), [file[name] for name in _ARRAYS]
-            if "one_step_filters" not in plain:
-                raise OutdatedDiscrepancyError(
-                    f"{where}: an earlier version learned its noise otherwise: calibrate again"
-                )
             mean, deviation, correlation = arrays
             keys = tuple(plain["keys"])
             count = len(keys)
@@ -97,15 +88,13 @@ class Discrepancy:
             return cls(
                 {str(name): float(value) for name, value in plain["parameters"].items()},
                 Gaussian(keys, mean, covariance),
-                {int(balance): tuple(raw) for balance, raw in plain["one_step_filters"].items()},
+                {int(balance): tuple(raw) for balance, raw in plain["filters"].items()},
                 float(plain["step"]),
                 {str(key): float(gain) for key, gain in plain["own_gains"].items()},
                 np.datetime64(plain["middle"], "s"),
                 float(plain.get("opening", 0.0)),
                 tuple(map(str, plain.get("unseen", ()))),
             )
-        except OutdatedDiscrepancyError:
-            raise
         except Exception as error:
             # A damaged archive raises from zipfile, zlib or numpy; for the user it is one fault.
             raise IgrowError(f"{where}: holds no discrepancy: {error}") from None
