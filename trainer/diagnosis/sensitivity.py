@@ -115,8 +115,7 @@ def linearise(
         DivergenceError: a prediction that counts is no finite number.
     """
     states = observe(record, parameters, effects)
-    with np.errstate(over="ignore", invalid="ignore"):
-        shown = free_run(record, states, runs.starts, runs.steps, parameters, effects, added)
+    shown = free_run(record, states, runs.starts, runs.steps, parameters, effects, added)
     drivers = climate.derive(np, states, record.inputs, parameters, record.lamp_efficacy)
     line = Linearisation(record, runs, parameters, effects, _stacked(shown), states, drivers, added or {})
     if not np.isfinite(line.errors).all():

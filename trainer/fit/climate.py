@@ -191,9 +191,8 @@ def _errors(runs: Sequence[_Runs], parameters: Mapping[str, Floats], effects: Ac
     """Return predicted minus measured by quantity, (m, k, all runs), of parameters that are (m, 1)."""
     collected: dict[str, list[Floats]] = {}
     for one in runs:
-        with np.errstate(over="ignore", invalid="ignore"):
-            states = records.observe(one.record, parameters, effects)
-            shown = records.free_run(one.record, states, one.starts, one.steps, parameters, effects)
+        states = records.observe(one.record, parameters, effects)
+        shown = records.free_run(one.record, states, one.starts, one.steps, parameters, effects)
         for name in one.quantities:
             collected.setdefault(name, []).append(np.moveaxis(shown[name][one.kept], 0, 1) - one.measured(name))
     return {name: np.concatenate(parts, axis=2) for name, parts in collected.items()}

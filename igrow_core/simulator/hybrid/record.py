@@ -102,6 +102,7 @@ def observe(record: Record, parameters: Values, effects: ActiveEffects) -> dict[
     return {name: np.broadcast_to(v, np.broadcast_shapes(np.shape(v), shape)) for name, v in state.items()}
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def free_run(
     record: Record,
     states: Mapping[str, Floats],
@@ -123,7 +124,8 @@ def free_run(
         added: further fluxes by channel: (n,), or (steps, s) for fluxes that differ from start to start.
 
     Returns:
-        What the sensors would show at rows start + 1 ... start + steps, by quantity, (steps, s) or (steps, m, s).
+        What the sensors would show at rows start + 1 ... start + steps, by quantity, (steps, s) or (steps, m, s); no
+        finite number, and no warning, where a run leaves all bounds.
     """
     begin = np.asarray(starts, dtype=np.int64)
     substeps = max(1, round(record.step / SUBSTEP))
