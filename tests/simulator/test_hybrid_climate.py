@@ -184,6 +184,14 @@ def test_variants_in_one_batch_equal_runs_one_by_one() -> None:
         np.testing.assert_allclose(together["air_temperature"][:, position], alone["air_temperature"], rtol=1e-9)
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_run_that_leaves_all_bounds_is_told_by_its_numbers_and_by_no_warning() -> None:
+    record, values = site_record(virtual_log(2, step=900.0), SITE, 900.0), nominal(SITE)
+    states, fire = records.observe(record, values, {}), {"heat": np.full(len(record), 1e12)}
+    shown = records.free_run(record, states, [0], 60, values, {}, fire)
+    assert not np.isfinite(shown["air_co2"]).all()
+
+
 def test_floor_and_soil_follow_the_measured_air_as_the_balances_lead_them() -> None:
     """Whatever the log's length is to the stretches that are run side by side."""
     whole, values = site_record(virtual_log(7, step=900.0), SITE, 900.0), nominal(SITE)
