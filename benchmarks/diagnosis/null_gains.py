@@ -19,8 +19,10 @@ from igrow.trainer.data import prepare_log
 from igrow.trainer.diagnosis import change, diagnose, history, linear, parameter_change, search
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.freerun import log_days
+from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, VENTS
 from igrow.trainer.diagnosis.null_gains import NullGains
 from igrow.trainer.diagnosis.rules import DEFAULT
+from igrow.trainer.diagnosis.visible_parameters import members
 
 FALSE_CLAIMS = 0.02
 """Share of logs with nothing missing that may be given a name, each greenhouse judged by the gains of the others."""
@@ -44,11 +46,16 @@ def gained(job: Later) -> Gained:
     known, site = reference.model.history, reference.greenhouse.site
     assert known is not None
     days = log_days(prepare_log(telemetry, site), reference.model)
-    plain = history.laid_out(days, site, known, (), DEFAULT)
+    rules = history.with_vents(known, days.record, DEFAULT)
+    unasked = VENTS if history.vents_hardly_open(known, days.record, DEFAULT) else frozenset[str]()
+    plain = history.laid_out(days, site, known, (), rules)
     design = history.expected(known, plain, history.expected_misfit(known, plain))
     effects = _gains(design, search.score_candidates)
     parameters = _gains(parameter_change.joined(design), parameter_change.score)
-    return Gained(site.name, case.group, effects, parameters)
+    asked = {
+        key: gain for key, gain in parameters.items() if unasked.isdisjoint(members(key.removeprefix(PARAMETER_PREFIX)))
+    }
+    return Gained(site.name, case.group, effects, asked)
 
 
 def _gains(design: Design, score: Callable[..., list[search.Hypothesis]]) -> dict[str, float]:

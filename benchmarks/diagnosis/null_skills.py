@@ -19,7 +19,7 @@ from benchmarks.diagnosis.null_gains import FALSE_CLAIMS, largest
 from benchmarks.diagnosis.null_logs import Later
 from benchmarks.jobs import Jobs
 from igrow.trainer.data import prepare_log
-from igrow.trainer.diagnosis import DEFAULT, cross_validation, null_gains, unexplained
+from igrow.trainer.diagnosis import DEFAULT, cross_validation, history, null_gains, unexplained
 from igrow.trainer.diagnosis.candidates import Pattern
 from igrow.trainer.diagnosis.cross_validation import CrossValidated, cross_validated
 from igrow.trainer.diagnosis.freerun import log_days
@@ -50,11 +50,13 @@ def told(job: Later) -> Told:
     reference, case, telemetry = job
     site, rng = reference.greenhouse.site, np.random.default_rng(0)
     log = prepare_log(telemetry, site)
-    knowledge, days = knowledge_of(reference.model, site, DEFAULT), log_days(log, reference.model)
-    search = search_of(days, site, knowledge, frozenset(), DEFAULT, None, None)
+    days = log_days(log, reference.model)
+    rules = history.with_vents(reference.model.history, days.record, DEFAULT)
+    knowledge = knowledge_of(reference.model, site, rules)
+    search = search_of(days, site, knowledge, frozenset(), rules, None, None)
     assert isinstance(search, Change)
     design = search.resolved()
-    by_physics = knowledge.by_physics(DEFAULT)
+    by_physics = knowledge.by_physics(rules)
     effects = _ranked(cross_validated(design, by_physics, cross_validation.promising(design, rng)))
     patterns: dict[str, float] = {}
     for one in _ranked(unexplained.judged(design, site.longitude, by_physics).found):

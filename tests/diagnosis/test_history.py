@@ -141,8 +141,13 @@ def test_vents_that_hardly_open_any_more_are_told() -> None:
     opening = history.opening_of(record)
     known = Discrepancy({}, Gaussian((), np.zeros(0), np.zeros((0, 0))), {}, 900.0, {}, record.time[0], 3.0 * opening)
     assert history.vents_hardly_open(known, record, DEFAULT)
-    for silent in (replace(known, opening=1.5 * opening), replace(known, opening=0.0), None):
+    assert history.vents_hardly_open(replace(known, opening=0.06), record, DEFAULT)
+    for silent in (replace(known, opening=1.5 * opening), replace(known, opening=np.nan), None):
         assert not history.vents_hardly_open(silent, record, DEFAULT)
+    closed = replace(
+        record, inputs={**record.inputs, **dict.fromkeys(("vent_lee", "vent_wind"), np.zeros(len(record)))}
+    )
+    assert not history.vents_hardly_open(replace(known, opening=0.0), closed, DEFAULT)
 
 
 def test_own_gains_tell_what_comes_and_goes_in_a_log_without_a_change() -> None:

@@ -145,10 +145,9 @@ class _Question:
         knowledge = knowledge_of(known, site, rules)
         progress("completing the log")
         logged, rng = log_days(log, model), np.random.default_rng(self.seed)
-        of_vents = frozenset[str]()
-        if history.vents_hardly_open(knowledge.history, logged.record, rules):
-            of_vents, rules = VENTS, replace(rules, vent_drift=rules.narrow_vent_drift)
-            knowledge = knowledge_of(known, site, rules)
+        of_vents = VENTS if history.vents_hardly_open(knowledge.history, logged.record, rules) else frozenset[str]()
+        rules = history.with_vents(knowledge.history, logged.record, rules)
+        knowledge = knowledge_of(known, site, rules)
         completed = complete(log, logged, model, knowledge, rules)
         days, opened = completed.days, under_open_vents(logged.record, rules)
         off = opened is not None and opened.is_offset(rules)

@@ -77,11 +77,22 @@ def opening_of(record: Record) -> float:
 
 
 def vents_hardly_open(known: Discrepancy | None, record: Record, rules: DecisionRules) -> bool:
-    """Tell whether the vents stand open much less than in the calibration log.
+    """Tell whether the vents stand open much less than in the calibration log, or hardly opened then.
 
-    A law that wide openings taught says little of narrow ones: what changes then is its error, or the vents'.
+    A law that wide openings taught says little of narrow ones, and one that none did says nothing: what changes then is
+    its error, or the vents'.
     """
-    return known is not None and opening_of(record) < rules.least_opening_share * known.opening
+    if known is None:
+        return False
+    opening = opening_of(record)
+    untried = opening > 0.0 and known.opening < rules.least_opening
+    return untried or opening < rules.least_opening_share * known.opening
+
+
+def with_vents(known: Discrepancy | None, record: Record, rules: DecisionRules) -> DecisionRules:
+    """Return the rules for a log: where its vents hardly open, their law may be off by more than physics lets drift."""
+    hardly = vents_hardly_open(known, record, rules)
+    return replace(rules, vent_drift=rules.narrow_vent_drift) if hardly else rules
 
 
 def jointly(

@@ -99,6 +99,9 @@ class DecisionRules:
     least_opening_share: float = _chosen(
         0.5, "of the vents' opening at the calibration: with less nothing is asked of them"
     )
+    least_opening: float = _chosen(
+        0.5, "mean opening of both rows of vents at the calibration, %, with less of which their law was not tried"
+    )
     least_leading_change: float = _chosen(0.1, "share of its value by which a parameter that leads must have changed")
     least_other_change: float = _chosen(0.2, "the same of one that explains no more than an effect does")
     least_parameter_gain: float = _tuned(20.0, "gain that its change must bring")

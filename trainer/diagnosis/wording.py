@@ -40,8 +40,8 @@ GROWN_CROP = N_(
     "leaves or in the light is not looked for. Log the leaf area, or calibrate again (igrow-trainer calibrate)."
 )
 VENTS_HARDLY_OPEN = N_(
-    "The vents opened less than half as far as in the weeks of the calibration: how much air they let through is not "
-    "asked. Calibrate again on weeks like these (igrow-trainer calibrate)."
+    "The vents opened less than half as far as in the weeks of the calibration, or hardly at all then: how much air "
+    "they let through is not asked. Calibrate again on weeks like these (igrow-trainer calibrate)."
 )
 THIN_AIR = N_(
     "This greenhouse lies high, and the simulator counts with air as it is at the sea: amounts of CO2, and of heat "

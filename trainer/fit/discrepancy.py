@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -39,8 +40,8 @@ class Discrepancy:
     """Largest gain in a window of the calibration log, learned on the rest, by effect or by a pattern's key."""
     middle: np.datetime64
     """Of the calibration log, UTC."""
-    opening: float = 0.0
-    """Of both rows of vents together, %, its mean over the calibration log; 0: not known."""
+    opening: float = math.nan
+    """Of both rows of vents together, %, its mean over the calibration log; NaN: not known."""
     unseen: tuple[str, ...] = ()
     """Keys of effects that the calibration log hardly showed: less was known of them before it."""
 
@@ -92,7 +93,7 @@ class Discrepancy:
                 float(plain["step"]),
                 {str(key): float(gain) for key, gain in plain["own_gains"].items()},
                 np.datetime64(plain["middle"], "s"),
-                float(plain.get("opening", 0.0)),
+                float(plain.get("opening", math.nan)),
                 tuple(map(str, plain.get("unseen", ()))),
             )
         except Exception as error:
