@@ -79,7 +79,7 @@ def enr_units(record: Record, model: FittedModel) -> dict[str, float]:
         small = 0.2 * effect.amplitude.typical
         shape = {one.name: one.typical for one in effect.shapes}
         if effect.kind == "sensor":
-            column = sensitivity.sensor_sensitivity(line, effect, shape)
+            column = sensitivity.sensor_sensitivities(line, [(effect, shape)])[0]
         else:
             column = sensitivity.flux_sensitivities(line, [(sensitivity.unit_fluxes(line, effect, shape), small)])[0]
         ratios = [freerun.root_mean_square(part) / scale for part, scale in zip(column, noise, strict=True)]

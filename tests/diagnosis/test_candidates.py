@@ -140,11 +140,23 @@ def test_a_flux_into_no_balance_moves_nothing(line: Linearisation) -> None:
 
 
 def test_an_offset_of_a_sensor_leaves_the_plant_alone(line: Linearisation) -> None:
-    column = sensitivity.sensor_sensitivity(line, EFFECTS["co2_offset"], {})
+    column = sensitivity.sensor_sensitivities(line, [(EFFECTS["co2_offset"], {})])[0]
     # The start of a run is corrected by the offset, and with the hours the air forgets its start.
     assert np.median(column[2][:, -1]) == pytest.approx(-1.0, abs=0.1)
     assert np.abs(column[2][:, 0]).max() < 0.5
     assert np.abs(column[0]).max() < 1e-3
+
+
+def test_faults_of_sensors_together_move_the_errors_as_each_alone(line: Linearisation) -> None:
+    faults = [
+        (effect, {shape.name: shape.typical for shape in effect.shapes})
+        for effect in EFFECTS.values()
+        if effect.kind == "sensor"
+    ]
+    together = sensitivity.sensor_sensitivities(line, faults)
+    for one, column in zip(faults, together, strict=True):
+        np.testing.assert_array_equal(sensitivity.sensor_sensitivities(line, [one])[0], column)
+    assert sensitivity.sensor_sensitivities(line, []).shape[0] == 0
 
 
 def test_parameters_move_the_errors_as_a_run_at_another_value_does(line: Linearisation) -> None:

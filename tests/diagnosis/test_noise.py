@@ -70,3 +70,13 @@ def test_a_sample_far_out_counts_little_and_one_that_is_not_observed_not_at_all(
     assert weight[0, 0] < 0.1
     assert (weight[1] == 0.0).all()
     assert weight.max() == pytest.approx(np.sqrt((FREEDOM + 1.0) / FREEDOM), rel=0.01)
+
+
+def test_the_slopes_of_a_fit_are_those_of_its_deviance() -> None:
+    errors, raw, small = coloured(0.8, 7)[:5], np.array([2.0, 4.0, 0.5, 1.5, 3.0]), 1e-6
+    errors[0, 0] = 0.0
+    innovation = noise._filtered(errors, raw)
+    slopes = [noise._deviance_slope(innovation) * one for one in noise._filter_slopes(innovation, raw)]
+    for change, slope in zip(small * np.eye(len(raw)), slopes, strict=True):
+        above, below = (noise._deviance(noise._filtered(errors, raw + sign * change)) for sign in (1.0, -1.0))
+        np.testing.assert_allclose(slope, (above - below) / (2.0 * small), atol=1e-6)

@@ -29,7 +29,7 @@ from igrow.trainer.diagnosis.sensitivity import (
     Linearisation,
     flux_sensitivities,
     is_measured,
-    sensor_sensitivity,
+    sensor_sensitivities,
     unit_fluxes,
 )
 
@@ -304,7 +304,7 @@ def _is_blind(line: Linearisation, effect: Effect) -> bool:
 
 
 def _columns(line: Linearisation, candidates: Sequence[Candidate]) -> Floats:
-    columns = np.zeros((len(candidates), 3, len(line.runs.starts), line.runs.steps))
+    columns = np.zeros((len(candidates), *line.shown.shape))
     process = [index for index, one in enumerate(candidates) if one.definition.kind == "process"]
     fluxes = [
         (
@@ -314,9 +314,9 @@ def _columns(line: Linearisation, candidates: Sequence[Candidate]) -> Floats:
         for index in process
     ]
     columns[process] = flux_sensitivities(line, fluxes)
-    for index, one in enumerate(candidates):
-        if one.definition.kind == "sensor":
-            columns[index] = sensor_sensitivity(line, one.definition, one.values)
+    sensors = [index for index, one in enumerate(candidates) if one.definition.kind == "sensor"]
+    faults = [(candidates[index].definition, candidates[index].values) for index in sensors]
+    columns[sensors] = sensor_sensitivities(line, faults)
     return columns
 
 

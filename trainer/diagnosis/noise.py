@@ -76,11 +76,15 @@ def fit_filter(errors: Floats, counted: Mask, start: NoiseFilter | None = None) 
         scale = _t_scale(_filtered(normal, raw)[counted])
 
         def deviance(values: Floats, scale: float = scale) -> Floats:
-            innovation = _filtered(normal, values)[counted] / scale
-            return np.asarray(np.sign(innovation) * np.sqrt((FREEDOM + 1.0) * np.log1p(innovation**2 / FREEDOM)))
+            return _deviance(_filtered(normal, values)[counted] / scale)
+
+        def slopes(values: Floats, scale: float = scale) -> Floats:
+            innovation = _filtered(normal, values)
+            moved = np.stack([one[counted] for one in _filter_slopes(innovation, values)], axis=1)
+            return _deviance_slope(innovation[counted] / scale)[:, None] * moved / scale
 
         before = raw
-        raw = np.asarray(least_squares(deviance, raw, bounds=(-3.0, 9.0), max_nfev=12, ftol=1e-5, xtol=1e-3).x)
+        raw = np.asarray(least_squares(deviance, raw, slopes, (-3.0, 9.0), max_nfev=12, ftol=1e-5, xtol=1e-3).x)
         if np.max(np.abs(raw - before)) < 0.02:
             break
     return filter_of(tuple(float(value) for value in raw))
@@ -161,9 +165,14 @@ def _distance(whitening: Whitening, errors: Floats) -> Floats:
     return np.asarray(np.sum(np.tensordot(whitening.root, innovations, axes=1) ** 2, axis=0))
 
 
+def _roots(raw: Floats) -> Floats:
+    """Return the zeros of the filter, which take the disturbance's poles out, and then its own poles."""
+    return np.asarray(_LARGEST_ROOT * np.tanh(0.5 * raw))
+
+
 def _coefficients(raw: Floats) -> tuple[Floats, Floats]:
-    """Return numerator and denominator: the disturbance's poles, which whitening turns into zeros, come first."""
-    roots = _LARGEST_ROOT * np.tanh(0.5 * raw)
+    """Return numerator and denominator."""
+    roots = _roots(raw)
     numerator: Floats = np.poly(roots[:ORDER]).astype(np.float64)
     denominator: Floats = np.poly(roots[ORDER:]).astype(np.float64)
     return numerator, denominator
@@ -171,6 +180,27 @@ def _coefficients(raw: Floats) -> tuple[Floats, Floats]:
 
 def _filtered(values: Floats, raw: Floats) -> Floats:
     return np.asarray(lfilter(*_coefficients(raw), values))
+
+
+def _filter_slopes(innovation: Floats, raw: Floats) -> list[Floats]:
+    """Return the slope of the innovations (r, steps) in each raw coefficient: a root's own factor, differentiated."""
+    roots = _roots(raw)
+    by_raw = 0.5 * (_LARGEST_ROOT - roots**2 / _LARGEST_ROOT)
+    by_raw[:ORDER] *= -1.0
+    return [lfilter([0.0, size], [1.0, -root], innovation) for size, root in zip(by_raw, roots, strict=True)]
+
+
+def _deviance(innovation: Floats) -> Floats:
+    """Return the signed root of minus twice the log-likelihood of innovations in units of their scale, (n,)."""
+    return np.asarray(np.copysign(np.sqrt((FREEDOM + 1.0) * np.log1p(innovation**2 / FREEDOM)), innovation))
+
+
+def _deviance_slope(innovation: Floats) -> Floats:
+    """Return its slope in the innovations, (n,)."""
+    deviance = _deviance(innovation)
+    level = np.full_like(innovation, np.sqrt(FREEDOM / (FREEDOM + 1.0)))
+    ratio = np.divide(innovation, deviance, out=level, where=deviance != 0.0)
+    return np.asarray((FREEDOM + 1.0) / (FREEDOM + innovation**2) * ratio)
 
 
 def _t_scale(innovation: Floats) -> float:

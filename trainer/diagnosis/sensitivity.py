@@ -168,13 +168,32 @@ def parameter_secant(line: Linearisation, names: Sequence[str], amount: float, s
     return np.asarray(-(_stacked(shown) - line.shown) / amount)
 
 
-def sensor_sensitivity(line: Linearisation, effect: Effect, shape: Mapping[str, float]) -> Floats:
-    """Return d(error)/d(amplitude), (3, r, steps), of a sensor effect that is not active."""
-    small = EFFECT_DIFFERENCE * effect.amplitude.typical
-    active = {**line.effects, effect.name: {effect.amplitude.name: small, **shape}}
+def sensor_sensitivities(line: Linearisation, sensors: Sequence[tuple[Effect, Mapping[str, float]]]) -> Floats:
+    """Return d(error)/d(amplitude), (s, 3, r, steps), of sensor effects of given shapes that are not active."""
+    columns = np.zeros((len(sensors), *line.shown.shape))
+    # What only adds to what the sensors of the air show can be run side by side.
+    plain = [
+        index
+        for index, (effect, _) in enumerate(sensors)
+        if not effect.shapes and set(effect.measured) <= set(measurement.PREDICTED)
+    ]
+    for group in (plain, *([index] for index in range(len(sensors)) if index not in plain)):
+        if group:
+            columns[group] = _sensor_batch(line, [sensors[index] for index in group])
+    return columns
+
+
+def _sensor_batch(line: Linearisation, sensors: Sequence[tuple[Effect, Mapping[str, float]]]) -> Floats:
+    count = len(sensors)
+    small = np.array([EFFECT_DIFFERENCE * effect.amplitude.typical for effect, _ in sensors])
+    own = list(np.diag(small)[..., None]) if count > 1 else small.tolist()
+    faults = {
+        effect.name: {effect.amplitude.name: size, **shape} for (effect, shape), size in zip(sensors, own, strict=True)
+    }
+    active: ActiveEffects = {**line.effects, **faults}
     states = observe(line.record, line.parameters, active)
-    shown = free_run(line.record, states, line.runs.starts, line.runs.steps, line.parameters, active)
-    return np.asarray(-(_stacked(shown) - line.shown) / small)
+    shown = free_run(line.record, states, line.runs.starts, line.runs.steps, line.parameters, active, line.added)
+    return np.asarray(-(_batched(shown, count, line) - line.shown) / small[:, None, None, None])
 
 
 def unit_fluxes(line: Linearisation, effect: Effect, shape: Mapping[str, float]) -> dict[str, Array]:
