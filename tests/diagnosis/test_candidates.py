@@ -15,6 +15,7 @@ from igrow.trainer.data import Log
 from igrow.trainer.data.splits import split_days
 from igrow.trainer.diagnosis import candidates, sensitivity
 from igrow.trainer.diagnosis.candidates import UNIT_FLUX, Candidate, Pattern
+from igrow.trainer.diagnosis.knowledge import ActiveTerm, activate
 from igrow.trainer.diagnosis.sensitivity import Linearisation
 from igrow.trainer.fit.solver import DivergenceError
 from tests.virtual_log import SITE
@@ -204,3 +205,26 @@ def test_a_leak_may_be_hidden_where_the_log_has_no_wind_and_not_where_it_has(lin
     blind = replace(line, record=replace(line.record, missing=(*line.record.missing, "wind_speed", "wind_direction")))
     assert candidates.hidden_by_missing_weather(line) == ()
     assert candidates.hidden_by_missing_weather(blind) == ("wind_infiltration",)
+
+
+def test_other_effects_in_one_run_with_parameters_move_the_errors_as_alone(line: Linearisation) -> None:
+    begins = line.record.time[len(line.record) // 2]
+    terms = [
+        ActiveTerm("air_temperature_offset", 0.4, {}, begins),
+        ActiveTerm("wind_infiltration", 0.1, {"exponent": 1.2}),
+        ActiveTerm("soil_heat_storage", 2.0, {"time_constant": 4.0}),
+    ]
+    about = sensitivity.linearise(line.record, line.runs, line.parameters, activate(line.record, terms))
+    others = [
+        (activate(line.record, [replace(terms[0], amplitude=0.5), *terms[1:]]), 0.1),
+        (activate(line.record, [terms[0], replace(terms[1], shape={"exponent": 1.3}), terms[2]]), 0.1),
+        (activate(line.record, [*terms[:2], replace(terms[2], shape={"time_constant": 3.5})]), -0.5),
+    ]
+    names, spread = ("leakage_wind",), np.array([0.1])
+    alone = sensitivity.parameter_sensitivities(about, names, spread)
+    together = sensitivity.parameter_sensitivities(about, names, spread, others)
+    np.testing.assert_allclose(together[:1], alone, rtol=1e-9, atol=1e-12)
+    for (effects, amount), column in zip(others, together[1:], strict=True):
+        moved = sensitivity.linearise(line.record, line.runs, line.parameters, effects)
+        assert np.abs(column).max() > 0.0
+        np.testing.assert_allclose(column, -(moved.shown - about.shown) / amount, rtol=1e-6, atol=1e-9)

@@ -16,6 +16,7 @@ from scipy.linalg import block_diag
 
 from igrow.core.arrays import Floats, Mask
 from igrow.core.effects import EFFECTS
+from igrow.core.simulator.hybrid.climate import ActiveEffects
 from igrow.trainer.diagnosis import possible_air, sensitivity
 from igrow.trainer.diagnosis.design import NULL, Design
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, activate, clipped
@@ -99,27 +100,31 @@ class _Unknowns:
             terms = knob.set(terms, float(value))
         return terms
 
-    def line(self, point: Floats, terms: Sequence[ActiveTerm] | None = None) -> Linearisation:
-        """Return the model at a point (with other terms)."""
-        record, names = self.design.line.record, self.design.prior.names
+    def line(self, point: Floats) -> Linearisation:
+        """Return the model at a point."""
+        names = self.design.prior.names
         parameters = clipped(names, point[: len(names)])
-        active = activate(record, [*self.before, *(self.terms(point) if terms is None else terms)])
-        return sensitivity.linearise(record, self.design.line.runs, parameters, active)
+        return sensitivity.linearise(
+            self.design.line.record, self.design.line.runs, parameters, self._active(self.terms(point))
+        )
 
     def slopes(self, point: Floats, line: Linearisation) -> Floats:
         """Return d(error)/d(parameter) and d(error)/d(knob), (p + k, 3, r, steps), about the model at a point."""
         terms, prior = self.terms(point), self.design.prior
-        parameters = sensitivity.parameter_sensitivities(line, prior.names, prior.standard_deviation)
-        return np.concatenate([parameters, *(self._slope(point, line, terms, knob)[None] for knob in self.knobs)])
+        moved = [(self._active(other), amount) for other, amount in (_moved(terms, knob) for knob in self.knobs)]
+        return sensitivity.parameter_sensitivities(line, prior.names, prior.standard_deviation, moved)
 
-    def _slope(self, point: Floats, line: Linearisation, terms: list[ActiveTerm], knob: Knob) -> Floats:
-        value = knob.of(terms)
-        step = _DIFFERENCE * (knob.scale if knob.is_shape else max(abs(value), knob.scale))
-        # At a bound one of both steps is held back.
-        other = max(
-            (knob.set(terms, value + sign * step) for sign in (1, -1)), key=lambda one: abs(knob.of(one) - value)
-        )
-        return np.asarray((self.line(point, other).errors - line.errors) / (knob.of(other) - value))
+    def _active(self, terms: Sequence[ActiveTerm]) -> ActiveEffects:
+        return activate(self.design.line.record, [*self.before, *terms])
+
+
+def _moved(terms: Sequence[ActiveTerm], knob: Knob) -> tuple[list[ActiveTerm], float]:
+    """Return the terms with a knob a little further on, and by how much."""
+    value = knob.of(terms)
+    step = _DIFFERENCE * (knob.scale if knob.is_shape else max(abs(value), knob.scale))
+    # At a bound one of both steps is held back.
+    other = max((knob.set(terms, value + sign * step) for sign in (1, -1)), key=lambda one: abs(knob.of(one) - value))
+    return other, knob.of(other) - value
 
 
 def refit(design: Design, named: Fit, terms: Sequence[ActiveTerm], before: Sequence[ActiveTerm]) -> list[Refitted]:
@@ -148,6 +153,8 @@ def refit(design: Design, named: Fit, terms: Sequence[ActiveTerm], before: Seque
     point = np.clip(point, unknowns.low, unknowns.high)
     whitening: Whitening | None = None
     line = solver.remembered(unknowns.line)
+    # A round begins where the one before it ended.
+    sensitivities = solver.remembered(lambda point: unknowns.slopes(point, line(point)))
     for _ in range(rules.refit_rounds):
         # The noise is fitted about the model as it now stands.
         errors = average(line(point).errors[None])[0]
@@ -160,7 +167,7 @@ def refit(design: Design, named: Fit, terms: Sequence[ActiveTerm], before: Seque
             return view.flat(plain + np.tensordot(point[size : size + other], background, axes=1) + misfit)[:, 0]
 
         def jacobian(point: Floats, view: _View = view) -> Floats:
-            slopes = average(unknowns.slopes(point, line(point)))
+            slopes = average(sensitivities(point))
             return view.flat(np.concatenate([slopes[:size], background, slopes[size:]]))
 
         solution = solver.solve(

@@ -126,27 +126,53 @@ def linearise(
     return line
 
 
-def parameter_sensitivities(line: Linearisation, names: Sequence[str], spread: Floats) -> Floats:
-    """Return d(error)/d(parameter), (len(names), 3, r, steps), by finite differences.
+def parameter_sensitivities(
+    line: Linearisation, names: Sequence[str], spread: Floats, others: Sequence[tuple[ActiveEffects, float]] = ()
+) -> Floats:
+    """Return d(error)/d(parameter), (len(names) + len(others), 3, r, steps), by finite differences.
 
     Args:
         line: where to differentiate.
         names: of the parameters.
         spread: prior standard deviation of each, (len(names),).
+        others: values of the line's effects in further variants, and by how much what they vary differs.
     """
-    value = np.array([line.parameters[name] for name in names])
+    value, count = np.array([line.parameters[name] for name in names]), len(names)
     step = PARAMETER_DIFFERENCE * spread
     high = np.array([PARAMETERS[name].high for name in names])
     step = np.where(value + step > high, -step, step)
-    variants = value + np.diag(step)
+    variants = np.concatenate([value + np.diag(step), np.tile(value, (len(others), 1))])
     varied = {**line.parameters, **{name: variants[:, k : k + 1] for k, name in enumerate(names)}}
     # Memories of processes run along the log as they are: one course of drivers, not one a variant.
     remembering = {one.name for one in EFFECTS.values() if one.kind == "process" and one.memory is not None}
     plain = {name: values for name, values in line.effects.items() if name not in remembering}
     states = dict(observe(line.record, varied, plain))
     states |= {name: values for name, values in line.states.items() if name not in states}
-    shown = free_run(line.record, states, line.runs.starts, line.runs.steps, varied, line.effects, line.added)
-    return -(_batched(shown, len(names), line) - line.shown) / step[:, None, None, None]
+    effects = line.effects
+    if others:
+        observed = [observe(line.record, line.parameters, active) for active, _ in others]
+        states = {name: _joined(values, [one[name] for one in observed], count) for name, values in states.items()}
+        effects = {
+            name: {key: _joined(now, [active[name][key] for active, _ in others], count) for key, now in values.items()}
+            for name, values in effects.items()
+        }
+    shown = free_run(line.record, states, line.runs.starts, line.runs.steps, varied, effects, line.added)
+    amounts = np.array([*step, *(amount for _, amount in others)])
+    return np.asarray(-(_batched(shown, len(amounts), line) - line.shown) / amounts[:, None, None, None])
+
+
+def _joined(first: Array, others: Sequence[Array], count: int) -> Array:
+    """Return a value of `count` variants and of others after them, (count + others, 1 or n); as it is if all have it.
+
+    Args:
+        first: of the `count` variants, a float or (n,); or (count + others, n), of which the last rows are replaced.
+        others: of each other, a float or (n,).
+        count: of the variants.
+    """
+    if np.ndim(first) < 2 and all(np.array_equal(one, first) for one in others):
+        return first
+    before = first[:count] if np.ndim(first) == 2 else [first] * count
+    return np.stack(np.broadcast_arrays(*(np.atleast_1d(one) for one in (*before, *others))))
 
 
 def parameter_secant(line: Linearisation, names: Sequence[str], amount: float, share: bool) -> Floats:

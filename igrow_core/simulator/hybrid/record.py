@@ -120,7 +120,7 @@ def free_run(
         starts: rows to start from, (s,); start + steps must be less than n.
         steps: rows to run.
         parameters: floats, or arrays of shape (m, 1) for m variants at once.
-        effects: the active effects; their values are floats, (m, 1), or functions of time as (n,).
+        effects: the active effects; their values are floats, (m, 1), or functions of time as (n,) or (m, n).
         added: further fluxes by channel: (n,), or (steps, s) for fluxes that differ from start to start.
 
     Returns:
@@ -195,7 +195,7 @@ def _at_rows(effects: ActiveEffects, rows: Integers, count: int) -> ActiveEffect
     """Pick the rows of values that are functions of time."""
     return {
         effect: {
-            name: value[rows] if isinstance(value, np.ndarray) and value.shape == (count,) else value
+            name: value[..., rows] if isinstance(value, np.ndarray) and value.shape[-1:] == (count,) else value
             for name, value in values.items()
         }
         for effect, values in effects.items()
