@@ -23,7 +23,7 @@ demo: $(STAMP) ## Run the whole loop on a virtual greenhouse with an undeclared 
 # One thread of linear algebra a process: more of them wait for each other beside other processes, and burn twice the time.
 # Five processes on two cores, since many tests wait for a daemon, a line or a clock. They start hundreds of others, so
 # what Python has compiled is kept, whatever the environment says.
-test: $(STAMP) ## Run the tests (ten minutes on two cores).
+test: $(STAMP) ## Run the tests (ten minutes on two fast cores, twenty on slow ones).
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/pytest -n 5 --dist worksteal -m 'not soak and not notebooks' tests
 
 page-pictures: $(STAMP) ## Take the pictures of docs/page.md anew (needs Chromium).
