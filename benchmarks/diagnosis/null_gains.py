@@ -19,7 +19,7 @@ from igrow.trainer.data import prepare_log
 from igrow.trainer.diagnosis import change, diagnose, history, linear, parameter_change, search
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.freerun import log_days
-from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, VENTS
+from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX
 from igrow.trainer.diagnosis.null_gains import NullGains
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.diagnosis.visible_parameters import members
@@ -46,8 +46,7 @@ def gained(job: Later) -> Gained:
     known, site = reference.model.history, reference.greenhouse.site
     assert known is not None
     days = log_days(prepare_log(telemetry, site), reference.model)
-    rules = history.with_vents(known, days.record, DEFAULT)
-    unasked = VENTS if history.vents_hardly_open(known, days.record, DEFAULT) else frozenset[str]()
+    unasked, rules = history.with_vents(known, days.record, DEFAULT)
     plain = history.laid_out(days, site, known, (), rules)
     design = history.expected(known, plain, history.expected_misfit(known, plain))
     effects = _gains(design, search.score_candidates)

@@ -51,7 +51,7 @@ def told(job: Later) -> Told:
     site, rng = reference.greenhouse.site, np.random.default_rng(0)
     log = prepare_log(telemetry, site)
     days = log_days(log, reference.model)
-    rules = history.with_vents(reference.model.history, days.record, DEFAULT)
+    _, rules = history.with_vents(reference.model.history, days.record, DEFAULT)
     knowledge = knowledge_of(reference.model, site, rules)
     search = search_of(days, site, knowledge, frozenset(), rules, None, None)
     assert isinstance(search, Change)

@@ -37,7 +37,7 @@ from igrow.trainer.diagnosis.diagnosed_days import since_calibration, weeks_in_t
 from igrow.trainer.diagnosis.estimate import Estimated, from_before, normal_quantile
 from igrow.trainer.diagnosis.evidence import Evidence
 from igrow.trainer.diagnosis.freerun import log_days
-from igrow.trainer.diagnosis.knowledge import VENTS, ActiveTerm, knowledge_of
+from igrow.trainer.diagnosis.knowledge import ActiveTerm, knowledge_of
 from igrow.trainer.diagnosis.nuisance import NuisanceSubspace
 from igrow.trainer.diagnosis.null_gains import NullGains
 from igrow.trainer.diagnosis.open_vents import under_open_vents
@@ -145,8 +145,7 @@ class _Question:
         knowledge = knowledge_of(known, site, rules)
         progress("completing the log")
         logged, rng = log_days(log, model), np.random.default_rng(self.seed)
-        of_vents = VENTS if history.vents_hardly_open(knowledge.history, logged.record, rules) else frozenset[str]()
-        rules = history.with_vents(knowledge.history, logged.record, rules)
+        of_vents, rules = history.with_vents(knowledge.history, logged.record, rules)
         knowledge = knowledge_of(known, site, rules)
         completed = complete(log, logged, model, knowledge, rules)
         days, opened = completed.days, under_open_vents(logged.record, rules)

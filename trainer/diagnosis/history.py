@@ -23,7 +23,7 @@ from igrow.trainer.diagnosis import candidates, linear, noise, parameter_change,
 from igrow.trainer.diagnosis.amplitudes import columns, drift_over, drift_within, hardly_shown, keys, omission
 from igrow.trainer.diagnosis.design import Design, History, of_parts
 from igrow.trainer.diagnosis.freerun import LogDays
-from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, ActiveTerm, activate, knowledge_of
+from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, VENTS, ActiveTerm, activate, knowledge_of
 from igrow.trainer.diagnosis.linear import DailyGrams, LinearModel
 from igrow.trainer.diagnosis.noise import Whitening
 from igrow.trainer.diagnosis.null_gains import NullGains, read_null_gains
@@ -89,10 +89,14 @@ def vents_hardly_open(known: Discrepancy | None, record: Record, rules: Decision
     return untried or opening < rules.least_opening_share * known.opening
 
 
-def with_vents(known: Discrepancy | None, record: Record, rules: DecisionRules) -> DecisionRules:
-    """Return the rules for a log: where its vents hardly open, their law may be off by more than physics lets drift."""
-    hardly = vents_hardly_open(known, record, rules)
-    return replace(rules, vent_drift=rules.narrow_vent_drift) if hardly else rules
+def with_vents(known: Discrepancy | None, record: Record, rules: DecisionRules) -> tuple[frozenset[str], DecisionRules]:
+    """Return the parameters of vents that are not asked of a log, and the rules for it.
+
+    Where vents hardly open their law may be off by more than physics lets drift.
+    """
+    if vents_hardly_open(known, record, rules):
+        return VENTS, replace(rules, vent_drift=rules.narrow_vent_drift)
+    return frozenset(), rules
 
 
 def jointly(

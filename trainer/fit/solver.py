@@ -191,7 +191,7 @@ def covariance(
 
 
 def remembered(model: Callable[[Floats], Answer]) -> Callable[[Floats], Answer]:
-    """Return a model that knows its answer to the latest point, whose errors are asked before its slopes.
+    """Return a model that knows its answer to the latest point: it is asked for slopes too, and where a fit goes on.
 
     Args:
         model: of a point (p,); nobody may write into its answer.
