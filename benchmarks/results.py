@@ -213,6 +213,13 @@ RESULTS = {
         "300000 and on",
         long=True,
     ),
+    "diagnosis-foreign": Result(
+        "Greenhouses of another structure",
+        ("benchmarks.diagnosis", "same", "--foreign", "--greenhouses", "4", "--cases", "120", "--history-only"),
+        "A simulator that shares no balance with the project's own plant; nothing was learned or tuned on its seeds.",
+        "800000 and on",
+        long=True,
+    ),
     "diagnosis-same-season": Result(
         "The same greenhouse later, over twelve weeks",
         ("benchmarks.diagnosis", "same", "--days", "84", "--greenhouses", "2", "--cases", "60", "--history-only"),

@@ -55,6 +55,7 @@ def main() -> int:
         "--greenhouses", type=int, help="of `same`, `separating`: in the nursery of a season (default: 6; 2)"
     )
     parser.add_argument("--tuning", action="store_true", help="of `same`: greenhouses and seeds that rules are set on")
+    parser.add_argument("--foreign", action="store_true", help="of `same`: greenhouses of another structure")
     parser.add_argument("--compartment", default="", help="of `real`: those whose name has this in it (default: all)")
     parser.add_argument("--withheld-only", action="store_true", help="of `real`: leave out built-in bundle and placebo")
     parser.add_argument("--history-only", action="store_true", help="of `same`: leave out what is known in general")

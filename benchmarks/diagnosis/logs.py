@@ -9,11 +9,11 @@ import numpy as np
 
 from benchmarks.diagnosis.cases import Case, hidden
 from benchmarks.diagnosis.greenhouses import VirtualGreenhouse
+from benchmarks.diagnosis.makers import State
 from igrow.core import sun
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.effects import EFFECTS
 from igrow.core.greenhouse import Disturbances, GreenhouseParameters, recipe, simulate_many
-from igrow.core.greenhouse.tomato import Crop
 from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
 from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
@@ -37,8 +37,8 @@ class Reference:
     greenhouse: VirtualGreenhouse
     model: FittedModel
     unit: dict[str, float]
-    crop: Crop
-    """At the end of the log that it was calibrated on."""
+    state: State
+    """At the end of the log that it was calibrated on: where its later logs begin."""
 
 
 def reference(greenhouse: VirtualGreenhouse) -> Reference:
@@ -49,15 +49,15 @@ def reference(greenhouse: VirtualGreenhouse) -> Reference:
     return referenced(greenhouse, log.measured, log.crop)
 
 
-def referenced(greenhouse: VirtualGreenhouse, log: Telemetry, crop: Crop) -> Reference:
-    """Calibrate on the log of a greenhouse, and measure sizes; `crop` is that at its end."""
+def referenced(greenhouse: VirtualGreenhouse, log: Telemetry, state: State) -> Reference:
+    """Calibrate on the log of a greenhouse, and measure sizes; `state` is that at its end."""
     seen = prepare_log(log, greenhouse.site)
     model = calibrate(seen)
     record = seen.record(model.alignment or 0.0)
     if model.history is None:
         # Learned here whether or not it is asked by default.
         model = replace(model, history=history_of(record, model, DEFAULT))
-    return Reference(greenhouse, model, enr_units(record, model), crop)
+    return Reference(greenhouse, model, enr_units(record, model), state)
 
 
 def built_in(site: Site) -> FittedModel:

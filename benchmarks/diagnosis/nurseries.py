@@ -15,9 +15,7 @@ import numpy as np
 from benchmarks.diagnosis.cases import CHANGES, SEASONS, Case, hidden
 from benchmarks.diagnosis.greenhouses import OTHERS_SPREAD, VirtualGreenhouse, site_of
 from benchmarks.diagnosis.logs import REFERENCE_DAYS, Reference, disturbances, referenced
-from igrow.core.greenhouse import GreenhouseParameters, recipe, simulate_many
-from igrow.core.greenhouse.parameters import stack
-from igrow.core.greenhouse.tomato import Crop, mature_crop, young_crop
+from benchmarks.diagnosis.makers import OWN, Maker, Plant, State
 from igrow.core.telemetry import Telemetry
 
 DRIFT = 0.015
@@ -34,6 +32,7 @@ class Nursery:
 
     season: str
     greenhouses: tuple[VirtualGreenhouse, ...]
+    maker: Maker = OWN
 
     @property
     def start(self) -> np.datetime64:
@@ -41,16 +40,17 @@ class Nursery:
         return self.greenhouses[0].start
 
 
-def nursery(season: str, count: int, first: int) -> Nursery:
+def nursery(season: str, count: int, first: int, maker: Maker = OWN) -> Nursery:
     """Draw a nursery.
 
     Args:
         season: its logs begin about the day of `SEASONS`.
         count: of greenhouses.
         first: seed of the place; no other nursery within a thousand.
+        maker: whose greenhouses they are.
     """
     rng = np.random.default_rng(first)
-    usual = GreenhouseParameters(latitude=float(rng.uniform(42.0, 60.0)))
+    usual = maker.usual(float(rng.uniform(42.0, 60.0)))
     start = np.datetime64(f"{SEASONS[season]}T00:00:00") + np.timedelta64(int(rng.integers(-JITTER, JITTER + 1)), "D")
     found = []
     for number in range(count):
@@ -59,63 +59,61 @@ def nursery(season: str, count: int, first: int) -> Nursery:
         if number % 2:
             plant = replace(plant, lamp_capacity=0.0)
         found.append(VirtualGreenhouse(site_of(f"{season}-{first}-{number}", plant), plant, start, seed))
-    return Nursery(season, tuple(found))
+    return Nursery(season, tuple(found), maker)
 
 
-def calibration_logs(known: Nursery) -> list[tuple[Telemetry, Crop]]:
-    """Simulate the weeks before, with nothing hidden: of every greenhouse the log, and the crop at its end."""
+def calibration_logs(known: Nursery) -> list[tuple[Telemetry, State]]:
+    """Simulate the weeks before, with nothing hidden: of every greenhouse the log, and the state at its end."""
     greenhouses = known.greenhouses
-    start, count = known.start - np.timedelta64(REFERENCE_DAYS, "D"), len(greenhouses)
-    seasons = simulate_many(
-        [one.plant for one in greenhouses],
+    start = known.start - np.timedelta64(REFERENCE_DAYS, "D")
+    plants = [one.plant for one in greenhouses]
+    return known.maker.run(
+        plants,
         [one.weather(start, known.start, one.seed) for one in greenhouses],
-        recipe,
         start,
         known.start,
-        count=count,
+        known.maker.begun(plants, np.arange(len(plants)) % 3 == 2),
         seed=greenhouses[0].seed,
-        crop=_planted(greenhouses),
     )
-    return [(one.measured, one.crop) for one in seasons]
 
 
-def calibrated(job: tuple[VirtualGreenhouse, tuple[Telemetry, Crop]]) -> Reference:
+def calibrated(job: tuple[VirtualGreenhouse, tuple[Telemetry, State]]) -> Reference:
     """Return a greenhouse calibrated on its log."""
-    greenhouse, (log, crop) = job
-    return referenced(greenhouse, log, crop)
+    greenhouse, (log, state) = job
+    return referenced(greenhouse, log, state)
 
 
-def later_logs(known: Sequence[Reference], cases: Sequence[Sequence[Case]], days: int) -> list[list[Telemetry]]:
+def later_logs(
+    known: Sequence[Reference], cases: Sequence[Sequence[Case]], days: int, maker: Maker = OWN
+) -> list[list[Telemetry]]:
     """Simulate all cases of a nursery as one batch: its greenhouses themselves, some time after their calibration.
 
     Args:
         known: the greenhouses.
         cases: of each of them.
         days: of a log.
+        maker: whose greenhouses they are.
     """
     pairs = [(one, case) for one, own in zip(known, cases, strict=True) for case in own]
     if not pairs:
         return [[] for _ in known]
     start = known[0].greenhouse.start
     end = start + np.timedelta64(days, "D")
-    crops = [one.crop for one, _ in pairs]
-    seasons = simulate_many(
+    runs = maker.run(
         [later(one.greenhouse, case) for one, case in pairs],
         [one.greenhouse.weather(start, end, case.seed) for one, case in pairs],
-        recipe,
         start,
         end,
-        count=len(pairs),
+        [one.state for one, _ in pairs],
         seed=pairs[0][1].seed,
         effects=[hidden(case, one.unit, start) for one, case in pairs],
         disturbances=[disturbances(case) for _, case in pairs],
-        crop=Crop(*(np.concatenate(parts, axis=-1) for parts in zip(*crops, strict=True))),
     )
-    logs = iter(seasons)
-    return [[next(logs).measured for _ in own] for own in cases]
+    logs = iter(runs)
+    return [[next(logs)[0] for _ in own] for own in cases]
 
 
-def later(greenhouse: VirtualGreenhouse, case: Case) -> GreenhouseParameters:
+def later(greenhouse: VirtualGreenhouse, case: Case) -> Plant:
     """Return the greenhouse as it is when the log of a case is taken."""
     plant = greenhouse.plant.varied(np.random.default_rng(case.seed), relative=DRIFT)
     if case.changed:
@@ -124,10 +122,3 @@ def later(greenhouse: VirtualGreenhouse, case: Case) -> GreenhouseParameters:
     if case.group != "clean":
         return plant
     return replace(plant, cover_transmission=plant.cover_transmission * CLEANED)
-
-
-def _planted(greenhouses: Sequence[VirtualGreenhouse]) -> Crop:
-    plants, like = stack([one.plant for one in greenhouses]), np.zeros(len(greenhouses))
-    young = np.arange(len(greenhouses)) % 3 == 2
-    both = zip(young_crop(plants, like), mature_crop(plants, like), strict=True)
-    return Crop(*(np.where(young, planted, grown) for planted, grown in both))

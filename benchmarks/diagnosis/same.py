@@ -20,6 +20,7 @@ import numpy as np
 
 from benchmarks.diagnosis.cases import CHANGES, FORMS, SEASONS, Case, Turn
 from benchmarks.diagnosis.logs import Reference
+from benchmarks.diagnosis.makers import FOREIGN, OWN
 from benchmarks.diagnosis.nurseries import calibrated, calibration_logs, later, later_logs, nursery
 from benchmarks.diagnosis.scoring import Outcome, has_all, is_first, judge
 from benchmarks.jobs import Jobs
@@ -32,6 +33,8 @@ from igrow.trainer.diagnosis.null_gains import read_null_gains
 CASES, DAYS = 60, 28
 SEEDS = {"tuning": 200_000, "scoring": 300_000}
 """Of the first nursery; each season's are ten thousand on."""
+FOREIGN_SEEDS = {"tuning": 700_000, "scoring": 800_000}
+"""The same of greenhouses of another structure."""
 GREENHOUSES = 6
 """In a nursery."""
 GROUPS = (
@@ -130,11 +133,12 @@ def table(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int, str]]:
     return rows
 
 
-def prepared(job: tuple[str, str, int, int, int]) -> list[tuple[Case, Telemetry, Reference]]:
+def prepared(job: tuple[str, str, int, int, int, bool]) -> list[tuple[Case, Telemetry, Reference]]:
     """Simulate and calibrate the nursery of a season; return its cases, their logs, and their greenhouses."""
-    kind, season, greenhouses, count, days = job
-    first = SEEDS[kind] + 10_000 * list(SEASONS).index(season)
-    known = nursery(season, greenhouses, first)
+    kind, season, greenhouses, count, days, foreign = job
+    seeds, maker = (FOREIGN_SEEDS, FOREIGN) if foreign else (SEEDS, OWN)
+    first = seeds[kind] + 10_000 * list(SEASONS).index(season)
+    known = nursery(season, greenhouses, first, maker)
     references: dict[str, Reference] = {}
     for own_log in zip(known.greenhouses, calibration_logs(known), strict=True):
         one = calibrated(own_log)
@@ -142,7 +146,7 @@ def prepared(job: tuple[str, str, int, int, int]) -> list[tuple[Case, Telemetry,
         print(f"{season}: {len(references)} of {greenhouses} calibrated", file=sys.stderr, flush=True)
     cases = draw(kind, first, count, {name: one.unit for name, one in references.items()})
     own = [[case for case in cases if case.greenhouse == name] for name in references]
-    logs = later_logs(list(references.values()), own, days)
+    logs = later_logs(list(references.values()), own, days, maker)
     print(f"{season}: {len(cases)} logs", file=sys.stderr, flush=True)
     return [
         (case, log, one)
@@ -163,8 +167,8 @@ def main(options: Namespace) -> int:
     greenhouses, count = options.greenhouses or GREENHOUSES, (options.cases or CASES) // len(seasons)
     names = ["history"] if options.history_only else list(RULES)
     outcomes: list[dict[str, Outcome]] = []
-    with Jobs("diagnosis same", options.processes) as jobs:
-        wanted = [(kind, season, greenhouses, count, options.days) for season in seasons]
+    with Jobs("diagnosis foreign" if options.foreign else "diagnosis same", options.processes) as jobs:
+        wanted = [(kind, season, greenhouses, count, options.days, options.foreign) for season in seasons]
         cases = [case for own in jobs.each(prepared, wanted) for case in own]
         for number, one in enumerate(jobs.each(partial(_judge, names=names), cases), 1):
             outcomes.append(one)

@@ -98,7 +98,7 @@ def simulated(chosen: Sequence[Trial], days: int) -> list[Season]:
     """Return the season of each trial, all as one batch."""
     start = chosen[0].known.greenhouse.start
     end = start + np.timedelta64(days, "D")
-    crops = [one.known.crop for one in chosen]
+    crops = [one.known.state for one in chosen]
     return simulate_many(
         [later(one.known.greenhouse, one.case) for one in chosen],
         [one.known.greenhouse.weather(start, end, one.case.seed) for one in chosen],
