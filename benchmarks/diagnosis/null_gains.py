@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.diagnosis.null_logs import Later
+from benchmarks.diagnosis.null_logs import Later, rules_of
 from benchmarks.jobs import Jobs
 from igrow.trainer.data import prepare_log
 from igrow.trainer.diagnosis import change, diagnose, history, linear, parameter_change, search
@@ -46,7 +46,7 @@ def gained(job: Later) -> Gained:
     known, site = reference.model.history, reference.greenhouse.site
     assert known is not None
     days = log_days(prepare_log(telemetry, site), reference.model)
-    unasked, rules = history.with_vents(known, days.record, DEFAULT)
+    unasked, rules = history.with_vents(known, days.record, rules_of(days.record, known, site))
     plain = history.laid_out(days, site, known, (), rules)
     design = history.expected(known, plain, history.expected_misfit(known, plain))
     effects = _gains(design, search.score_candidates)

@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 
 from benchmarks.diagnosis.null_gains import FALSE_CLAIMS, largest
-from benchmarks.diagnosis.null_logs import Later
+from benchmarks.diagnosis.null_logs import Later, rules_of
 from benchmarks.jobs import Jobs
 from igrow.trainer.data import prepare_log
-from igrow.trainer.diagnosis import DEFAULT, cross_validation, history, null_gains, unexplained
+from igrow.trainer.diagnosis import cross_validation, history, null_gains, unexplained
 from igrow.trainer.diagnosis.candidates import Pattern
 from igrow.trainer.diagnosis.cross_validation import CrossValidated, cross_validated
 from igrow.trainer.diagnosis.freerun import log_days
@@ -51,7 +51,8 @@ def told(job: Later) -> Told:
     site, rng = reference.greenhouse.site, np.random.default_rng(0)
     log = prepare_log(telemetry, site)
     days = log_days(log, reference.model)
-    _, rules = history.with_vents(reference.model.history, days.record, DEFAULT)
+    known = reference.model.history
+    _, rules = history.with_vents(known, days.record, rules_of(days.record, known, site))
     knowledge = knowledge_of(reference.model, site, rules)
     search = search_of(days, site, knowledge, frozenset(), rules, None, None)
     assert isinstance(search, Change)

@@ -87,16 +87,19 @@ def test_what_is_not_asked_of_a_crop_that_grew_is_said(quiet_log: Log) -> None:
     assert "structure_shade" in result.untestable
 
 
-def test_a_crop_that_grew_unmeasured_may_differ_as_far_as_its_usual_course_says(quiet_log: Log) -> None:
-    log = log_of(quiet_log, 56, 84)
-    measured = replace(log, telemetry=Telemetry(log.telemetry.time, {"leaf_area_index": np.full(28 * 24, 3.0)}))
-    young, grown, other = (calibrated(PLANTED + np.timedelta64(days, "D")) for days in (28, 100, -60))
-    drifts = [with_its_drift(DEFAULT, log, one).crop_drift for one in (other, young, grown)]
-    assert drifts[0] == DEFAULT.new_crop_drift
-    assert DEFAULT.new_crop_drift > drifts[1] > 5.0 * DEFAULT.crop_drift
-    assert drifts[2] == DEFAULT.crop_drift
-    assert with_its_drift(DEFAULT, measured, young) == DEFAULT
-    assert with_its_drift(DEFAULT, log, model_in_force()) == DEFAULT
+def test_crop_and_light_may_differ_by_the_leaves_that_the_calibration_has_not_seen(quiet_log: Log) -> None:
+    site = log_of(quiet_log, 56, 84).known_site
+    known = calibrated(PLANTED + np.timedelta64(28, "D")).history
+    assert known is not None
+    other = with_its_drift(DEFAULT, known, site, 3.0, new_crop=True)
+    young, usual, grown = (
+        with_its_drift(DEFAULT, replace(known, leaf_area=then), site, 3.0) for then in (1.5, np.nan, 2.8)
+    )
+    assert (other.crop_drift, other.light_drift) == (DEFAULT.new_crop_drift, DEFAULT.new_crop_drift)
+    assert young.crop_drift == young.light_drift == pytest.approx(0.5 * DEFAULT.new_crop_drift)
+    # Where it is not known, the usual course says what there was four weeks after the planting.
+    assert DEFAULT.new_crop_drift > usual.crop_drift > 5.0 * DEFAULT.crop_drift
+    assert grown == with_its_drift(DEFAULT, None, site, 3.0) == DEFAULT
 
 
 def test_a_crop_may_differ_more_than_the_walls() -> None:

@@ -1,7 +1,8 @@
 """The crop of a log, beside the one that its model was calibrated on.
 
-Where nobody measures the leaf area, the usual course since the planting stands in (`nominal.leaf_area_curve`). A
-calibration in a young crop puts that course's error into the crop's parameters, and they are off as it grows on.
+A calibration in a young crop puts what its model says wrongly of leaves into the parameters, and these are off as the
+crop grows on; more so where nobody measures the leaf area, and the usual course since the planting stands in
+(`nominal.leaf_area_curve`).
 """
 
 from __future__ import annotations
@@ -12,12 +13,13 @@ import numpy as np
 
 from igrow.core.arrays import Times
 from igrow.core.effects import EFFECTS
-from igrow.core.simulator.hybrid.nominal import leaf_area_curve, measures_leaf_area
+from igrow.core.simulator.hybrid.nominal import leaf_area_curve
 from igrow.core.site import Site
 from igrow.trainer.data.log import Log
 from igrow.trainer.diagnosis.knowledge import CROP
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.diagnosis.visible_parameters import VISIBLE
+from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.model import FittedModel
 
 _OF_LEAVES = frozenset({"leaf_area_index", "transpiration", "assimilation"})
@@ -54,13 +56,35 @@ def has_new_crop(time: Times, site: Site, model: FittedModel) -> bool:
     return known is not None and bool(np.any(time[-1:] >= planted)) and bool(known.middle < planted)
 
 
-def with_its_drift(rules: DecisionRules, log: Log, model: FittedModel) -> DecisionRules:
-    """Return rules by which a crop may differ as far as its leaf area does, where only the usual course tells that."""
-    site, known, telemetry = log.known_site, model.history, log.telemetry
-    if has_new_crop(telemetry.time, site, model):
-        return replace(rules, crop_drift=rules.new_crop_drift)
-    if known is None or measures_leaf_area(telemetry):
+def with_its_drift(
+    rules: DecisionRules, known: Discrepancy | None, site: Site, leaf_area: float, *, new_crop: bool = False
+) -> DecisionRules:
+    """Return rules by which crop, light and discrepancy may differ by the share of the leaves that is new to the model.
+
+    What a model says of few leaves does not hold of many: which share of the light they take, what they make of it, and
+    what the model misses of both. For that share all is as uncertain again as before the calibration.
+
+    Args:
+        rules: every threshold.
+        known: what the calibration learned of the greenhouse.
+        site: as it is described now.
+        leaf_area: mean leaf area index of the log, measured or by the usual course.
+        new_crop: see `has_new_crop`.
+    """
+    if known is None:
         return rules
-    then, now = (float(leaf_area_curve(site, time).mean()) for time in (np.array([known.middle]), telemetry.time))
-    grown = abs(now - then) / max(now, then)
-    return replace(rules, crop_drift=max(rules.crop_drift, grown * rules.new_crop_drift))
+    then = known.leaf_area
+    if np.isnan(then):
+        then = float(leaf_area_curve(site, np.array([known.middle])).mean())
+    unseen = 1.0 if new_crop else abs(leaf_area - then) / max(leaf_area, then, 1e-9)
+    share = unseen * rules.new_crop_drift
+    if share <= rules.crop_drift:
+        return rules
+    return replace(
+        rules,
+        crop_drift=share,
+        light_drift=max(rules.light_drift, share),
+        effect_drift=max(rules.effect_drift, unseen * rules.omission_effect),
+        co2_source_drift=max(rules.co2_source_drift, unseen * rules.omission_effect),
+        pattern_drift=max(rules.pattern_drift, unseen * rules.omission_pattern),
+    )

@@ -139,19 +139,21 @@ class _Question:
             earlier: causes that the weeks before it have told.
         """
         model, rules, progress, site = self.model, self.rules, self.progress, log.known_site
-        new_crop, rules = has_new_crop(log.telemetry.time, site, model), with_its_drift(rules, log, model)
         # What is shipped asks the next log by the calibration.
         known = replace(model, history=self.history or model.history)
-        knowledge = knowledge_of(known, site, rules)
         progress("completing the log")
         logged, rng = log_days(log, model), np.random.default_rng(self.seed)
+        new_crop, leaf_area = has_new_crop(log.telemetry.time, site, model), history.leaf_area_of(logged.record)
+        rules = with_its_drift(rules, model.history, site, leaf_area, new_crop=new_crop)
+        knowledge = knowledge_of(known, site, rules)
         of_vents, rules = history.with_vents(knowledge.history, logged.record, rules)
         knowledge = knowledge_of(known, site, rules)
         completed = complete(log, logged, model, knowledge, rules)
         days, opened = completed.days, under_open_vents(logged.record, rules)
         off = opened is not None and opened.is_offset(rules)
         # Of a crop that may be another by now nothing is asked, nor of the light, which its leaves take up.
-        of_crop = LEAVES_AND_LIGHT if rules.crop_drift > self.rules.crop_drift else frozenset[str]()
+        unmeasured = "leaf_area_index" in logged.record.missing and rules.crop_drift > self.rules.crop_drift
+        of_crop = LEAVES_AND_LIGHT if new_crop or unmeasured else frozenset[str]()
         hidden = self.without | (frozenset({"co2_drift"}) if off else frozenset()) | of_crop | of_vents
         search = search_of(
             days, site, knowledge, hidden, rules, self.nuisance, self.null_gains, is_later=self.history is not None

@@ -236,7 +236,13 @@ def log_days(log: Log, model: FittedModel) -> LogDays:
 
 def root_mean_square(values: Floats) -> float:
     """Return the root of the mean square over what is finite (NaN for nothing)."""
-    return float(np.sqrt(np.nanmean(values**2))) if np.isfinite(values).any() else float("nan")
+    return float(np.sqrt(np.nanmean(_squared(values)))) if np.isfinite(values).any() else float("nan")
+
+
+def _squared(values: Floats) -> Floats:
+    """Return squares; those of a run that leaves all bounds are infinite, which is no fault of whoever asks."""
+    with np.errstate(over="ignore"):
+        return np.square(values)
 
 
 def effect_to_noise(plain: FreeRuns, corrected: FreeRuns) -> float:
@@ -283,8 +289,8 @@ def skill_by_day(before: FreeRuns, after: FreeRuns) -> Floats:
     by_day = np.zeros(len(days))
     quantities = [name for name in before.errors if np.isfinite(before.errors[name]).any()]
     for name in quantities:
-        scale = np.nanmean(before.errors[name] ** 2)
-        fall = (before.errors[name] ** 2 - after.errors[name] ** 2) / scale
+        squared = _squared(before.errors[name])
+        fall = (squared - _squared(after.errors[name])) / np.nanmean(squared)
         for index, day in enumerate(days):
             part = fall[:, before.day == day]
             by_day[index] += np.nanmean(part) / len(quantities) if np.isfinite(part).any() else 0.0

@@ -67,6 +67,7 @@ def history_of(
         own_gains=own_gains(design),
         middle=_middle(record),
         opening=opening_of(record),
+        leaf_area=leaf_area_of(record),
         unseen=tuple(sorted(hardly_shown(design))),
     )
 
@@ -74,6 +75,11 @@ def history_of(
 def opening_of(record: Record) -> float:
     """Return the mean opening of both rows of vents together, %."""
     return float(sum(record.inputs[row].mean() for row in ("vent_lee", "vent_wind")))
+
+
+def leaf_area_of(record: Record) -> float:
+    """Return the mean leaf area index, measured or by the usual course."""
+    return float(np.mean(record.inputs["leaf_area_index"]))
 
 
 def vents_hardly_open(known: Discrepancy | None, record: Record, rules: DecisionRules) -> bool:

@@ -32,6 +32,10 @@ CROP = frozenset({
     "assimilation_maximum", "assimilation_light", "assimilation_co2", "respiration",
 })  # fmt: skip
 """Parameters that change as the crop does."""
+LIGHT = frozenset({
+    "transmissivity", "solar_heat_share", "mass_solar_share", "lamp_heat_share", "lamp_radiation_share",
+})  # fmt: skip
+"""Parameters of where light ends, of which leaves take the more the more there are."""
 VENTS = frozenset({"vent_wind", "vent_stack", "vent_curvature", "vent_windward_ratio"})
 """Parameters of the law of what goes through the vents, at the openings that taught it."""
 
@@ -107,7 +111,8 @@ def drift(mean: Mapping[str, float], share: float, rules: DecisionRules) -> Floa
 
 def home_drift(mean: Mapping[str, float], rules: DecisionRules) -> Floats:
     """Return the change to expect of every parameter of a greenhouse since its calibration, (p,): the crop grows."""
-    of_its_kind = {**dict.fromkeys(CROP, rules.crop_drift), **dict.fromkeys(VENTS, rules.vent_drift)}
+    kinds = ((CROP, rules.crop_drift), (LIGHT, rules.light_drift), (VENTS, rules.vent_drift))
+    of_its_kind = {name: share for names, share in kinds for name in names}
     share = np.array([of_its_kind.get(name, rules.wall_drift) for name in mean])
     changes: Floats = share * drift(mean, 1.0, rules)
     return changes

@@ -67,9 +67,12 @@ class DecisionRules:
     )
     wall_drift: float = _tuned(0.015, "relative change of a parameter within some weeks, by physics")
     crop_drift: float = _tuned(0.05, "the same of a parameter of the crop")
+    light_drift: float = _tuned(0.015, "the same of a parameter that says where light ends")
     vent_drift: float = _tuned(0.015, "the same of a parameter of the vents' law")
     narrow_vent_drift: float = _chosen(0.25, "the same where the vents stand open much less than it was learned from")
-    new_crop_drift: float = _chosen(0.5, "the same of a crop that the calibration has not seen, or of so much of it")
+    new_crop_drift: float = _chosen(
+        0.5, "the same of crop and light where the calibration has not seen the crop, or of the share of its leaves"
+    )
     effect_drift: float = _tuned(0.02, "change of an effect in the discrepancy, in typical amplitudes")
     co2_source_drift: float = _tuned(0.1, "the same of a source of CO2, which a growing crop looks like")
     pattern_drift: float = _tuned(0.005, "the same of a pattern, in its units")

@@ -42,6 +42,8 @@ class Discrepancy:
     """Of the calibration log, UTC."""
     opening: float = math.nan
     """Of both rows of vents together, %, its mean over the calibration log; NaN: not known."""
+    leaf_area: float = math.nan
+    """Leaf area index, its mean over the calibration log, measured or by the usual course; NaN: not known."""
     unseen: tuple[str, ...] = ()
     """Keys of effects that the calibration log hardly showed: less was known of them before it."""
 
@@ -55,6 +57,7 @@ class Discrepancy:
             "own_gains": dict(self.own_gains),
             "middle": str(self.middle.astype("datetime64[s]")),
             "opening": self.opening,
+            "leaf_area": self.leaf_area,
             "unseen": self.unseen,
         }
         buffer, below = io.BytesIO(), np.tril_indices(len(self.amplitudes.names), -1)
@@ -94,6 +97,7 @@ class Discrepancy:
                 {str(key): float(gain) for key, gain in plain["own_gains"].items()},
                 np.datetime64(plain["middle"], "s"),
                 float(plain.get("opening", math.nan)),
+                float(plain.get("leaf_area", math.nan)),
                 tuple(map(str, plain.get("unseen", ()))),
             )
         except Exception as error:
