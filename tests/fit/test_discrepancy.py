@@ -24,8 +24,8 @@ def known() -> Discrepancy:
     covariance = np.array([[4.0, 1.0], [1.0, 9.0]])
     amplitudes = Gaussian(("parameter:leakage_wind", "heat:cold weather"), np.array([0.5, -2.0]), covariance)
     return Discrepancy(
-        {"leakage_wind": 0.06}, amplitudes, {0: (2.0, 4.5), 2: (1.0, 3.0)}, 900.0, {"lamp_heat": 7.5}, MIDDLE, 12.5, 2.25,
-        ("heating_valve_leak:threshold=3",),
+        {"leakage_wind": 0.06}, amplitudes, {0: (2.0, 4.5), 2: (1.0, 3.0)}, 900.0, {"lamp_heat": 7.5}, MIDDLE,
+        12.5, 2.25, ("heating_valve_leak:threshold=3",),
     )  # fmt: skip
 
 
