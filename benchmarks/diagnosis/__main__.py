@@ -4,12 +4,12 @@
 each, and prints the table beside its bounds. `others` does the same with greenhouses that nothing was learned from,
 each with a model calibrated on its own first weeks; `transferred` diagnoses the same logs with the built-in bundle.
 `matched` does the like with greenhouses of the simulator's own structure; `same` with greenhouses that have drifted a
-little since their calibration, and asks what has changed in them; `omission` takes terms out of the model before the
-calibration (with DATA: of the public logs) and asks the calibration log for them; `real` diagnoses the public logs.
-`nuisance` learns anew what greenhouses show though nothing is missing, and `rules` fits the bounds that are fitted,
-both from seeds that no case has, and `null-bounds` what a change must gain, and what it must take off unseen days;
-`separating` asks what tests of the plant bring, and `thresholds` prints all rules. Everything is made afresh: an hour
-or so on two cores, most of it for simulated weeks.
+little since their calibration, and asks what has changed in them (`--foreign`: of another structure); `omission` takes
+terms out of the model before the calibration (with DATA: of the public logs) and asks the calibration log for them;
+`real` diagnoses the public logs. `nuisance` learns anew what greenhouses show though nothing is missing, and `rules`
+fits the bounds that are fitted, both from seeds that no case has, and `null-bounds` what a change must gain, and what
+it must take off unseen days; `separating` asks what tests of the plant bring, and `thresholds` prints all rules.
+Everything is made afresh: an hour or so on two cores, most of it for simulated weeks.
 """
 
 from __future__ import annotations
