@@ -33,6 +33,13 @@ def test_skill_is_the_share_of_the_squared_error_that_falls_mean_over_days() -> 
     assert freerun.skill(before, runs([[2.0, 4.0], [2.0, 4.0]])) == pytest.approx(-1.5)
 
 
+def test_a_run_that_leaves_all_bounds_has_no_skill_and_says_nothing() -> None:
+    before, lost = runs([[2.0, 2.0], [2.0, 2.0]]), runs([[1e200, 1e200], [2.0, 2.0]])
+    with np.errstate(over="raise"):
+        assert freerun.skill(before, lost) == -np.inf
+        assert freerun.root_mean_square(lost.errors["air_temperature"]) == np.inf
+
+
 def test_what_was_not_measured_does_not_count() -> None:
     nan = float("nan")
     assert freerun.skill(runs([[2.0, nan], [2.0, 2.0]]), runs([[1.0, nan], [1.0, 2.0]])) == pytest.approx(0.375)
