@@ -15,7 +15,7 @@ import numpy as np
 from benchmarks.diagnosis.cases import CHANGES, SEASONS, Case, hidden
 from benchmarks.diagnosis.greenhouses import OTHERS_SPREAD, VirtualGreenhouse, site_of
 from benchmarks.diagnosis.logs import REFERENCE_DAYS, Reference, disturbances, referenced
-from benchmarks.diagnosis.makers import OWN, Maker, Plant, State
+from benchmarks.diagnosis.makers import OWN, Batch, Maker, Plant, State
 from igrow.core.telemetry import Telemetry
 
 DRIFT = 0.015
@@ -67,14 +67,9 @@ def calibration_logs(known: Nursery) -> list[tuple[Telemetry, State]]:
     greenhouses = known.greenhouses
     start = known.start - np.timedelta64(REFERENCE_DAYS, "D")
     plants = [one.plant for one in greenhouses]
-    return known.maker.run(
-        plants,
-        [one.weather(start, known.start, one.seed) for one in greenhouses],
-        start,
-        known.start,
-        known.maker.begun(plants, np.arange(len(plants)) % 3 == 2),
-        seed=greenhouses[0].seed,
-    )
+    weather = [one.weather(start, known.start, one.seed) for one in greenhouses]
+    begun = known.maker.begun(plants, np.arange(len(plants)) % 3 == 2)
+    return known.maker.run(Batch(plants, weather, start, known.start, begun, greenhouses[0].seed))
 
 
 def calibrated(job: tuple[VirtualGreenhouse, tuple[Telemetry, State]]) -> Reference:
@@ -99,17 +94,17 @@ def later_logs(
         return [[] for _ in known]
     start = known[0].greenhouse.start
     end = start + np.timedelta64(days, "D")
-    runs = maker.run(
+    batch = Batch(
         [later(one.greenhouse, case) for one, case in pairs],
         [one.greenhouse.weather(start, end, case.seed) for one, case in pairs],
         start,
         end,
         [one.state for one, _ in pairs],
-        seed=pairs[0][1].seed,
-        effects=[hidden(case, one.unit, start) for one, case in pairs],
-        disturbances=[disturbances(case) for _, case in pairs],
+        pairs[0][1].seed,
+        [hidden(case, one.unit, start) for one, case in pairs],
+        [disturbances(case) for _, case in pairs],
     )
-    logs = iter(runs)
+    logs = iter(maker.run(batch))
     return [[next(logs)[0] for _ in own] for own in cases]
 
 
