@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.diagnosis.cases import SEASONS
+from benchmarks.diagnosis.makers import Plant
 from igrow.core.greenhouse import GreenhouseParameters, generate_weather
 from igrow.core.greenhouse.weather import WeatherClimate
 from igrow.core.site import Crop, Greenhouse, Lamps, Site
@@ -27,7 +28,7 @@ class VirtualGreenhouse:
     """A greenhouse, and the day on which its logs begin; its model is calibrated on the eight weeks before."""
 
     site: Site
-    plant: GreenhouseParameters
+    plant: Plant
     start: np.datetime64
     seed: int
     """Of the log that it is calibrated on."""
@@ -79,7 +80,7 @@ def neighbours(greenhouse: VirtualGreenhouse, count: int) -> list[VirtualGreenho
     return found
 
 
-def site_of(name: str, plant: GreenhouseParameters) -> Site:
+def site_of(name: str, plant: Plant) -> Site:
     """Return what a grower would write down of a greenhouse."""
     lamps = Lamps() if plant.lamp_capacity > 0.0 else None
     described = Greenhouse(mean_height=float(np.mean(plant.air_height)), lamps=lamps)

@@ -9,11 +9,11 @@ import numpy as np
 
 from benchmarks.diagnosis.cases import Case, hidden
 from benchmarks.diagnosis.greenhouses import VirtualGreenhouse
-from benchmarks.diagnosis.makers import State
+from benchmarks.diagnosis.makers import Plant, State
 from igrow.core import sun
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.core.effects import EFFECTS
-from igrow.core.greenhouse import Disturbances, GreenhouseParameters, recipe, simulate_many
+from igrow.core.greenhouse import Disturbances, recipe, simulate_many
 from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
 from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
@@ -108,7 +108,7 @@ def simulate_cases(known: Reference, cases: Sequence[Case], days: int) -> list[T
     return [one.measured for one in seasons]
 
 
-def moved(greenhouse: VirtualGreenhouse, case: Case) -> GreenhouseParameters:
+def moved(greenhouse: VirtualGreenhouse, case: Case) -> Plant:
     """Return the greenhouse that the log of a case is of: not quite the one that the model was calibrated on."""
     return greenhouse.plant.varied(np.random.default_rng(case.seed), relative=MISMATCH)
 

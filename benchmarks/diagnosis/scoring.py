@@ -11,11 +11,12 @@ import numpy as np
 
 from benchmarks.diagnosis.cases import CHANGES, Case, hidden
 from benchmarks.diagnosis.logs import Reference, moved
+from benchmarks.diagnosis.makers import Plant
 from benchmarks.diagnosis.naming import is_named, kind
 from igrow.core import sun
 from igrow.core.arrays import Floats
 from igrow.core.effects import EFFECTS
-from igrow.core.greenhouse import GreenhouseParameters, HiddenEffect
+from igrow.core.greenhouse import HiddenEffect
 from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
@@ -76,7 +77,7 @@ def judge(
     case: Case,
     telemetry: Telemetry,
     reference: Reference,
-    plant: GreenhouseParameters,
+    plant: Plant,
     rules: DecisionRules = DEFAULT,
 ) -> Outcome:
     """Diagnose one case and compare with the truth.
@@ -129,9 +130,7 @@ def judge(
     )
 
 
-def true_changes(
-    findings: Sequence[Finding], before: GreenhouseParameters, now: GreenhouseParameters
-) -> tuple[str, ...]:
+def true_changes(findings: Sequence[Finding], before: Plant, now: Plant) -> tuple[str, ...]:
     """Return the parameters told to have changed of which the plant's has: as told more or less, and enough to be told.
 
     Args:

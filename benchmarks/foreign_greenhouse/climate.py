@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.foreign_greenhouse.crop import Exchange
-from benchmarks.foreign_greenhouse.plant import Batch, ForeignGreenhouse
+from benchmarks.foreign_greenhouse.plant import ForeignGreenhouse, Values
 from igrow.core.air import LATENT_HEAT, STEFAN_BOLTZMANN, VOLUMETRIC_HEAT, saturation_concentration
 from igrow.core.greenhouse.weather_table import WeatherRow
 
@@ -30,7 +30,7 @@ class Air:
     """Heat through the screens' cloth, W m-2 K-1."""
 
 
-def vented(p: ForeignGreenhouse, s: Batch, weather: WeatherRow) -> Any:
+def vented(p: ForeignGreenhouse, s: Values, weather: WeatherRow) -> Any:
     """Return the air through the vents, m3 m-2 s-1.
 
     Wind after De Jong (1990), lee and windward side; buoyancy by the opening to the power 1.5; both add as squares
@@ -44,7 +44,7 @@ def vented(p: ForeignGreenhouse, s: Batch, weather: WeatherRow) -> Any:
     return p.vent_area * np.sqrt((shares * weather.wind_speed) ** 2 + by_warmth**2)
 
 
-def air(p: ForeignGreenhouse, s: Batch, weather: WeatherRow, vents: Any, hidden: Any) -> Air:
+def air(p: ForeignGreenhouse, s: Values, weather: WeatherRow, vents: Any, hidden: Any) -> Air:
     """Return where air goes; a third of what leaks comes in below the screens, with what a hidden effect adds."""
     leakage = p.leakage * np.maximum(weather.wind_speed, 0.3)
     low = 0.35 * leakage + hidden
@@ -66,9 +66,9 @@ def air(p: ForeignGreenhouse, s: Batch, weather: WeatherRow, vents: Any, hidden:
 
 def advance(
     p: ForeignGreenhouse,
-    s: Batch,
+    s: Values,
     weather: WeatherRow,
-    light: Batch,
+    light: Values,
     crop: Exchange,
     moved: Air,
     added: tuple[Any, Any, Any],

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.foreign_greenhouse.plant import Batch, ForeignGreenhouse
+from benchmarks.foreign_greenhouse.plant import ForeignGreenhouse, Values
 from igrow.core.air import co2_fraction, relative_humidity, saturation_concentration
 from igrow.core.greenhouse.weather_table import WeatherRow
 
@@ -24,7 +24,7 @@ def recipe(hour: float, elevation: float) -> dict[str, float]:
 
 def control(
     p: ForeignGreenhouse,
-    s: Batch,
+    s: Values,
     weather: WeatherRow,
     setpoints: Mapping[str, float],
     errors: Mapping[str, Any],
@@ -88,7 +88,7 @@ def control(
     s["pulse"] = np.maximum(np.where(begins, 240.0, s["pulse"] - seconds), 0.0)
 
 
-def positions(p: ForeignGreenhouse, s: Batch) -> Batch:
+def positions(p: ForeignGreenhouse, s: Values) -> Values:
     """Return the actuators as a log has them, in the units of the registry."""
     screens = {name: 100.0 * s[name] for name in ("vent_lee", "vent_wind", "energy_screen", "blackout_screen")}
     return {

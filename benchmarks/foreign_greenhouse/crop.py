@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.foreign_greenhouse.plant import Batch, ForeignGreenhouse
+from benchmarks.foreign_greenhouse.plant import ForeignGreenhouse, Values
 from igrow.core.air import MOLAR_MASS_CO2, co2_fraction, saturation_concentration, saturation_pressure
 
 GROWTH_HOURS = 14.0
@@ -31,7 +31,7 @@ class Exchange:
     respired: Any
 
 
-def exchange(p: ForeignGreenhouse, s: Batch, light: Batch, hidden: Any, seconds: float) -> Exchange:
+def exchange(p: ForeignGreenhouse, s: Values, light: Values, hidden: Any, seconds: float) -> Exchange:
     """Return the crop's gas exchange, and let its leaves grow.
 
     Stomata by the form of Stanghellini (1987), photosynthesis after Acock et al. (1978), its answer to CO2 by Farquhar

@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.foreign_greenhouse.plant import Batch, ForeignGreenhouse
+from benchmarks.foreign_greenhouse.plant import ForeignGreenhouse, Values
 from igrow.core.greenhouse.weather_table import WeatherRow
 
 SOLAR_CONSTANT = 1370.0
 """W m-2."""
 
 
-def distribute(p: ForeignGreenhouse, s: Batch, weather: WeatherRow, elevation: float, loss: Any) -> Batch:
+def distribute(p: ForeignGreenhouse, s: Values, weather: WeatherRow, elevation: float, loss: Any) -> Values:
     """Return what canopy, floor, air and cover take up and what passes the cover, W m-2, and PAR, umol m-2 s-1.
 
     Args:

@@ -10,7 +10,7 @@ import numpy as np
 
 State = dict[str, float]
 """Every state of one greenhouse by its name; in a batch each is an array (N,)."""
-Batch = dict[str, Any]
+Values = dict[str, Any]
 """Named values of a batch, each a float or an array (N,)."""
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.foreign_greenhouse import climate, crop, light
 from benchmarks.foreign_greenhouse.computer import control, positions, recipe
-from benchmarks.foreign_greenhouse.plant import Batch, ForeignGreenhouse, State, stacked
+from benchmarks.foreign_greenhouse.plant import ForeignGreenhouse, State, Values, stacked
 from igrow.core import sun
 from igrow.core.air import co2_fraction, humidity_and_deficit, relative_humidity
 from igrow.core.arrays import Floats
@@ -21,7 +21,7 @@ from igrow.core.greenhouse.weather_table import WeatherRow, WeatherTable
 from igrow.core.telemetry import Telemetry
 
 TICK = 30.0
-"""Seconds of a step; with steps of five the air's mean is within .08 K, its humidity's within .2 %."""
+"""Seconds of a step; `tests/benchmarks/test_foreign_greenhouse.py` holds longer ones beside shorter."""
 TUESDAY, PICKING_HOUR = 1.0, 9.0
 
 
@@ -60,11 +60,11 @@ def simulate(
     bank = EffectBank(np, list(effects), count, begin) if any(len(one) for one in effects) else None
     unknown = combined(disturbances) if disturbances is not None else Disturbances()
     disturbed: list[Any] = [np.zeros(count)] * 3
-    s: Batch = {name: np.array([one[name] for one in states]) for name in states[0]}
+    s: Values = {name: np.array([one[name] for one in states]) for name in states[0]}
     rows = int((end - start) // np.timedelta64(int(INTERVAL), "s")) + 1
     logs: dict[str, Floats] = {}
     memory: list[Any] = []
-    faults: Batch = {}
+    faults: Values = {}
     moved = positions(p, s)
     for row in range(rows):
         now = begin + row * INTERVAL
@@ -106,9 +106,9 @@ def simulate(
 
 def _advance(
     p: ForeignGreenhouse,
-    s: Batch,
+    s: Values,
     weather: WeatherRow,
-    shone: Batch,
+    shone: Values,
     added: Mapping[str, Any],
     disturbed: Sequence[Any],
     seconds: float,
@@ -123,7 +123,7 @@ def _advance(
     s["ventilation"], s["transpiration"], s["assimilation"] = vents, gases.transpired, gases.taken
 
 
-def shown(s: Batch, weather: WeatherRow, setpoints: Mapping[str, float], shone: Batch) -> Batch:
+def shown(s: Values, weather: WeatherRow, setpoints: Mapping[str, float], shone: Values) -> Values:
     """Return weather, climate and setpoints as exact sensors would show them."""
     like = 0.0 * s["air"]
     return {
@@ -140,12 +140,12 @@ def shown(s: Batch, weather: WeatherRow, setpoints: Mapping[str, float], shone: 
 
 def drivers(
     p: ForeignGreenhouse,
-    s: Batch,
+    s: Values,
     weather: WeatherRow,
     setpoints: Mapping[str, float],
-    shone: Batch,
+    shone: Values,
     place: Mapping[str, float],
-) -> Batch:
+) -> Values:
     """Return the true drivers of hidden effects."""
     like, air = 0.0 * s["air"], s["air"]
     humidity, deficit = humidity_and_deficit(np, air, s["vapour"])
