@@ -17,7 +17,7 @@ from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.diagnosis import DEFAULT, DecisionRules, history
-from igrow.trainer.diagnosis.crop import with_its_drift
+from igrow.trainer.diagnosis.crop import new_leaves, with_its_drift
 from igrow.trainer.fit.discrepancy import Discrepancy
 
 SEEDS = {"spring": 110_000, "autumn": 120_000, "winter": 130_000}
@@ -43,7 +43,7 @@ def null_cases(season: str, known: Sequence[Reference]) -> list[list[Case]]:
 
 def rules_of(record: Record, known: Discrepancy | None, site: Site) -> DecisionRules:
     """Return the rules that a diagnosis has of a log whose crop has grown since its calibration."""
-    return with_its_drift(DEFAULT, known, site, history.leaf_area_of(record))
+    return with_its_drift(DEFAULT, new_leaves(known, site, history.leaf_area_of(record)))
 
 
 def unchanged(jobs: Jobs) -> list[Later]:

@@ -11,7 +11,7 @@ import pytest
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import Log
 from igrow.trainer.diagnosis import diagnose, wording
-from igrow.trainer.diagnosis.crop import LEAVES_AND_LIGHT, has_new_crop, of_one_crop, with_its_drift
+from igrow.trainer.diagnosis.crop import LEAVES_AND_LIGHT, has_new_crop, new_leaves, of_one_crop, with_its_drift
 from igrow.trainer.diagnosis.knowledge import knowledge_of
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.fit import FittedModel
@@ -91,15 +91,15 @@ def test_crop_and_light_may_differ_by_the_leaves_that_the_calibration_has_not_se
     site = log_of(quiet_log, 56, 84).known_site
     known = calibrated(PLANTED + np.timedelta64(28, "D")).history
     assert known is not None
-    other = with_its_drift(DEFAULT, known, site, 3.0, new_crop=True)
+    other = with_its_drift(DEFAULT, 1.0)
     young, usual, grown = (
-        with_its_drift(DEFAULT, replace(known, leaf_area=then), site, 3.0) for then in (1.5, np.nan, 2.8)
+        with_its_drift(DEFAULT, new_leaves(replace(known, leaf_area=then), site, 3.0)) for then in (1.5, np.nan, 2.8)
     )
     assert (other.crop_drift, other.light_drift) == (DEFAULT.new_crop_drift, DEFAULT.new_crop_drift)
     assert young.crop_drift == young.light_drift == pytest.approx(0.5 * DEFAULT.new_crop_drift)
     # Where it is not known, the usual course says what there was four weeks after the planting.
     assert DEFAULT.new_crop_drift > usual.crop_drift > 5.0 * DEFAULT.crop_drift
-    assert grown == with_its_drift(DEFAULT, None, site, 3.0) == DEFAULT
+    assert grown == with_its_drift(DEFAULT, new_leaves(None, site, 3.0)) == DEFAULT
 
 
 def test_a_crop_may_differ_more_than_the_walls() -> None:

@@ -42,6 +42,8 @@ class Corrected:
     kept: tuple[Estimated, ...]
     parameter: ParameterChange | None = None
     """One that has changed, where no effect is missing."""
+    refused: Stage | None = None
+    """With a parameter at what the log asks of it, though it is not told."""
 
 
 def correct(
@@ -149,9 +151,36 @@ def explains_as_well(kept: Sequence[Estimated], parameter: ParameterChange, rule
     return rules.most_parameter_over_found * sum(one.gain for one in kept) >= parameter.gain
 
 
-def predicts_better(log: LogDays, one: Corrected, other: Corrected, rules: DecisionRules) -> bool:
-    """Tell whether a correction predicts days that no fit has seen clearly better than another."""
-    before, after = log.run(other.stages["corrected"]), log.run(one.stages["corrected"])
+def stands_in_its_place(
+    log: LogDays,
+    beside: Corrected,
+    patterns: Sequence[Hypothesis],
+    result: Corrected,
+    parameter: ParameterChange,
+    rules: DecisionRules,
+) -> bool:
+    """Tell whether what the search told beside a parameter that leads is told in its place.
+
+    Args:
+        log: of the diagnosis.
+        beside: with what the search told.
+        patterns: that it told.
+        result: with the parameter where unseen days bear it out, without it where they do not.
+        parameter: by the search.
+        rules: what must be shown.
+    """
+    found, as_well = beside.stages["corrected"], bool(patterns) or explains_as_well(beside.kept, parameter, rules)
+    if result.parameter is not None:
+        return as_well and predicts_better(log, found, result.stages["corrected"], rules)
+    if as_well or not beside.kept or result.refused is None:
+        return as_well
+    # A search is linear: by it a parameter that would have to leave its bounds gains more than there is to gain.
+    return predicts_better(log, found, result.refused, rules)
+
+
+def predicts_better(log: LogDays, one: Stage, other: Stage, rules: DecisionRules) -> bool:
+    """Tell whether a model predicts days that no fit has seen clearly better than another."""
+    before, after = log.run(other), log.run(one)
     return before is not None and after is not None and freerun.skill(before, after) >= rules.clear_skill
 
 
@@ -231,13 +260,14 @@ def with_parameter(
         shipped = cross_validated_skill(log, Refittable(recalibrated, knowledge.prior), beside)
     except DivergenceError:
         return result
+    refused = replace(result, refused=alone.stage)
     if over_none is None or over_faults is None or shipped is None:
-        return result if rivals else replace(result, parameter=parameter)
+        return refused if rivals else replace(result, parameter=parameter)
     if min(over_none, over_faults) < rules.least_skill:
-        return result
+        return refused
     fitted = _sized(parameter, known, alone.stage.posterior, rules)
     if fitted is None:
-        return result
+        return refused
     corrected = beside.stage if shipped >= 0.0 else recalibrated
     return replace(result, stages={**result.stages, "corrected": corrected}, kept=(), parameter=fitted)
 

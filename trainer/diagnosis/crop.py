@@ -56,9 +56,23 @@ def has_new_crop(time: Times, site: Site, model: FittedModel) -> bool:
     return known is not None and bool(np.any(time[-1:] >= planted)) and bool(known.middle < planted)
 
 
-def with_its_drift(
-    rules: DecisionRules, known: Discrepancy | None, site: Site, leaf_area: float, *, new_crop: bool = False
-) -> DecisionRules:
+def new_leaves(known: Discrepancy | None, site: Site, leaf_area: float) -> float:
+    """Return the share of a log's leaves that a calibration has not seen, or of its leaves that are gone.
+
+    Args:
+        known: what the calibration learned of the greenhouse.
+        site: as it is described now.
+        leaf_area: mean leaf area index of the log, measured or by the usual course.
+    """
+    if known is None:
+        return 0.0
+    then = known.leaf_area
+    if np.isnan(then):
+        then = float(leaf_area_curve(site, np.array([known.middle])).mean())
+    return abs(leaf_area - then) / max(leaf_area, then, 1e-9)
+
+
+def with_its_drift(rules: DecisionRules, new: float) -> DecisionRules:
     """Return rules by which crop, light and discrepancy may differ by the share of the leaves that is new to the model.
 
     What a model says of few leaves does not hold of many: which share of the light they take, what they make of it, and
@@ -66,25 +80,16 @@ def with_its_drift(
 
     Args:
         rules: every threshold.
-        known: what the calibration learned of the greenhouse.
-        site: as it is described now.
-        leaf_area: mean leaf area index of the log, measured or by the usual course.
-        new_crop: see `has_new_crop`.
+        new: that share; 1 for a crop that the calibration has not seen.
     """
-    if known is None:
-        return rules
-    then = known.leaf_area
-    if np.isnan(then):
-        then = float(leaf_area_curve(site, np.array([known.middle])).mean())
-    unseen = 1.0 if new_crop else abs(leaf_area - then) / max(leaf_area, then, 1e-9)
-    share = unseen * rules.new_crop_drift
+    share = new * rules.new_crop_drift
     if share <= rules.crop_drift:
         return rules
     return replace(
         rules,
         crop_drift=share,
         light_drift=max(rules.light_drift, share),
-        effect_drift=max(rules.effect_drift, unseen * rules.omission_effect),
-        co2_source_drift=max(rules.co2_source_drift, unseen * rules.omission_effect),
-        pattern_drift=max(rules.pattern_drift, unseen * rules.omission_pattern),
+        effect_drift=max(rules.effect_drift, new * rules.omission_effect),
+        co2_source_drift=max(rules.co2_source_drift, new * rules.omission_effect),
+        pattern_drift=max(rules.pattern_drift, new * rules.omission_pattern),
     )

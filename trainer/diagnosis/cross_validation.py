@@ -114,8 +114,8 @@ def with_what_outdoes_it(design: Design, by_physics: Gaussian, told: Round, rng:
     """Return a round with a cause, and with the pattern, if there is one, that surely makes unseen days better by more.
 
     What the catalogue does not hold borrows the name that comes nearest. That something has changed a name shows that
-    stands; a pattern that outdoes it by what a cause must do for itself says better what. Where steps tell a name by
-    far, days hardly say more: no law is quite the plant's, and a pattern may be off by less.
+    stands; a pattern that gains about as much and makes unseen days better by half as much again says better what.
+    Where steps tell a name by far, days hardly say more: no law is quite the plant's, and a pattern may be off by less.
 
     Arguments are as of `settled`.
     """
@@ -123,10 +123,11 @@ def with_what_outdoes_it(design: Design, by_physics: Gaussian, told: Round, rng:
     rules, first = design.rules, told.cause.hypothesis
     if change.over_null(design, first) >= rules.far_over_null:
         return told
-    patterns = search.score_patterns(design, linear.fit(design.grams, design.null_model()), [None], rng)
-    own, *others = cross_validated(design, by_physics, [first, *patterns])
+    scored = search.score_patterns(design, linear.fit(design.grams, design.null_model()), [None], rng)
+    own, *others = cross_validated(design, by_physics, [first, *rivals(design, first, scored)])
     rival = best(others)
-    if rival is None or rival.skill < own.skill + rules.least_skill or not _is_surely_better(rival, own, rules, rng):
+    needed = max(own.skill + rules.least_skill, rules.pattern_over_skill * own.skill)
+    if rival is None or rival.skill < needed or not _is_surely_better(rival, own, rules, rng):
         return told
     return replace(told, outdone_by=rival.hypothesis)
 

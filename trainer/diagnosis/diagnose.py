@@ -26,13 +26,12 @@ from igrow.trainer.diagnosis.correction import (
     Corrected,
     correct,
     corrected_model,
-    explains_as_well,
     may_give_way,
-    predicts_better,
+    stands_in_its_place,
     until_outdone,
     with_parameter,
 )
-from igrow.trainer.diagnosis.crop import LEAVES_AND_LIGHT, has_new_crop, of_one_crop, with_its_drift
+from igrow.trainer.diagnosis.crop import LEAVES_AND_LIGHT, has_new_crop, new_leaves, of_one_crop, with_its_drift
 from igrow.trainer.diagnosis.diagnosed_days import since_calibration, weeks_in_turn
 from igrow.trainer.diagnosis.estimate import Estimated, from_before, normal_quantile
 from igrow.trainer.diagnosis.evidence import Evidence
@@ -144,7 +143,8 @@ class _Question:
         progress("completing the log")
         logged, rng = log_days(log, model), np.random.default_rng(self.seed)
         new_crop, leaf_area = has_new_crop(log.telemetry.time, site, model), history.leaf_area_of(logged.record)
-        rules = with_its_drift(rules, model.history, site, leaf_area, new_crop=new_crop)
+        new = 1.0 if new_crop else new_leaves(model.history, site, leaf_area)
+        rules, many_new = with_its_drift(rules, new), new > rules.most_new_leaves
         knowledge = knowledge_of(known, site, rules)
         of_vents, rules = history.with_vents(knowledge.history, logged.record, rules)
         knowledge = knowledge_of(known, site, rules)
@@ -155,9 +155,11 @@ class _Question:
         unmeasured = "leaf_area_index" in logged.record.missing and rules.crop_drift > self.rules.crop_drift
         of_crop = LEAVES_AND_LIGHT if new_crop or unmeasured else frozenset[str]()
         hidden = self.without | (frozenset({"co2_drift"}) if off else frozenset()) | of_crop | of_vents
+        is_later = self.history is not None
         search = search_of(
-            days, site, knowledge, hidden, rules, self.nuisance, self.null_gains, is_later=self.history is not None
-        )
+            days, site, knowledge, hidden, rules, self.nuisance, self.null_gains,
+            is_later=is_later, by_days=not (is_later or many_new),
+        )  # fmt: skip
         progress("searching for causes")
         first, last, found = search.run(rng, earlier)
         unseen = hidden_by_missing_weather(first.design.line)
@@ -190,8 +192,7 @@ class _Question:
         if parameter is not None and leads and not nothing_asked and (found or last.patterns):
             # What the search told beside the parameter stands where unseen days do not bear that out, or less.
             beside = correct(days, knowledge, found, last.patterns, site.longitude, rules)
-            rivals_it = bool(last.patterns) or explains_as_well(beside.kept, parameter, rules)
-            if rivals_it and (result.parameter is None or predicts_better(days, beside, result, rules)):
+            if stands_in_its_place(days, beside, last.patterns, result, parameter, rules):
                 result, patterns = beside, last.patterns
         sure, outdoing = until_outdone(result.kept)
         if outdoing and result.parameter is None and not patterns:
@@ -211,6 +212,7 @@ class _Question:
         notes = (
             *waiting,
             *((wording.NEW_CROP,) if new_crop else (wording.GROWN_CROP,) if of_crop else ()),
+            *((wording.NEW_LEAVES,) if many_new and not new_crop else ()),
             *((wording.VENTS_HARDLY_OPEN,) if of_vents else ()),
             *((wording.NOT_CALIBRATED,) if knowledge.transferred else ()),
             *wording.thin_air(site),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -59,6 +60,8 @@ class Estimated:
     """The same of a change, where parameters change as physics alone lets expect."""
     over_null: float = 0.0
     """Gain of a change over what it must gain: more than it did wherever nothing had changed."""
+    certainty: float = math.inf
+    """Amplitude over its standard error, refitted beside all other causes; infinite before."""
     outdone_by: Hypothesis | None = None
     """A pattern that unseen days tell better."""
 
@@ -108,7 +111,8 @@ def with_refitted(one: Estimated, refitted: Refitted, rules: DecisionRules) -> E
     unit = definition.amplitude.unit
     regimes = {name: Estimate.about(value, errors * own, unit) for name, (value, own) in refitted.regimes.items()}
     interval = Estimate.about(amplitude, wide, unit)
-    return replace(one, term=refitted.term, amplitude=interval, shapes=shapes, regimes=regimes)
+    certainty = abs(amplitude) / refitted.deviation
+    return replace(one, term=refitted.term, amplitude=interval, shapes=shapes, regimes=regimes, certainty=certainty)
 
 
 def within_bounds(one: Estimated, design: Design) -> Estimated:

@@ -277,11 +277,6 @@ def _refitted(unknowns: _Unknowns, solution: solver.Solution, view: _View) -> li
     return found
 
 
-def are_identifiable(terms: Sequence[Refitted]) -> bool:
-    """Tell whether terms that were fitted together each have a size of their own: else they are confounded."""
-    return all(abs(one.term.amplitude) > one.deviation for one in terms)
-
-
 def _regimes(
     unknowns: _Unknowns, view: _View, residual: Floats, slope: Floats, amplitude: float
 ) -> dict[str, tuple[float, float]]:

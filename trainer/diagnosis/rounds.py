@@ -19,7 +19,7 @@ from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, activate
 from igrow.trainer.diagnosis.nuisance import NuisanceSubspace, read_nuisance
 from igrow.trainer.diagnosis.null_gains import NullGains, read_null_gains
 from igrow.trainer.diagnosis.parameter_change import ParameterChange
-from igrow.trainer.diagnosis.refit import are_identifiable, refit
+from igrow.trainer.diagnosis.refit import refit
 from igrow.trainer.diagnosis.rules import HOUR, DecisionRules
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.diagnosis.structure import disagreement
@@ -32,7 +32,9 @@ class Search:
     """The rounds of a search: one cause after the other, each in a model that has those before it.
 
     A large effect moves the model far from where the search linearised it; further causes and what remains can
-    be told only after it has been put in.
+    be told only after it has been put in. For the same reason the first may have stood in for a later one: where that
+    is more surely there than all before it, the search begins again with it (forward and backward steps: Zhang 2009,
+    Advances in Neural Information Processing Systems 21).
     """
 
     days: LogDays
@@ -55,11 +57,12 @@ class Search:
         if found:
             first = self.judge(design, [], rng, causes=True)
             design = self.design([*self.knowledge.terms, *(one.term for one in found)], design.interval)
+        led = {one.effect for one in earlier}
         while True:
             judged = self.judge(design, found, rng, causes=len(found) < self.rules.most_causes)
             first = first or judged
             new = estimate(judged, rng)
-            terms = [] if new is None else self.refitted(judged, [*found, new])
+            terms = [] if new is None else self.joined_by(new, judged, found, led)
             if not terms:
                 return first, judged, found
             try:
@@ -106,23 +109,36 @@ class Search:
         steps = self.design(self.knowledge.terms, self.days.record.step)
         return steps if disagreement(hours, steps) <= self.rules.largest_disagreement else hours
 
-    def refitted(self, judged: Round, causes: list[Estimated]) -> list[Estimated]:
-        """Return all causes refitted together, or none where one turns round or a further one adds nothing of its own.
+    def joined_by(self, new: Estimated, judged: Round, found: Sequence[Estimated], led: set[str]) -> list[Estimated]:
+        """Return the causes of the next model: none where a further one adds nothing of its own.
 
-        A further one that only mops up what is left runs to its bound; one that is confounded with another (two ways
-        for CO2 to leak in) leaves neither with a size.
+        One that only mops up what is left runs to its bound; one that is confounded with another (two ways for CO2 to
+        leak in) leaves neither with a size. One beside which those before it hardly stand is alone to begin with.
+
+        Args:
+            new: that a round has found.
+            judged: this round.
+            found: in rounds before.
+            led: effects that were first before, and are not again; those that give way now join them.
         """
+        terms = self.refitted(judged, [*found, new])
+        if found and new.effect not in led and terms[-1].certainty > max(one.certainty for one in terms[:-1]):
+            led |= {one.effect for one in found}
+            terms = self.refitted(judged, [new])
+        stand = all(one.term.amplitude != 0.0 for one in terms) and all(
+            _is_inside(one, judged.design) for one in terms[1:]
+        )
+        return terms if stand and (len(terms) == 1 or all(one.certainty > 1.0 for one in terms)) else []
+
+    def refitted(self, judged: Round, causes: Sequence[Estimated]) -> list[Estimated]:
+        """Return causes refitted together."""
         try:
             with np.errstate(over="ignore", invalid="ignore"):
                 found = refit(judged.design, judged.named, [one.term for one in causes], self.knowledge.terms)
         except (np.linalg.LinAlgError, DivergenceError):
             # A poor start can run away; the causes then stay as the search found them.
             return [within_bounds(one, judged.design) for one in causes]
-        better = [with_refitted(one, two, self.rules) for one, two in zip(causes, found, strict=True)]
-        stands = all(one.term.amplitude != 0.0 for one in better) and all(
-            _is_inside(one, judged.design) for one in better[1:]
-        )
-        return better if stands and (len(found) == 1 or are_identifiable(found)) else []
+        return [with_refitted(one, two, self.rules) for one, two in zip(causes, found, strict=True)]
 
 
 @dataclass(frozen=True)
@@ -136,8 +152,8 @@ class Change(Search):
     """What the model is expected to miss in this log."""
     null_gains: NullGains | None
     """Of greenhouses in which nothing has changed; None: what came with the trainer."""
-    is_later: bool = False
-    """It is not the weeks next to the calibration, from which these gains were learned."""
+    by_days: bool = True
+    """Unseen days alone may tell something; not in weeks or of leaves unlike those that null skills were learned of."""
     _latest: list[tuple[list[ActiveTerm], Design]] = field(default_factory=list)
     """Terms that the log was laid out with last: it is asked in two ways, and laid out once."""
 
@@ -151,7 +167,7 @@ class Change(Search):
             return judged
         if judged.cause is not None:
             judged = cross_validation.settled(design, by_physics, judged, rng)
-        elif not self.is_later:
+        if judged.cause is None and self.by_days:
             judged = cross_validation.find(design, by_physics, rng) or judged
         if judged.cause is None:
             return judged
@@ -177,7 +193,7 @@ class Change(Search):
 
     def unexplained(self, rng: np.random.Generator) -> tuple[Hypothesis, ...]:
         """Return the pattern that unseen days tell where nothing else is told."""
-        if self.is_later:
+        if not self.by_days:
             return ()
         by_physics = self.knowledge.by_physics(self.rules)
         found = unexplained.find(self.resolved(), self.site.longitude, by_physics, rng)
@@ -208,11 +224,13 @@ def search_of(
     null_gains: NullGains | None,
     *,
     is_later: bool = False,
+    by_days: bool = True,
 ) -> Search:
     """Return the search that fits what is known: of changes where the greenhouse's history applies to the log.
 
     What a change must gain was learned from the weeks next to a calibration. In later ones a season makes more of what
-    a calibration misses, so that only what gains far more is told, and nothing that unseen days alone tell.
+    a calibration misses, so that only what gains far more is told (`is_later`), and nothing that unseen days alone tell
+    (`by_days`).
     """
     common = (days, site, knowledge, without, rules, nuisance or read_nuisance())
     known = knowledge.history
@@ -223,7 +241,7 @@ def search_of(
         return Search(*common)
     if is_later:
         null_gains = (null_gains or read_null_gains()).times(rules.far_over_null)
-    return Change(*common, known, plain, history.expected_misfit(known, plain), null_gains, is_later)
+    return Change(*common, known, plain, history.expected_misfit(known, plain), null_gains, by_days)
 
 
 def _explained(found: Sequence[Estimated]) -> float:

@@ -73,6 +73,9 @@ class DecisionRules:
     new_crop_drift: float = _chosen(
         0.5, "the same of crop and light where the calibration has not seen the crop, or of the share of its leaves"
     )
+    most_new_leaves: float = _chosen(
+        0.3, "that share up to which unseen days alone tell something: null skills were learned of no more"
+    )
     effect_drift: float = _tuned(0.02, "change of an effect in the discrepancy, in typical amplitudes")
     co2_source_drift: float = _tuned(0.1, "the same of a source of CO2, which a growing crop looks like")
     pattern_drift: float = _tuned(0.005, "the same of a pattern, in its units")
@@ -88,10 +91,13 @@ class DecisionRules:
     least_change_skill: float = _tuned(
         -0.02, "share that the shipped model gains at least with a change in it: chance makes as much"
     )
-    least_unproven_change: float = _tuned(4.0, "gain from which on a change is asked of unseen days alone")
+    least_unproven_change: float = _tuned(2.0, "gain from which on a change is asked of unseen days alone")
     least_pattern_change: float = _tuned(60.0, "the same of a pattern: greenhouses drift with the weather")
     least_proven_pattern: float = _tuned(20.0, "of it, what the scatter of day scores must bear out")
     pattern_over_change: float = _tuned(1.5, "times a change's gain at which a pattern replaces it")
+    pattern_over_skill: float = _tuned(
+        1.5, "times the skill of a name that only just stands at which a pattern is told in its place"
+    )
     least_left_by_hour: float = _tuned(25.0, "gain of a pattern by the hour beside a change that unmakes its name")
     left_by_hour_share: float = _tuned(
         0.4, "the same as a share of the change's own: a large one of a slightly other form leaves much as well"

@@ -39,6 +39,10 @@ GROWN_CROP = N_(
     "Nobody logs the leaf area, and by its usual course the crop has grown since the calibration: what began in its "
     "leaves or in the light is not looked for. Log the leaf area, or calibrate again (igrow-trainer calibrate)."
 )
+NEW_LEAVES = N_(
+    "The leaf area is another than at the calibration by more than three tenths: only what every time step shows is "
+    "told. Calibrate again on weeks like these (igrow-trainer calibrate)."
+)
 VENTS_HARDLY_OPEN = N_(
     "The vents opened less than half as far as in the weeks of the calibration, or hardly at all then: how much air "
     "they let through is not asked. Calibrate again on weeks like these (igrow-trainer calibrate)."
