@@ -20,6 +20,7 @@ from igrow.trainer.diagnosis.correction import (
     may_give_way,
     same_in_all_regimes,
     stands,
+    stands_in_its_place,
     until_outdone,
     with_parameter,
 )
@@ -226,6 +227,34 @@ def test_a_parameter_takes_the_place_of_a_sensors_fault_where_unseen_days_ask_fo
         assert told.parameter.share.value == pytest.approx(-0.5)
     assert told.kept == (() if named else causes)
     assert told.stages["corrected"].terms == (() if named else stages["corrected"].terms)
+
+
+@pytest.mark.parametrize(
+    ("faulty", "gain", "stays"),
+    [
+        # It explains as much by the search.
+        (2.9, 200.0, True),
+        # A humidity sensor by 15 % off looked, to the search, like leaves that transpire three times as much.
+        (1.0, 10.0, True),
+        (1.99, 10.0, False),
+        (2.5, 10.0, False),
+    ],
+)
+def test_causes_stand_in_the_place_of_a_parameter_that_predicts_unseen_days_worse(
+    faulty: float, gain: float, stays: bool
+) -> None:
+    known = knowledge_of(model_in_force(), model_in_force().site, DEFAULT).prior
+    freed = known.widened_along(known.mean * np.array([name == "transmissivity" for name in known.names]))
+    fault = replace(cause(gain=gain), term=ActiveTerm("humidity_offset", -5.0, {}))
+    plain = Corrected({"corrected": Stage(known, ())}, (), refused=Stage(freed, ()))
+    beside = Corrected({"corrected": Stage(known, (fault.term,))}, (fault,))
+    change = ParameterChange(
+        "transmissivity", Estimate(-0.7, -0.8, -0.6, "1"), None, 0.001, ("transmissivity",), leads=True, gain=400.0
+    )
+    days: Any = DaysThatErr(3.0, 2.0, faulty)
+    assert stands_in_its_place(days, beside, (), plain, change, DEFAULT) is stays
+    assert not stands_in_its_place(days, replace(beside, kept=()), (), plain, change, DEFAULT)
+    assert stands_in_its_place(days, beside, (), replace(plain, refused=None), change, DEFAULT) is (gain == 200.0)
 
 
 def test_of_a_parameter_that_explains_far_more_a_cause_is_a_part() -> None:

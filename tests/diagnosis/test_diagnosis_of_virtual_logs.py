@@ -17,7 +17,7 @@ from igrow.core.local_time import utc_datetime
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import Log, prepare_log
 from igrow.trainer.diagnosis import Diagnosis, diagnose, history, rounds, wording
-from igrow.trainer.diagnosis.correction import Corrected, predicts_better
+from igrow.trainer.diagnosis.correction import predicts_better
 from igrow.trainer.diagnosis.diagnosed_days import since_calibration, weeks_in_turn
 from igrow.trainer.diagnosis.evidence import errors_with
 from igrow.trainer.diagnosis.knowledge import VENTS, ActiveTerm
@@ -78,9 +78,7 @@ def test_a_parameter_that_unseen_days_do_not_bear_out_takes_no_cause_with_it(
 
 def test_of_two_corrections_that_predicts_better_which_has_the_cause(leak: Diagnosis) -> None:
     assert leak.evidence is not None
-    named, without = (
-        Corrected({"corrected": leak.evidence.stages[stage]}, ()) for stage in ("corrected", "recalibrated")
-    )
+    named, without = (leak.evidence.stages[stage] for stage in ("corrected", "recalibrated"))
     assert predicts_better(leak.evidence.log, named, without, DEFAULT)
     assert not predicts_better(leak.evidence.log, without, named, DEFAULT)
     assert not predicts_better(leak.evidence.log, named, named, DEFAULT)

@@ -1,0 +1,76 @@
+"""One cause after the other: what joins those before it, and what takes their place."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, cast
+
+import pytest
+
+from igrow.core.bundle import Estimate
+from igrow.trainer.diagnosis import rounds
+from igrow.trainer.diagnosis.candidates import Candidate
+from igrow.trainer.diagnosis.compare import Round
+from igrow.trainer.diagnosis.estimate import Estimated
+from igrow.trainer.diagnosis.knowledge import ActiveTerm
+from igrow.trainer.diagnosis.linear import Term
+from igrow.trainer.diagnosis.search import Hypothesis
+from tests.diagnosis.synthetic_design import Truth
+from tests.diagnosis.test_cross_validation import change_of
+from tests.diagnosis.test_parameter_change import with_parameters
+
+
+def of(effect: str, amplitude: float = 1.0) -> Estimated:
+    hypothesis = Hypothesis(Candidate(effect, ()), Term(0), 40.0, amplitude, 5.0, 0.001)
+    size = Estimate.about(amplitude, 0.1, "1")
+    return Estimated(hypothesis, ActiveTerm(effect, amplitude, {}), size, 40.0, None, (effect,))
+
+
+def effects(causes: Sequence[Estimated]) -> list[str]:
+    return [one.effect for one in causes]
+
+
+@pytest.mark.parametrize(
+    ("sizes", "joined"),
+    [
+        # Size and standard error of the first and of the new one, beside each other.
+        ([(0.1, 0.01), (0.1, 0.02)], ["rain_cooling", "lamp_heat"]),
+        ([(0.1, 0.02), (0.1, 0.01)], ["lamp_heat"]),
+        # Beside the new one nothing is left of the first.
+        ([(0.0, 0.02), (0.1, 0.01)], ["lamp_heat"]),
+        # The new one adds nothing of its own, or neither has a size.
+        ([(0.1, 0.01), (0.0, 0.02)], []),
+        ([(0.1, 0.09), (0.1, 0.11)], []),
+        # It only mops up what is left, up to its bound.
+        ([(0.1, 0.01), (1e9, 1e9)], []),
+    ],
+)
+def test_a_later_cause_that_is_more_surely_there_takes_the_place_of_those_before_it(
+    sizes: list[tuple[float, float]], joined: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A humidity sensor by 15 % off was first told as an air sensor: a search is linear, and a refit is not."""
+    search, judged = searched(sizes, monkeypatch)
+    first, new, led = of("rain_cooling"), of("lamp_heat"), set[str]()
+    assert effects(search.joined_by(new, judged, [first], led)) == joined
+    assert led == ({"rain_cooling"} if joined == ["lamp_heat"] else set())
+
+
+def test_what_gave_way_does_not_lead_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    search, judged = searched([(0.1, 0.02), (0.1, 0.01)], monkeypatch)
+    back = search.joined_by(of("rain_cooling"), judged, [of("lamp_heat")], {"rain_cooling"})
+    assert effects(back) == ["lamp_heat", "rain_cooling"]
+
+
+def searched(sizes: Sequence[tuple[float, float]], monkeypatch: pytest.MonkeyPatch) -> tuple[rounds.Change, Round]:
+    """Return a search whose refit gives two causes these sizes and standard errors, and one alone the new one's."""
+    design = with_parameters(Truth({}, {}), 1)
+
+    def refitted(_search: Any, _judged: Any, causes: Sequence[Estimated]) -> list[Estimated]:
+        found = []
+        for one, (size, error) in zip(causes, sizes[-len(causes) :], strict=True):
+            found.append(replace(one, term=replace(one.term, amplitude=size), certainty=size / error))
+        return found
+
+    monkeypatch.setattr(rounds.Search, "refitted", refitted)
+    return change_of(design), Round(design, cast(Any, None), cast(Any, None), None, ())
