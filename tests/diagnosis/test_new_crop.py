@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import datetime
+import sys
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import Log
-from igrow.trainer.diagnosis import diagnose, wording
+from igrow.trainer.diagnosis import diagnose, rounds, wording
 from igrow.trainer.diagnosis.crop import LEAVES_AND_LIGHT, has_new_crop, new_leaves, of_one_crop, with_its_drift
 from igrow.trainer.diagnosis.knowledge import knowledge_of
 from igrow.trainer.diagnosis.rules import DEFAULT
@@ -85,6 +87,24 @@ def test_what_is_not_asked_of_a_crop_that_grew_is_said(quiet_log: Log) -> None:
     assert wording.GROWN_CROP in result.notes
     assert wording.NEW_CROP not in result.notes
     assert "structure_shade" in result.untestable
+
+
+@pytest.mark.parametrize(("new", "few"), [(0.2, True), (0.4, False)])
+def test_where_many_leaves_are_new_days_alone_tell_nothing_and_that_is_said(
+    new: float, few: bool, quiet_log: Log, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module = sys.modules["igrow.trainer.diagnosis.diagnose"]  # its function has its name
+    asked: list[bool] = []
+
+    def search_of(*arguments: Any, by_days: bool, **others: Any) -> rounds.Search:
+        asked.append(by_days)
+        return rounds.search_of(*arguments, by_days=by_days, **others)
+
+    monkeypatch.setattr(module, "new_leaves", lambda *_: new)
+    monkeypatch.setattr(module, "search_of", search_of)
+    result = diagnose(quiet_log, model_in_force())
+    assert asked == [few]
+    assert (wording.NEW_LEAVES not in result.notes) is few
 
 
 def test_crop_and_light_may_differ_by_the_leaves_that_the_calibration_has_not_seen(quiet_log: Log) -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from igrow.core.arrays import Floats
+from igrow.core.effects import EFFECTS
 from igrow.core.site import Site
 from igrow.trainer.diagnosis import cross_validation, history, parameter_change, unexplained
 from igrow.trainer.diagnosis.change import changed
@@ -57,7 +58,8 @@ class Search:
         if found:
             first = self.judge(design, [], rng, causes=True)
             design = self.design([*self.knowledge.terms, *(one.term for one in found)], design.interval)
-        led = {one.effect for one in earlier}
+        # What weeks before have told gives way to nothing.
+        led = set(EFFECTS if earlier else ())
         while True:
             judged = self.judge(design, found, rng, causes=len(found) < self.rules.most_causes)
             first = first or judged
@@ -123,7 +125,7 @@ class Search:
         """
         terms = self.refitted(judged, [*found, new])
         if found and new.effect not in led and terms[-1].certainty > max(one.certainty for one in terms[:-1]):
-            led |= {one.effect for one in found}
+            led.update(one.effect for one in found)
             terms = self.refitted(judged, [new])
         stand = all(one.term.amplitude != 0.0 for one in terms) and all(
             _is_inside(one, judged.design) for one in terms[1:]
