@@ -151,6 +151,16 @@ def test_a_step_on_which_the_model_diverges_is_shortened() -> None:
     assert found.posterior.mean[0] == pytest.approx(2.9, abs=1e-3)
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_step_that_ends_near_the_largest_number_is_shortened_without_a_warning() -> None:
+    def residuals(point: np.ndarray) -> np.ndarray:
+        return np.where(point > 3.0, 1e200, 100.0 * (np.exp(np.minimum(point, 3.0)) - np.exp(2.9)))
+
+    prior = Gaussian(("a",), np.zeros(1), np.eye(1) * 100.0)
+    found = solve(residuals, lambda x: 100.0 * np.exp(x)[:, None], prior, -FAR[:1], FAR[:1])
+    assert found.posterior.mean[0] == pytest.approx(2.9, abs=1e-3)
+
+
 @pytest.mark.parametrize("broken", [lambda x: np.array([np.nan]) * x, lambda x: np.array([np.inf]) + x])
 def test_a_model_without_a_finite_error_at_the_start_is_refused(broken) -> None:
     prior = Gaussian(("a",), np.zeros(1), np.eye(1))

@@ -124,17 +124,19 @@ def solve(
     # "dogbox" is quick, exact, and lies on bounds, but it can stop on its way where several parameters lie near theirs;
     # "trf" goes on from there, if it does not begin on a bound.
     for method in ("dogbox", "trf"):
-        found = least_squares(
-            rows,
-            place,
-            jac=slopes,
-            bounds=edges,
-            method=method,
-            loss=lambda squares: _huber(squares, limit),
-            ftol=_COST_TOLERANCE,
-            xtol=_STEP_TOLERANCE,
-            max_nfev=evaluations,
-        )
+        # Errors near the largest number are of points that are never taken; whoever fits has done nothing wrong.
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = least_squares(
+                rows,
+                place,
+                jac=slopes,
+                bounds=edges,
+                method=method,
+                loss=lambda squares: _huber(squares, limit),
+                ftol=_COST_TOLERANCE,
+                xtol=_STEP_TOLERANCE,
+                max_nfev=evaluations,
+            )
         if _has_arrived(found):
             break
         inside = np.minimum(_INSIDE, 0.5 * (edges[1] - edges[0]))
