@@ -210,7 +210,7 @@ RESULTS = {
         "The same greenhouse later",
         ("benchmarks.diagnosis", "same", "--greenhouses", "4", "--cases", "160", "--history-only"),
         "Calibrated on eight weeks of its own, diagnosed weeks later by its history.",
-        "300000 and on",
+        "900000 and on",
         long=True,
     ),
     "diagnosis-foreign": Result(
@@ -224,7 +224,7 @@ RESULTS = {
         "The same greenhouse later, over twelve weeks",
         ("benchmarks.diagnosis", "same", "--days", "84", "--greenhouses", "2", "--cases", "60", "--history-only"),
         "The same greenhouses and causes; a log that is longer than six weeks is asked in parts, the oldest first.",
-        "300000 and on",
+        "900000 and on",
         long=True,
     ),
     "diagnosis-omission": Result(

@@ -31,7 +31,7 @@ from igrow.trainer.diagnosis import DEFAULT
 from igrow.trainer.diagnosis.null_gains import read_null_gains
 
 CASES, DAYS = 60, 28
-SEEDS = {"tuning": 200_000, "scoring": 300_000}
+SEEDS = {"tuning": 200_000, "scoring": 900_000}
 """Of the first nursery; each season's are ten thousand on."""
 FOREIGN_SEEDS = {"tuning": 700_000, "scoring": 800_000}
 """The same of greenhouses of another structure."""

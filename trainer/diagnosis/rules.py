@@ -74,7 +74,7 @@ class DecisionRules:
         0.5, "the same of crop and light where the calibration has not seen the crop, or of the share of its leaves"
     )
     most_new_leaves: float = _chosen(
-        0.3, "that share up to which unseen days alone tell something: null skills were learned of no more"
+        0.3, "that share up to which crop alone differs, and unseen days alone tell something: null bounds know no more"
     )
     effect_drift: float = _tuned(0.02, "change of an effect in the discrepancy, in typical amplitudes")
     co2_source_drift: float = _tuned(0.1, "the same of a source of CO2, which a growing crop looks like")
