@@ -72,23 +72,25 @@ def new_leaves(known: Discrepancy | None, site: Site, leaf_area: float) -> float
     return abs(leaf_area - then) / max(leaf_area, then, 1e-9)
 
 
-def with_its_drift(rules: DecisionRules, new: float) -> DecisionRules:
-    """Return rules by which a crop may differ by the share of its leaves that is new; all else too, where it is large.
+def with_its_drift(rules: DecisionRules, new: float, *, measured: bool = True) -> DecisionRules:
+    """Return rules by which crop, light and discrepancy may differ by the share of the leaves that is new to the model.
 
     What a model says of few leaves does not hold of many: which share of the light they take, what they make of it, and
     what the model misses of both. For that share all is as uncertain again as before the calibration. Of a share that
-    the null bounds were learned of these know already what it makes of light, effects and patterns.
+    the null bounds were learned of these know that already; but where nobody measures the leaf area the parameters of
+    the crop hold its error too.
 
     Args:
         rules: every threshold.
         new: that share; 1 for a crop that the calibration has not seen.
+        measured: the log has the leaf area.
     """
     share = new * rules.new_crop_drift
-    rules = replace(rules, crop_drift=max(rules.crop_drift, share))
+    wider = replace(rules, crop_drift=max(rules.crop_drift, share))
     if new <= rules.most_new_leaves:
-        return rules
+        return rules if measured else wider
     return replace(
-        rules,
+        wider,
         light_drift=max(rules.light_drift, share),
         effect_drift=max(rules.effect_drift, new * rules.omission_effect),
         co2_source_drift=max(rules.co2_source_drift, new * rules.omission_effect),

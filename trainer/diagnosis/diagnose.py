@@ -144,7 +144,8 @@ class _Question:
         logged, rng = log_days(log, model), np.random.default_rng(self.seed)
         new_crop, leaf_area = has_new_crop(log.telemetry.time, site, model), history.leaf_area_of(logged.record)
         new = 1.0 if new_crop else new_leaves(model.history, site, leaf_area)
-        rules, many_new = with_its_drift(rules, new), new > rules.most_new_leaves
+        measured = "leaf_area_index" not in logged.record.missing
+        rules, many_new = with_its_drift(rules, new, measured=measured), new > rules.most_new_leaves
         knowledge = knowledge_of(known, site, rules)
         of_vents, rules = history.with_vents(knowledge.history, logged.record, rules)
         knowledge = knowledge_of(known, site, rules)
@@ -152,8 +153,8 @@ class _Question:
         days, opened = completed.days, under_open_vents(logged.record, rules)
         off = opened is not None and opened.is_offset(rules)
         # Of a crop that may be another by now nothing is asked, nor of the light, which its leaves take up.
-        unmeasured = "leaf_area_index" in logged.record.missing and rules.crop_drift > self.rules.crop_drift
-        of_crop = LEAVES_AND_LIGHT if new_crop or unmeasured else frozenset[str]()
+        may_be_another = not measured and rules.crop_drift > self.rules.crop_drift
+        of_crop = LEAVES_AND_LIGHT if new_crop or may_be_another else frozenset[str]()
         hidden = self.without | (frozenset({"co2_drift"}) if off else frozenset()) | of_crop | of_vents
         is_later = self.history is not None
         search = search_of(

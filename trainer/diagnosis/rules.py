@@ -74,7 +74,7 @@ class DecisionRules:
         0.5, "the same of crop and light where the calibration has not seen the crop, or of the share of its leaves"
     )
     most_new_leaves: float = _chosen(
-        0.3, "that share up to which crop alone differs, and unseen days alone tell something: null bounds know no more"
+        0.3, "that share up to which null bounds know what is new, and unseen days alone may tell something"
     )
     effect_drift: float = _tuned(0.02, "change of an effect in the discrepancy, in typical amplitudes")
     co2_source_drift: float = _tuned(0.1, "the same of a source of CO2, which a growing crop looks like")
