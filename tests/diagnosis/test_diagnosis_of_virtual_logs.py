@@ -17,11 +17,11 @@ from igrow.core.local_time import utc_datetime
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import Log, prepare_log
 from igrow.trainer.diagnosis import Diagnosis, diagnose, history, rounds, wording
-from igrow.trainer.diagnosis.correction import predicts_better
 from igrow.trainer.diagnosis.diagnosed_days import since_calibration, weeks_in_turn
 from igrow.trainer.diagnosis.evidence import errors_with
 from igrow.trainer.diagnosis.knowledge import VENTS, ActiveTerm
 from igrow.trainer.diagnosis.parameter_change import ParameterChange
+from igrow.trainer.diagnosis.parameter_or_causes import predicts_better
 from igrow.trainer.diagnosis.plots import needed
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.fit import FittedModel

@@ -12,7 +12,7 @@ import pytest
 
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import Log
-from igrow.trainer.diagnosis import diagnose, rounds, wording
+from igrow.trainer.diagnosis import circumstances, diagnose, rounds, wording
 from igrow.trainer.diagnosis.crop import LEAVES_AND_LIGHT, has_new_crop, new_leaves, of_one_crop, with_its_drift
 from igrow.trainer.diagnosis.knowledge import knowledge_of
 from igrow.trainer.diagnosis.rules import DEFAULT
@@ -100,7 +100,7 @@ def test_where_many_leaves_are_new_days_alone_tell_nothing_and_that_is_said(
         asked.append(by_days)
         return rounds.search_of(*arguments, by_days=by_days, **others)
 
-    monkeypatch.setattr(module, "new_leaves", lambda *_: new)
+    monkeypatch.setattr(circumstances, "new_leaves", lambda *_: new)
     monkeypatch.setattr(module, "search_of", search_of)
     result = diagnose(quiet_log, model_in_force())
     assert asked == [few]

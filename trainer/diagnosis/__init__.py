@@ -4,16 +4,17 @@
     print(result.summary())
 
 In the order in which they are read: `knowledge` (what is known before the log), `diagnosed_days`, `freerun` (the days
-of a log, and models that are fitted to some and judged on others), `actuators` and `open_vents` (what the log itself
-lacks, or a sensor must show), `sensitivity` (day runs of the model, and how they depend on everything), `candidates`,
-`noise`, `recalibration`, `design` (errors and candidates in named blocks), `linear` and `search` (a scan of all
-candidates), `rounds` (one cause after the other), `compare` (the best of them beside their own noise) or, where the
-greenhouse's own calibration log taught what is missing even then, `amplitudes`, `history`, `null_gains` and `change`
-(what has changed since; `cross_validation` asks unseen days where time steps tell nothing or not which, `unexplained`
-what has no name, `parameter_change` the parameters, `omission` what it lacked from the first day), `estimate`, `refit`
-(size, beginning, confounded causes), `confirmation` (the same by free runs), `correction` (what stands on unseen days),
-`unseen_errors`, `evidence`, `wording`, `result`, `answers` (what parts of a log tell beside each other). `rules` holds
-every threshold, `nuisance` what greenhouses show though nothing is missing, `sharing` what one tells others.
+of a log, and models that are fitted to some and judged on others), `circumstances` (what a log lets be asked: its
+`crop`, its `actuators`, what `open_vents` show), `sensitivity` (day runs of the model, and how they depend on
+everything), `candidates`, `noise`, `recalibration`, `design` (errors and candidates in named blocks), `linear` and
+`search` (a scan of all candidates), `rounds` (one cause after the other), `compare` (the best of them beside their own
+noise) or, where the greenhouse's own calibration log taught what is missing even then, `amplitudes`, `history`,
+`null_gains` and `change` (what has changed since; `cross_validation` asks unseen days where time steps tell nothing or
+not which, `unexplained` what has no name, `parameter_change` the parameters, `omission` what it lacked from the first
+day), `estimate`, `refit` (size, beginning, confounded causes), `confirmation` (the same by free runs), `correction`
+(what stands on unseen days; `parameter_or_causes` where both explain the log), `unseen_errors`, `evidence`, `wording`,
+`result`, `answers` (what parts of a log tell beside each other). `rules` holds every threshold, `nuisance` what
+greenhouses show though nothing is missing, `sharing` what one tells others.
 docs/method.md tells why.
 """
 

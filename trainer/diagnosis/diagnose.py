@@ -1,8 +1,8 @@
 """From a log to the verdict, each stage entered once a round.
 
-log, model --> knowledge --> actuators --> design --> compare --> estimate --> refit --+--> correct --> Diagnosis
-                                             ^                                         |
-                                             +------------ the cause put in -----------+
+log, model --> circumstances --> design --> compare --> estimate --> refit --+--> correct --> Diagnosis
+                                   ^                                         |
+                                   +------------ the cause put in -----------+
 
 Beside the causes it is asked which parameter has changed; of one that began within the log the days since then are
 diagnosed by themselves. A long log is asked in parts, the oldest first.
@@ -17,32 +17,26 @@ import numpy as np
 
 from igrow.core.effects import EFFECTS
 from igrow.core.errors import IgrowError
+from igrow.core.site import Site
 from igrow.trainer.data.log import Log
 from igrow.trainer.diagnosis import history, wording
-from igrow.trainer.diagnosis.actuators import Completed, complete, may_hide_in_parameters
+from igrow.trainer.diagnosis.actuators import Completed, may_hide_in_parameters
 from igrow.trainer.diagnosis.answers import Answer, bears_out, begun, is_same
 from igrow.trainer.diagnosis.candidates import hidden_by_missing_weather
-from igrow.trainer.diagnosis.correction import (
-    Corrected,
-    correct,
-    corrected_model,
-    may_give_way,
-    stands_in_its_place,
-    until_outdone,
-    with_parameter,
-)
-from igrow.trainer.diagnosis.crop import LEAVES_AND_LIGHT, has_new_crop, new_leaves, of_one_crop, with_its_drift
+from igrow.trainer.diagnosis.circumstances import Circumstances, circumstances_of
+from igrow.trainer.diagnosis.compare import Round
+from igrow.trainer.diagnosis.correction import Corrected, correct, corrected_model, until_outdone
+from igrow.trainer.diagnosis.crop import of_one_crop
 from igrow.trainer.diagnosis.diagnosed_days import since_calibration, weeks_in_turn
 from igrow.trainer.diagnosis.estimate import Estimated, from_before, normal_quantile
 from igrow.trainer.diagnosis.evidence import Evidence
-from igrow.trainer.diagnosis.freerun import log_days
-from igrow.trainer.diagnosis.knowledge import ActiveTerm, knowledge_of
+from igrow.trainer.diagnosis.knowledge import ActiveTerm
 from igrow.trainer.diagnosis.nuisance import NuisanceSubspace
 from igrow.trainer.diagnosis.null_gains import NullGains
-from igrow.trainer.diagnosis.open_vents import under_open_vents
 from igrow.trainer.diagnosis.parameter_change import ParameterChange
+from igrow.trainer.diagnosis.parameter_or_causes import may_give_way, stands_in_its_place, with_parameter
 from igrow.trainer.diagnosis.result import Diagnosis, Finding, Verdict
-from igrow.trainer.diagnosis.rounds import search_of
+from igrow.trainer.diagnosis.rounds import Search, search_of
 from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.diagnosis.unseen_errors import errors_of, runs_of, stages_of
@@ -137,49 +131,36 @@ class _Question:
             rivals: faults of sensors that explain it there as well.
             earlier: causes that the weeks before it have told.
         """
-        model, rules, progress, site = self.model, self.rules, self.progress, log.known_site
+        progress, site = self.progress, log.known_site
         # What is shipped asks the next log by the calibration.
-        known = replace(model, history=self.history or model.history)
+        seen = self.history or self.model.history
         progress("completing the log")
-        logged, rng = log_days(log, model), np.random.default_rng(self.seed)
-        new_crop, leaf_area = has_new_crop(log.telemetry.time, site, model), history.leaf_area_of(logged.record)
-        new = 1.0 if new_crop else new_leaves(model.history, site, leaf_area)
-        measured = "leaf_area_index" not in logged.record.missing
-        rules, many_new = with_its_drift(rules, new, measured=measured), new > rules.most_new_leaves
-        knowledge = knowledge_of(known, site, rules)
-        of_vents, rules = history.with_vents(knowledge.history, logged.record, rules)
-        knowledge = knowledge_of(known, site, rules)
-        completed = complete(log, logged, model, knowledge, rules)
-        days, opened = completed.days, under_open_vents(logged.record, rules)
-        off = opened is not None and opened.is_offset(rules)
-        # Of a crop that may be another by now nothing is asked, nor of the light, which its leaves take up.
-        may_be_another = not measured and rules.crop_drift > self.rules.crop_drift
-        of_crop = LEAVES_AND_LIGHT if new_crop or may_be_another else frozenset[str]()
-        hidden = self.without | (frozenset({"co2_drift"}) if off else frozenset()) | of_crop | of_vents
-        is_later = self.history is not None
-        search = search_of(
-            days, site, knowledge, hidden, rules, self.nuisance, self.null_gains,
-            is_later=is_later, by_days=not (is_later or many_new),
-        )  # fmt: skip
+        around = circumstances_of(log, self.model, seen, self.rules)
+        days, knowledge, rules, rng = (
+            around.completed.days,
+            around.knowledge,
+            around.rules,
+            np.random.default_rng(self.seed),
+        )
+        search = self._search(around, site)
         progress("searching for causes")
         first, last, found = search.run(rng, earlier)
         unseen = hidden_by_missing_weather(first.design.line)
         found = [replace(one, confounded=(*one.confounded, *unseen)) for one in found]
         # A parameter can stand in for an actuator that the log lacks, found or not.
-        hiding = may_hide_in_parameters(logged.record.missing)
-        waiting: tuple[str, ...] = ()
-        parameter = None if hiding or new_crop else search.changed_parameter(rng) or asked
+        hiding = may_hide_in_parameters(around.logged.record.missing)
+        waiting = False
+        parameter = None if hiding or around.new_crop else search.changed_parameter(rng) or asked
         if parameter is not None and parameter.leads and parameter.onset is not None:
             if (told := self._since(parameter, parameter.onset.time, log)) is not None:
                 return told
             # What the days since then alone do not bear out, or are too few to, is left to a later log; of too few days
             # all is left, since what an effect explains of them the parameter explains better.
-            if log.select(parameter.onset.time).days < rules.least_days:
-                waiting = (wording.WAITING,)
+            waiting = log.select(parameter.onset.time).days < rules.least_days
             parameter = None
         leads = parameter is not None and parameter.leads
         progress("correcting the model")
-        nothing_asked = bool(waiting) or new_crop
+        nothing_asked = waiting or around.new_crop
         causes, patterns = ([], ()) if leads or nothing_asked else (found, last.patterns)
         result = correct(days, knowledge, causes, patterns, site.longitude, rules)
         if parameter is not None and not patterns and may_give_way(result.kept):
@@ -198,30 +179,51 @@ class _Question:
         sure, outdoing = until_outdone(result.kept)
         if outdoing and result.parameter is None and not patterns:
             result, patterns = correct(days, knowledge, sure, outdoing, site.longitude, rules), outdoing
-        explained = bool(completed.found or result.kept or result.parameter or patterns)
+        explained = bool(around.completed.found or result.kept or result.parameter or patterns)
         if not (explained or nothing_asked) and (patterns := search.unexplained(rng)):
             result = correct(days, knowledge, (), patterns, site.longitude, rules)
-        verdict, findings = _verdict(completed, result, patterns, rules)
-        stages = stages_of(result, completed, logged)
-        progress("predicting unseen days")
+        followed = remembering(replace(self.model, history=seen), result.parameter, rules).history
+        if not (around.new_crop or result.parameter is not None):
+            followed = search.history_after(result.kept)
+        diagnosis = self._diagnosis(log, around, first, result, patterns)
+        if waiting:
+            diagnosis = replace(diagnosis, notes=(wording.WAITING, *diagnosis.notes))
+        return Answer(diagnosis, result.kept, result.parameter, followed)
+
+    def _search(self, around: Circumstances, site: Site) -> Search:
+        """Return the search that the circumstances of a log leave."""
+        is_later = self.history is not None
+        return search_of(
+            around.completed.days, site, around.knowledge, self.without | around.not_asked, around.rules,
+            self.nuisance, self.null_gains, is_later=is_later, by_days=around.by_days and not is_later,
+        )  # fmt: skip
+
+    def _diagnosis(
+        self, log: Log, around: Circumstances, first: Round, result: Corrected, patterns: Sequence[Hypothesis]
+    ) -> Diagnosis:
+        """Return what was told of a log, with the errors on unseen days and the model that comes of it.
+
+        Args:
+            log: that was asked.
+            around: its circumstances.
+            first: round of the search.
+            result: of the correction.
+            patterns: what no cause explains.
+        """
+        model, rules, days, site = self.model, around.rules, around.completed.days, log.known_site
+        verdict, findings = _verdict(around.completed, result, patterns, rules)
+        stages = stages_of(result, around.completed, around.logged)
+        self.progress("predicting unseen days")
         runs = runs_of(stages)
         errors = errors_of(runs)
         start, end = log.telemetry.time[0], log.telemetry.time[-1]
         moved = model.posterior.values, result.stages["corrected"].posterior.values
         crop = growth_since(log, days.record, moved, model.crop or built_in_crop())
-        corrected = corrected_model(model, result, findings, errors, knowledge.discrepancy, (start, end), crop)
-        notes = (
-            *waiting,
-            *((wording.NEW_CROP,) if new_crop else (wording.GROWN_CROP,) if of_crop else ()),
-            *((wording.NEW_LEAVES,) if many_new and not new_crop else ()),
-            *((wording.VENTS_HARDLY_OPEN,) if of_vents else ()),
-            *((wording.NOT_CALIBRATED,) if knowledge.transferred else ()),
-            *wording.thin_air(site),
-            *((opened.sentence,) if opened is not None and off else ()),
-        )
+        discrepancy = around.knowledge.discrepancy
+        corrected = corrected_model(model, result, findings, errors, discrepancy, (start, end), crop)
         possible = {name for one in findings for name in one.confounded}
-        not_asked = {*first.design.untestable, *of_crop}
-        diagnosis = Diagnosis(
+        not_asked = {*first.design.untestable, *around.of_crop}
+        return Diagnosis(
             site=site.name,
             verdict=verdict,
             start=start,
@@ -235,16 +237,13 @@ class _Question:
             corrected=remembering(corrected, result.parameter, rules),
             # What a cause may as well be is told already.
             untestable=tuple(name for name in EFFECTS if name in not_asked and name not in possible),
-            missing=logged.record.missing,
-            notes=notes,
+            missing=around.logged.record.missing,
+            notes=around.notes,
             evidence=Evidence(
-                days, knowledge, first, {name: stage for name, (stage, _) in stages.items()}, runs["24_h"]
+                days, around.knowledge, first, {name: stage for name, (stage, _) in stages.items()}, runs["24_h"]
             ),
             log=log,
         ).settled()
-        followed = remembering(known, result.parameter, rules).history
-        seen = followed if new_crop or result.parameter is not None else search.history_after(result.kept)
-        return Answer(diagnosis, result.kept, result.parameter, seen)
 
     def _since(
         self,
