@@ -106,16 +106,13 @@ def table(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int, str]]:
         lambda one: bool(one.confounded) and not is_first(one),
         "-",
     )
-    alone = [one for one in of("single", size=1.0) if one.expected_gain is not None]
     enough = read_null_gains().least
-    share(
-        "oracle: gain enough at ENR 1, were the structure right",
-        alone,
-        lambda one: (one.expected_gain or 0.0) >= enough,
-        "-",
-    )
-    known = [one for one in alone if one.known_gain is not None]
-    share("oracle: the same, parameters known", known, lambda one: (one.known_gain or 0.0) >= enough, "-")
+    for size in (1.0, 0.3):
+        alone = [one for one in of("single", size=size) if one.expected_gain is not None]
+        right = f"oracle: gain enough at ENR {size:g}, were the structure right"
+        share(right, alone, lambda one: (one.expected_gain or 0.0) >= enough, "-")
+        known = [one for one in alone if one.known_gain is not None]
+        share("oracle: the same, parameters known", known, lambda one: (one.known_gain or 0.0) >= enough, "-")
     share("both of a pair", of("pair"), has_all, ">= .45")
     sizes = [abs(one.relative_size - 1.0) for one in outcomes if one.relative_size is not None]
     rows.append(("size, median relative error", float(np.median(sizes)) if sizes else np.nan, len(sizes), "<= .10"))
