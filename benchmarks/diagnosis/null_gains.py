@@ -13,12 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.diagnosis.null_logs import Later, rules_of
+from benchmarks.diagnosis.null_logs import Later, around
 from benchmarks.jobs import Jobs
 from igrow.trainer.data import prepare_log
 from igrow.trainer.diagnosis import change, diagnose, history, linear, parameter_change, search
 from igrow.trainer.diagnosis.design import Design
-from igrow.trainer.diagnosis.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX
 from igrow.trainer.diagnosis.null_gains import NullGains
 from igrow.trainer.diagnosis.rules import DEFAULT
@@ -42,17 +41,18 @@ class Gained:
 
 def gained(job: Later) -> Gained:
     """Return the gains of every effect and parameter in a log."""
-    reference, case, telemetry = job
-    known, site = reference.model.history, reference.greenhouse.site
+    reference, case, _ = job
+    known, site, log = reference.model.history, reference.greenhouse.site, around(job)
     assert known is not None
-    days = log_days(prepare_log(telemetry, site), reference.model)
-    unasked, rules = history.with_vents(known, days.record, rules_of(days.record, known, site))
+    days, rules = log.completed.days, log.rules
     plain = history.laid_out(days, site, known, (), rules)
     design = history.expected(known, plain, history.expected_misfit(known, plain))
     effects = _gains(design, search.score_candidates)
     parameters = _gains(parameter_change.joined(design), parameter_change.score)
     asked = {
-        key: gain for key, gain in parameters.items() if unasked.isdisjoint(members(key.removeprefix(PARAMETER_PREFIX)))
+        key: gain
+        for key, gain in parameters.items()
+        if log.not_asked.isdisjoint(members(key.removeprefix(PARAMETER_PREFIX)))
     }
     return Gained(site.name, case.group, effects, asked)
 

@@ -13,12 +13,10 @@ from benchmarks.diagnosis.cases import Case
 from benchmarks.diagnosis.logs import Reference
 from benchmarks.diagnosis.nurseries import calibrated, calibration_logs, later_logs, nursery
 from benchmarks.jobs import Jobs
-from igrow.core.simulator.hybrid.record import Record
-from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
-from igrow.trainer.diagnosis import DEFAULT, DecisionRules, history
-from igrow.trainer.diagnosis.crop import new_leaves, with_its_drift
-from igrow.trainer.fit.discrepancy import Discrepancy
+from igrow.trainer.data import prepare_log
+from igrow.trainer.diagnosis import DEFAULT
+from igrow.trainer.diagnosis.circumstances import Circumstances, circumstances_of
 
 SEEDS = {"spring": 110_000, "autumn": 120_000, "winter": 130_000}
 GREENHOUSES, DAYS = 16, 28
@@ -41,9 +39,11 @@ def null_cases(season: str, known: Sequence[Reference]) -> list[list[Case]]:
     return found
 
 
-def rules_of(record: Record, known: Discrepancy | None, site: Site) -> DecisionRules:
-    """Return the rules that a diagnosis has of a log whose crop has grown since its calibration."""
-    return with_its_drift(DEFAULT, new_leaves(known, site, history.leaf_area_of(record)))
+def around(job: Later) -> Circumstances:
+    """Return the circumstances of such a log, as a diagnosis has them."""
+    reference, _, telemetry = job
+    model = reference.model
+    return circumstances_of(prepare_log(telemetry, reference.greenhouse.site), model, model.history, DEFAULT)
 
 
 def unchanged(jobs: Jobs) -> list[Later]:

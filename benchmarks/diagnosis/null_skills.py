@@ -16,14 +16,11 @@ from typing import Any
 import numpy as np
 
 from benchmarks.diagnosis.null_gains import FALSE_CLAIMS, largest
-from benchmarks.diagnosis.null_logs import Later, rules_of
+from benchmarks.diagnosis.null_logs import Later, around
 from benchmarks.jobs import Jobs
-from igrow.trainer.data import prepare_log
-from igrow.trainer.diagnosis import cross_validation, history, null_gains, unexplained
+from igrow.trainer.diagnosis import cross_validation, null_gains, unexplained
 from igrow.trainer.diagnosis.candidates import Pattern
 from igrow.trainer.diagnosis.cross_validation import CrossValidated, cross_validated
-from igrow.trainer.diagnosis.freerun import log_days
-from igrow.trainer.diagnosis.knowledge import knowledge_of
 from igrow.trainer.diagnosis.null_gains import NullGains
 from igrow.trainer.diagnosis.rounds import Change, search_of
 
@@ -47,14 +44,10 @@ class Told:
 
 def told(job: Later) -> Told:
     """Ask a log, as a diagnosis does where its time steps tell nothing, whether or not those of this one do."""
-    reference, case, telemetry = job
-    site, rng = reference.greenhouse.site, np.random.default_rng(0)
-    log = prepare_log(telemetry, site)
-    days = log_days(log, reference.model)
-    known = reference.model.history
-    _, rules = history.with_vents(known, days.record, rules_of(days.record, known, site))
-    knowledge = knowledge_of(reference.model, site, rules)
-    search = search_of(days, site, knowledge, frozenset(), rules, None, None)
+    reference, case, _ = job
+    site, rng, log = reference.greenhouse.site, np.random.default_rng(0), around(job)
+    knowledge, rules = log.knowledge, log.rules
+    search = search_of(log.completed.days, site, knowledge, log.not_asked, rules, None, None)
     assert isinstance(search, Change)
     design = search.resolved()
     by_physics = knowledge.by_physics(rules)
