@@ -98,6 +98,16 @@ def test_grams_a_cubic_metre_outside_are_no_per_cent(clean: Clean) -> None:
     assert find_faults(table.with_columns({"outdoor_humidity": desert}), SITE) == ()
 
 
+def test_pipes_that_are_hot_throughout_cold_weeks_are_no_fahrenheit(clean: Clean) -> None:
+    """A greenhouse without lamps in January: its pipes never rest. Where it is mild outside they do at times."""
+    table = clean.telemetry
+    hot = table.with_columns({"rail_pipe_temperature": np.linspace(60.0, 84.0, len(table))})
+    for outside, faults in ((2.0, []), (20.0, ["rail_pipe_temperature"])):
+        moved = table["outdoor_temperature"] - np.mean(table["outdoor_temperature"]) + outside
+        found = units_by_relation(hot.with_columns({"outdoor_temperature": moved}), SITE)
+        assert [one.quantity for one in found if one.quantity != "outdoor_temperature"] == faults
+
+
 def test_windward_vents_that_hardly_open_in_winter_are_no_fraction(clean: Clean) -> None:
     lee = clean.telemetry["vent_lee"]
     small = 0.98 * lee / lee.max()

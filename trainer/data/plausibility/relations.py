@@ -35,6 +35,8 @@ PIPE_ABOVE = 25.0
 """K by which the air lies at least below a pipe at rest that is in degF."""
 AT_REST = (-4.0, 10.0)
 """K by which a pipe at rest differs from the air."""
+MILD = 15.0
+"""degC outside at which no greenhouse needs pipes that hot."""
 DRY_MEDIAN, DRY_HIGH = 25.0, 45.0
 """% of relative humidity: g m-3 are never more."""
 CARBON_OUTSIDE = (370.0, 480.0)
@@ -105,10 +107,14 @@ def _sky(telemetry: Telemetry) -> DataFault | None:
 
 
 def _pipe(telemetry: Telemetry, name: str) -> DataFault | None:
-    """Judge a pipe by its coolest tenth: at rest it is as warm as the air around it."""
+    """Judge a pipe by its coolest tenth: at rest it is as warm as the air around it.
+
+    In weeks that are cold throughout a greenhouse may heat all the time, and its pipes never rest.
+    """
     pipe, air = _side_by_side(telemetry, name, "air_temperature")
     pipe, air = pipe[pipe > 1.0], air[pipe > 1.0]
-    if len(pipe) < _LEAST_ROWS:
+    outside = readings(telemetry, "outdoor_temperature")
+    if len(pipe) < _LEAST_ROWS or not len(outside) or float(np.quantile(outside, 0.9)) < MILD:
         return None
     coolest = pipe <= np.quantile(pipe, 0.1)
     above = float(np.median((pipe - air)[coolest]))
