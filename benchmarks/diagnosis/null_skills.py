@@ -1,8 +1,9 @@
 """Learn what a change that only unseen days tell must take off their errors: more than where there is none.
 
-An effect must exceed `OVER_NULL` times what it took off in any of these logs, a pattern without a name the same of any
-of its kind. Above that stands what every change must take off: the least with which these logs, each greenhouse judged
-by the others, are told to lack one no more often than they may; of patterns the same.
+An effect must exceed some times what it took off in any of these logs (`DecisionRules.days_over_null`), a pattern
+without a name the same of any of its kind. Above that stands what every change must take off: the least with which
+these logs, each greenhouse judged by the others, are told to lack one no more often than they may; of patterns the
+same.
 """
 
 from __future__ import annotations
@@ -23,9 +24,8 @@ from igrow.trainer.diagnosis.candidates import Pattern
 from igrow.trainer.diagnosis.cross_validation import CrossValidated, cross_validated
 from igrow.trainer.diagnosis.null_gains import NullGains
 from igrow.trainer.diagnosis.rounds import Change, search_of
+from igrow.trainer.diagnosis.rules import DEFAULT
 
-OVER_NULL = 1.3
-"""Times the most that an effect, or a kind of patterns, takes off where nothing has changed."""
 Skills = Mapping[str, float]
 """Share of the squared error of unseen days that each takes off; the largest first."""
 
@@ -64,9 +64,8 @@ def _ranked(found: Sequence[CrossValidated]) -> list[CrossValidated]:
 
 
 def of_each(skills: Sequence[Skills]) -> dict[str, float]:
-    """Return what each effect, or each kind of patterns, must exceed by itself."""
-    taken = largest([{name: OVER_NULL * skill for name, skill in one.items()} for one in skills])
-    return {name: skill for name, skill in taken.items() if skill > 0.0}
+    """Return the most that each effect, or each kind of patterns, takes off."""
+    return {name: skill for name, skill in largest(skills).items() if skill > 0.0}
 
 
 def least_skill(found: Sequence[tuple[str, Skills]]) -> float:
@@ -79,7 +78,7 @@ def least_skill(found: Sequence[tuple[str, Skills]]) -> float:
     for greenhouse, skills in found:
         by_others = of_each([other for name, other in found if name != greenhouse])
         best, skill = next(iter(skills.items()), ("", 0.0))
-        if skill > 0.0 and skill >= by_others.get(best, 0.0):
+        if skill > 0.0 and skill >= DEFAULT.days_over_null * by_others.get(best, 0.0):
             told.append(skill)
     may = int(FALSE_CLAIMS * len(found))
     least = sorted((0.0, *told), reverse=True)[min(may, len(told))]

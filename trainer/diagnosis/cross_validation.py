@@ -60,7 +60,7 @@ def find(design: Design, by_physics: Gaussian, rng: np.random.Generator) -> Roun
     """
     null = linear.fit(design.grams, design.null_model())
     found = best(cross_validated(design, by_physics, promising(design, rng)))
-    if found is None or found.skill < read_null_skills().needed(found.hypothesis.effect):
+    if found is None or found.skill < read_null_skills().needed(found.hypothesis.effect, design.rules.days_over_null):
         return None
     return _by_days(design, null, found, rng)
 
@@ -101,10 +101,11 @@ def settled(design: Design, by_physics: Gaussian, told: Round, rng: np.random.Ge
         own = rival
     chosen, begun = own.hypothesis, own.hypothesis.term.onset is not None
     over_null = change.over_null(design, chosen)
+    by_days_alone = known.needed(chosen.effect, rules.days_over_null)
     if over_null < 1.0:
-        return nothing if begun or own.skill < known.needed(chosen.effect) else _by_days(design, null, own, rng)
+        return nothing if begun or own.skill < by_days_alone else _by_days(design, null, own, rng)
     # A beginning was searched for among all days.
-    least = known.needed(chosen.effect) if begun else known.largest.get(chosen.effect, 0.0)
+    least = by_days_alone if begun else known.largest.get(chosen.effect, 0.0)
     if over_null < rules.far_over_null and own.skill < least:
         return nothing
     return told if chosen is first else change.round_of(design, null, chosen, rng)

@@ -23,15 +23,20 @@ class NullGains:
     """What is gained where nothing has changed: log-likelihoods in nats, or shares of the error of unseen days."""
 
     largest: Mapping[str, float]
-    """In any such log, of effects, parameters (``parameter:name``) or kinds of patterns; of shares some times that."""
+    """In any such log, of effects, parameters (``parameter:name``) or kinds of patterns."""
     least: float
     """What any change must gain: of such logs none or nearly none is given a name then, each by the gains of others."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
     """The command that learned it, its date and seeds."""
 
-    def needed(self, name: str) -> float:
-        """Return what a change must gain: more than it did in any greenhouse in which nothing had changed."""
-        return max(self.least, self.largest.get(name, 0.0))
+    def needed(self, name: str, over: float = 1.0) -> float:
+        """Return what a change must gain: more than it did in any greenhouse in which nothing had changed.
+
+        Args:
+            name: of an effect, a parameter, or a kind of patterns.
+            over: times that.
+        """
+        return max(self.least, over * self.largest.get(name, 0.0))
 
     def times(self, factor: float) -> NullGains:
         """Return so many times as much, for logs in which more is gained where nothing has changed."""

@@ -91,7 +91,10 @@ class DecisionRules:
     least_change_skill: float = _tuned(
         -0.02, "share that the shipped model gains at least with a change in it: chance makes as much"
     )
-    least_unproven_change: float = _tuned(4.0, "gain from which on a change is asked of unseen days alone")
+    least_unproven_change: float = _tuned(2.0, "gain from which on a change is asked of unseen days alone")
+    days_over_null: float = _tuned(
+        1.3, "times the most that it took off unseen days where nothing had changed that it must take off then"
+    )
     least_pattern_change: float = _tuned(60.0, "the same of a pattern: greenhouses drift with the weather")
     least_proven_pattern: float = _tuned(20.0, "of it, what the scatter of day scores must bear out")
     pattern_over_change: float = _tuned(1.5, "times a change's gain at which a pattern replaces it")

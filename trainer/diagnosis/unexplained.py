@@ -60,7 +60,9 @@ def find(design: Design, longitude: float, by_physics: Gaussian, rng: np.random.
     """
     asked = judged(design, longitude, by_physics)
     known = read_null_pattern_skills()
-    told = best([one for one in asked.found if one.skill >= known.needed(_pattern(one).kind)])
+    told = best(
+        [one for one in asked.found if one.skill >= known.needed(_pattern(one).kind, design.rules.days_over_null)]
+    )
     if told is None:
         return None
     column = search.column_of(asked.design, told.hypothesis.term)
