@@ -65,7 +65,7 @@ def _gains(design: Design, score: Callable[..., list[search.Hypothesis]]) -> dic
     return {one.key: change.proven_gain(design, one) for one in ranked}
 
 
-def largest(gains: Sequence[dict[str, float]]) -> dict[str, float]:
+def largest(gains: Sequence[Mapping[str, float]]) -> dict[str, float]:
     """Return the largest gain of every effect."""
     names = sorted({name for one in gains for name in one})
     return {name: float(f"{max(0.0, *(one.get(name, 0.0) for one in gains)):.3g}") for name in names}

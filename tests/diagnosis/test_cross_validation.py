@@ -34,6 +34,8 @@ from tests.virtual_log import SITE
 
 BY_PHYSICS = Gaussian(NAMES, np.array([PARAMETERS[name].value for name in NAMES]), np.diag([1e-4] * len(NAMES)))
 """About the parameters at which the designs stand."""
+BY_DAYS = NullGains({}, 0.05)
+"""What unseen days must show, where a test asks nothing else."""
 
 
 def hypothesis(effect: str, *, onset: int | None = None, column: int = 0) -> Hypothesis:
@@ -245,14 +247,14 @@ def test_what_gains_little_more_than_it_must_unseen_days_must_show(
     proven: float, named: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its skill is no more than where nothing had changed; rain that gains far more may fall on few days."""
-    monkeypatch.setattr(cross_validation, "read_null_skills", lambda: NullGains({"first": 0.05}, 0.06))
-    assert settled_as(hypothesis("other"), ([0.01] * 4, [0.0] * 4), proven, monkeypatch) == named
-    assert settled_as(hypothesis("other"), ([0.013] * 4, [0.0] * 4), proven, monkeypatch) == "first"
+    known = NullGains({"first": 0.05}, 0.06)
+    assert settled_as(hypothesis("other"), ([0.01] * 4, [0.0] * 4), proven, monkeypatch, known) == named
+    assert settled_as(hypothesis("other"), ([0.013] * 4, [0.0] * 4), proven, monkeypatch, known) == "first"
     # Of what began within the log they must show as much as if they alone told it; the other must gain 10.
     begun = hypothesis("other", onset=9)
-    assert settled_as(begun, ([0.0] * 4, [0.014] * 4), proven, monkeypatch) == ""
-    assert settled_as(begun, ([0.0] * 4, [0.016] * 4), proven, monkeypatch) == "other"
-    assert settled_as(begun, ([0.0] * 4, [0.014] * 4), proven + 14.0, monkeypatch) == "other"
+    assert settled_as(begun, ([0.0] * 4, [0.014] * 4), proven, monkeypatch, known) == ""
+    assert settled_as(begun, ([0.0] * 4, [0.016] * 4), proven, monkeypatch, known) == "other"
+    assert settled_as(begun, ([0.0] * 4, [0.014] * 4), proven + 14.0, monkeypatch, known) == "other"
 
 
 @pytest.mark.parametrize(
@@ -294,9 +296,14 @@ def test_both_that_is_known_of_everything_else_counts() -> None:
 
 
 def settled_as(
-    other: Hypothesis, falls: tuple[list[float], list[float]], proven: float, monkeypatch: pytest.MonkeyPatch
+    other: Hypothesis,
+    falls: tuple[list[float], list[float]],
+    proven: float,
+    monkeypatch: pytest.MonkeyPatch,
+    known: NullGains = BY_DAYS,
 ) -> str:
-    """Return which of two causes is told in the end."""
+    """Return which of two causes is told in the end, by what unseen days must show (`known`)."""
+    monkeypatch.setattr(cross_validation, "read_null_skills", lambda: known)
     plain = with_parameters(Truth({}, {}), 1)
     assert plain.history is not None
     design = replace(plain, history=replace(plain.history, null_gains=NullGains({"other": 10.0}, 8.0)))
