@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.diagnosis.null_logs import Later, around
+from benchmarks.diagnosis.null_logs import Later, circumstances
 from benchmarks.jobs import Jobs
 from igrow.trainer.data import prepare_log
 from igrow.trainer.diagnosis import change, diagnose, history, linear, parameter_change, search
@@ -42,7 +42,7 @@ class Gained:
 def gained(job: Later) -> Gained:
     """Return the gains of every effect and parameter in a log."""
     reference, case, _ = job
-    known, site, log = reference.model.history, reference.greenhouse.site, around(job)
+    known, site, log = reference.model.history, reference.greenhouse.site, circumstances(job)
     assert known is not None
     days, rules = log.completed.days, log.rules
     plain = history.laid_out(days, site, known, (), rules)

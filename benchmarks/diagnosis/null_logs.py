@@ -39,7 +39,7 @@ def null_cases(season: str, known: Sequence[Reference]) -> list[list[Case]]:
     return found
 
 
-def around(job: Later) -> Circumstances:
+def circumstances(job: Later) -> Circumstances:
     """Return the circumstances of such a log, as a diagnosis has them."""
     reference, _, telemetry = job
     model = reference.model

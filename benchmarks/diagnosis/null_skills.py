@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.diagnosis.null_gains import FALSE_CLAIMS, largest
-from benchmarks.diagnosis.null_logs import Later, around
+from benchmarks.diagnosis.null_logs import Later, circumstances
 from benchmarks.jobs import Jobs
 from igrow.trainer.diagnosis import cross_validation, null_gains, unexplained
 from igrow.trainer.diagnosis.candidates import Pattern
@@ -45,7 +45,7 @@ class Told:
 def told(job: Later) -> Told:
     """Ask a log, as a diagnosis does where its time steps tell nothing, whether or not those of this one do."""
     reference, case, _ = job
-    site, rng, log = reference.greenhouse.site, np.random.default_rng(0), around(job)
+    site, rng, log = reference.greenhouse.site, np.random.default_rng(0), circumstances(job)
     knowledge, rules = log.knowledge, log.rules
     search = search_of(log.completed.days, site, knowledge, log.not_asked, rules, None, None)
     assert isinstance(search, Change)

@@ -93,7 +93,7 @@ class DecisionRules:
     )
     least_unproven_change: float = _tuned(2.0, "gain from which on a change is asked of unseen days alone")
     days_over_null: float = _tuned(
-        1.3, "times the most that it took off unseen days where nothing had changed that it must take off then"
+        1.3, "times what it took off unseen days at most where nothing had changed, that it must take off to be told so"
     )
     least_pattern_change: float = _tuned(60.0, "the same of a pattern: greenhouses drift with the weather")
     least_proven_pattern: float = _tuned(20.0, "of it, what the scatter of day scores must bear out")
