@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, cast
 
+import numpy as np
 import pytest
 
 from igrow.core.bundle import Estimate
@@ -42,6 +43,7 @@ def effects(causes: Sequence[Estimated]) -> list[str]:
         # The new one adds nothing of its own, or neither has a size.
         ([(0.1, 0.01), (0.0, 0.02)], []),
         ([(0.1, 0.09), (0.1, 0.11)], []),
+        ([(0.1, 0.01), (0.1, 0.06)], []),
         # It only mops up what is left, up to its bound.
         ([(0.1, 0.01), (1e9, 1e9)], []),
     ],
@@ -60,6 +62,30 @@ def test_what_gave_way_does_not_lead_again(monkeypatch: pytest.MonkeyPatch) -> N
     search, judged = searched([(0.1, 0.02), (0.1, 0.01)], monkeypatch)
     back = search.joined_by(of("rain_cooling"), judged, [of("lamp_heat")], {"rain_cooling"})
     assert effects(back) == ["lamp_heat", "rain_cooling"]
+
+
+def test_beside_one_that_adds_nothing_another_is_looked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beside a pipe's sensor that is off, lamps that heat more were all that was asked: a crop at night went untold."""
+    search, judged = searched([(0.1, 0.01), (0.1, 0.06)], monkeypatch)
+    asked: list[frozenset[str]] = []
+
+    def judge(one: rounds.Change, _design: Any, found: Sequence[Estimated], *_rest: Any, **_causes: Any) -> Any:
+        asked.append(one.without)
+        rest = [name for name in ("rain_cooling", "lamp_heat", "night_transpiration") if name not in one.without]
+        return replace(judged, patterns=cast(Any, tuple(rest[len(found) : len(found) + 1])))
+
+    monkeypatch.setattr(rounds.Change, "judge", judge)
+    for name in ("resolved", "design"):
+        monkeypatch.setattr(rounds.Change, name, lambda *_asked: judged.design)
+    monkeypatch.setattr(rounds, "estimate", lambda one, _rng: of(*one.patterns) if one.patterns else None)
+    monkeypatch.setattr(
+        rounds.Change,
+        "joined_by",
+        lambda _one, new, _round, found, _led: [] if new.effect == "lamp_heat" else [*found, new],
+    )
+    _, _, found = search.run(np.random.default_rng(0))
+    assert effects(found) == ["rain_cooling", "night_transpiration"]
+    assert asked == [frozenset(), frozenset(), frozenset({"lamp_heat"}), frozenset({"lamp_heat"})]
 
 
 def searched(sizes: Sequence[tuple[float, float]], monkeypatch: pytest.MonkeyPatch) -> tuple[rounds.Change, Round]:

@@ -6,7 +6,6 @@ and then follow what is missing: a day ahead is nearly as good without its name.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -20,45 +19,47 @@ from igrow.trainer.fit.gaussian import Gaussian
 
 
 def confirmed(
-    log: LogDays, knowledge: Knowledge, beside: Sequence[ActiveTerm], one: Estimated, rules: DecisionRules
+    log: LogDays, knowledge: Knowledge, standing: Sequence[ActiveTerm], asked: Sequence[Estimated], rules: DecisionRules
 ) -> Estimated | None:
-    """Return a change with the size that time steps and free runs agree on, and its skill; None where they do not.
+    """Return the first of some changes with its size by free runs, and its skill; None where time steps tell another.
 
     Args:
         log: of the diagnosis.
         knowledge: of the greenhouse before it.
-        beside: terms that the model has, and all else that was found: of two causes one cannot do for both.
-        one: the change, as time steps tell it.
-        rules: how far both may be apart.
+        standing: terms that the model has: of two causes one cannot do for both.
+        asked: the change, as time steps tell it, and those that are to be asked after it.
+        rules: how far both sizes may be apart.
 
     Raises:
-        DivergenceError: the model runs out of all bounds with it.
+        DivergenceError: the model runs out of all bounds with them.
     """
     prior = knowledge.by_physics(rules)
-    size = _by_runs(log, prior, beside, one.term)
-    if size is not None:
-        both = size * one.term.amplitude
-        apart = both <= 0.0 or min(size / one.term.amplitude, one.term.amplitude / size) < rules.regime_share
-        if apart:
+    one, *later = asked
+    sizes = _by_runs(log, prior, standing, [change.term for change in asked])
+    if sizes is not None:
+        share = sizes[0] / one.term.amplitude
+        if share <= 0.0 or min(share, 1.0 / share) < rules.regime_share:
             return None
-        # Neither is better than the other, and they err for different reasons.
-        one = _at(one, math.copysign(math.sqrt(both), size))
-    without, named = (Stage(log.fit(prior, terms), terms) for terms in (tuple(beside), (*beside, one.term)))
+        one, *later = (_at(change, size) for change, size in zip(asked, sizes, strict=True))
+    beside = (*standing, *(change.term for change in later))
+    without, named = (Stage(log.fit(prior, terms), terms) for terms in (beside, (*beside, one.term)))
     skill = cross_validated_skill(log, Refittable(without, prior), Refittable(named, prior, sized=True))
     return one if skill is None else replace(one, change_skill=skill)
 
 
-def _by_runs(log: LogDays, prior: Gaussian, beside: Sequence[ActiveTerm], term: ActiveTerm) -> float | None:
-    """Return the size that the free runs of the fitted days ask for; None where something began within the log.
+def _by_runs(
+    log: LogDays, prior: Gaussian, standing: Sequence[ActiveTerm], asked: Sequence[ActiveTerm]
+) -> list[float] | None:
+    """Return the sizes that the free runs of the fitted days ask for; None where something began within the log.
 
     Of that there is no one size.
     """
-    if any(one.onset is not None for one in (*beside, term)):
+    if any(one.onset is not None for one in (*standing, *asked)):
         return None
-    name = f"{term.effect}:{EFFECTS[term.effect].amplitude.name}"
-    known = {**activate(log.record, beside), term.effect: dict(term.shape)}
-    fitted = fit_together(log.record, log.split.fit_rows, prior, {term.effect: term.amplitude}, known)
-    return fitted.values[name]
+    known = {**activate(log.record, standing), **{one.effect: dict(one.shape) for one in asked}}
+    sizes = {one.effect: one.amplitude for one in asked}
+    fitted = fit_together(log.record, log.split.fit_rows, prior, sizes, known).values
+    return [fitted[f"{name}:{EFFECTS[name].amplitude.name}"] for name in sizes]
 
 
 def _at(one: Estimated, size: float) -> Estimated:

@@ -61,24 +61,13 @@ def correct(
     current = recalibrated = Stage(log.fit(knowledge.prior, knowledge.terms), knowledge.terms)
     kept: list[Estimated] = []
     for place, one in enumerate(found, 1):
-        beside = (*current.terms, *(later.term for later in found[place:]))
-        # Where the effect takes over what recalibration had put into the parameters, the fit starts there.
-        begin = {name: value + one.shift.get(name, 0.0) for name, value in current.posterior.values.items()}
-        # What was found after a cause that does not stand was found beside it, and is not told either.
-        try:
-            asked = one if knowledge.history is None else confirmed(log, knowledge, beside, one, rules)
-            if asked is None:
-                break
-            terms = (*current.terms, asked.term)
-            trial = Stage(log.fit(knowledge.prior, terms, begin), terms)
-            judged = _judged(log, knowledge, asked, current, trial)
-        except DivergenceError:
-            break
-        proven = stands if knowledge.history is None else is_proven_change
-        if not proven(judged, kept, rules):
-            break
-        kept.append(judged)
-        current = trial
+        # It was found beside those before it. Where one of them does not stand, it must gain enough by itself.
+        if len(kept) < place - 1 and one.over_null < 1.0:
+            continue
+        tried = _tried(log, knowledge, one, current, found[place:], rules)
+        if tried is not None and _is_proven(tried[0], kept, knowledge, rules):
+            judged, current = tried
+            kept.append(judged)
     if patterns:
         current = _with_patterns(log, knowledge, current, patterns, longitude, rules)
     stages = {
@@ -87,6 +76,41 @@ def correct(
         "corrected": current,
     }
     return Corrected(stages, tuple(kept))
+
+
+def _tried(
+    log: LogDays,
+    knowledge: Knowledge,
+    one: Estimated,
+    current: Stage,
+    later: Sequence[Estimated],
+    rules: DecisionRules,
+) -> tuple[Estimated, Stage] | None:
+    """Return a cause as unseen days judge it, and the model with it; None where free runs refuse it.
+
+    Args:
+        log: of the diagnosis.
+        knowledge: of the model in force.
+        one: the cause.
+        current: the model so far.
+        later: causes that were found after it.
+        rules: what a cause must show.
+    """
+    # Where the effect takes over what recalibration had put into the parameters, the fit starts there.
+    begin = {name: value + one.shift.get(name, 0.0) for name, value in current.posterior.values.items()}
+    try:
+        asked = one if knowledge.history is None else confirmed(log, knowledge, current.terms, (one, *later), rules)
+        if asked is None:
+            return None
+        terms = (*current.terms, asked.term)
+        trial = Stage(log.fit(knowledge.prior, terms, begin), terms)
+        return _judged(log, knowledge, asked, current, trial), trial
+    except DivergenceError:
+        return None
+
+
+def _is_proven(one: Estimated, kept: Sequence[Estimated], knowledge: Knowledge, rules: DecisionRules) -> bool:
+    return stands(one, kept, rules) if knowledge.history is None else is_proven_change(one, rules)
 
 
 def stands(one: Estimated, kept: Sequence[Estimated], rules: DecisionRules) -> bool:
@@ -99,9 +123,9 @@ def stands(one: Estimated, kept: Sequence[Estimated], rules: DecisionRules) -> b
     return one.skill >= rules.clear_skill or (one.skill >= rules.least_skill and likelier)
 
 
-def is_proven_change(one: Estimated, kept: Sequence[Estimated], rules: DecisionRules) -> bool:
-    """Tell whether a change stands: makes a day ahead better, and the model that is shipped no worse."""
-    if not _is_large(one, rules) or (kept and not _adds_to(one, kept, rules)):
+def is_proven_change(one: Estimated, rules: DecisionRules) -> bool:
+    """Tell whether a change stands, alone or beside others: a day ahead is better, and the shipped model no worse."""
+    if not _is_large(one, rules):
         return False
     far_beyond_null = one.over_null >= rules.far_over_null
     enough = rules.least_skill if far_beyond_null else rules.clear_change_skill

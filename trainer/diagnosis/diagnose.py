@@ -291,7 +291,8 @@ def _verdict(
 ) -> tuple[Verdict, tuple[Finding, ...]]:
     findings = (
         *(wording.actuator(one) for one in completed.found),
-        *(wording.finding(one) for one in sorted(result.kept, key=lambda one: -one.effect_to_noise)),
+        # The surest first: where two may do for one cause, the lesser of them can be the larger.
+        *(wording.finding(one) for one in sorted(result.kept, key=lambda one: -one.certainty)),
         *(() if result.parameter is None else (wording.parameter(result.parameter),)),
     )
     if patterns:

@@ -60,15 +60,19 @@ class Search:
             design = self.design([*self.knowledge.terms, *(one.term for one in found)], design.interval)
         # What weeks before have told gives way to nothing.
         led = set(EFFECTS if earlier else ())
+        asked = self
         while True:
-            judged = self.judge(design, found, rng, causes=len(found) < self.rules.most_causes)
+            judged = asked.judge(design, found, rng, causes=len(found) < self.rules.most_causes)
             first = first or judged
             new = estimate(judged, rng)
-            terms = [] if new is None else self.joined_by(new, judged, found, led)
-            if not terms:
+            if new is None:
                 return first, judged, found
+            terms = self.joined_by(new, judged, found, led)
+            if not terms:
+                # It only mops up what is left; another may be there.
+                asked, terms = replace(asked, without=asked.without | {new.effect}), found
             try:
-                design = self.design([*self.knowledge.terms, *(one.term for one in terms)], design.interval)
+                design = asked.design([*self.knowledge.terms, *(one.term for one in terms)], design.interval)
             except DivergenceError:
                 # No cause: the log itself stayed within all bounds.
                 return first, judged, found
@@ -114,8 +118,9 @@ class Search:
     def joined_by(self, new: Estimated, judged: Round, found: Sequence[Estimated], led: set[str]) -> list[Estimated]:
         """Return the causes of the next model: none where a further one adds nothing of its own.
 
-        One that only mops up what is left runs to its bound; one that is confounded with another (two ways for CO2 to
-        leak in) leaves neither with a size. One beside which those before it hardly stand is alone to begin with.
+        One that only mops up what is left runs to its bound, or has no size that is sure; one that is confounded with
+        another (two ways for CO2 to leak in) leaves neither with one. One beside which those before it hardly stand is
+        alone to begin with.
 
         Args:
             new: that a round has found.
@@ -127,10 +132,11 @@ class Search:
         if found and new.effect not in led and terms[-1].certainty > max(one.certainty for one in terms[:-1]):
             led.update(one.effect for one in found)
             terms = self.refitted(judged, [new])
-        stand = all(one.term.amplitude != 0.0 for one in terms) and all(
-            _is_inside(one, judged.design) for one in terms[1:]
-        )
-        return terms if stand and (len(terms) == 1 or all(one.certainty > 1.0 for one in terms)) else []
+        stand = all(one.term.amplitude != 0.0 for one in terms)
+        if len(terms) > 1:
+            sure = all(one.certainty >= self.rules.least_certainty for one in terms)
+            stand = stand and sure and all(_is_inside(one, judged.design) for one in terms[1:])
+        return terms if stand else []
 
     def refitted(self, judged: Round, causes: Sequence[Estimated]) -> list[Estimated]:
         """Return causes refitted together."""
