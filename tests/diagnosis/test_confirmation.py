@@ -54,11 +54,19 @@ def test_where_steps_and_runs_tell_another_size_nothing_is_told(
     assert (found is not None) is told
 
 
-def test_of_what_began_within_the_log_runs_tell_no_size() -> None:
-    began = np.datetime64("2020-02-08")
-    log, prior = cast(Any, None), cast(Any, None)
-    assert confirmation._by_runs(log, prior, (), [change(1.0, began).term]) is None
-    assert confirmation._by_runs(log, prior, (change(1.0, began).term,), [change(1.0).term]) is None
+def test_of_what_began_within_the_log_the_days_since_then_tell_the_size() -> None:
+    telemetry = virtual_log(24, seed=3, step=900.0)
+    began = telemetry.time[0] + np.timedelta64(10, "D")
+    columns = {"air_temperature": telemetry.columns["air_temperature"] + 1.0 * (telemetry.time >= began)}
+    model = model_in_force()
+    log = log_days(prepare_log(replace(telemetry, columns=dict(telemetry.columns) | columns), SITE), model)
+    prior = knowledge_of(model, SITE, DEFAULT).by_physics(DEFAULT)
+    (since,) = confirmation._by_runs(log, prior, (), [change(0.5, began).term], DEFAULT) or (0.0,)
+    assert since == pytest.approx(1.0, abs=0.3)
+    late = change(0.5, began + np.timedelta64(8, "D")).term
+    assert confirmation._by_runs(log, prior, (), [late], DEFAULT) is None
+    drifts = replace(late, effect="humidity_drift", onset=began)
+    assert confirmation._by_runs(log, prior, (drifts,), [change(0.5).term], DEFAULT) is None
 
 
 def test_of_several_each_has_its_size_beside_the_others() -> None:
@@ -69,6 +77,6 @@ def test_of_several_each_has_its_size_beside_the_others() -> None:
     log = log_days(prepare_log(replace(telemetry, columns=columns), SITE), model)
     prior = knowledge_of(model, SITE, DEFAULT).by_physics(DEFAULT)
     humidity = ActiveTerm("humidity_offset", 4.0, {})
-    right, nothing = confirmation._by_runs(log, prior, (), [change(0.5).term, humidity]) or (0.0, 0.0)
+    right, nothing = confirmation._by_runs(log, prior, (), [change(0.5).term, humidity], DEFAULT) or (0.0, 0.0)
     assert right == pytest.approx(1.0, abs=0.3)
     assert abs(nothing) < 1.0

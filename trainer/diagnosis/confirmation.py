@@ -35,7 +35,7 @@ def confirmed(
     """
     prior = knowledge.by_physics(rules)
     one, *later = asked
-    sizes = _by_runs(log, prior, standing, [change.term for change in asked])
+    sizes = _by_runs(log, prior, standing, [change.term for change in asked], rules)
     if sizes is not None:
         share = sizes[0] / one.term.amplitude
         if share <= 0.0 or min(share, 1.0 / share) < rules.regime_share:
@@ -48,17 +48,25 @@ def confirmed(
 
 
 def _by_runs(
-    log: LogDays, prior: Gaussian, standing: Sequence[ActiveTerm], asked: Sequence[ActiveTerm]
+    log: LogDays, prior: Gaussian, standing: Sequence[ActiveTerm], asked: Sequence[ActiveTerm], rules: DecisionRules
 ) -> list[float] | None:
-    """Return the sizes that the free runs of the fitted days ask for; None where something began within the log.
+    """Return the sizes that the free runs of the fitted days ask for, since the latest beginning within the log.
 
-    Of that there is no one size.
+    None where there are too few days since then, or where something drifts from its beginning on: it has no one size.
     """
-    if any(one.onset is not None for one in (*standing, *asked)):
+    record, every = log.record, (*standing, *asked)
+    begun = [one.onset for one in every if one.onset is not None]
+    if any(one.onset is not None and "elapsed_days" in EFFECTS[one.effect].drivers for one in every):
         return None
-    known = {**activate(log.record, standing), **{one.effect: dict(one.shape) for one in asked}}
+    since = record.time >= max(begun, default=record.time[0])
+    if since.sum() * record.step < rules.least_days * 86_400.0:
+        return None
+    known = {
+        **activate(record, [replace(one, onset=None) for one in standing]),
+        **{one.effect: dict(one.shape) for one in asked},
+    }
     sizes = {one.effect: one.amplitude for one in asked}
-    fitted = fit_together(log.record, log.split.fit_rows, prior, sizes, known).values
+    fitted = fit_together(record, log.split.fit_rows & since, prior, sizes, known).values
     return [fitted[f"{name}:{EFFECTS[name].amplitude.name}"] for name in sizes]
 
 
