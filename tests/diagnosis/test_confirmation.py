@@ -65,6 +65,8 @@ def test_of_what_began_within_the_log_the_days_since_then_tell_the_size() -> Non
     assert since == pytest.approx(1.0, abs=0.3)
     late = change(0.5, began + np.timedelta64(8, "D")).term
     assert confirmation._by_runs(log, prior, (), [late], DEFAULT) is None
+    nothing_complete = replace(log, split=replace(log.split, fit=np.zeros_like(log.split.fit)))
+    assert confirmation._by_runs(nothing_complete, prior, (), [change(0.5).term], DEFAULT) is None
     drifts = replace(late, effect="humidity_drift", onset=began)
     assert confirmation._by_runs(log, prior, (drifts,), [change(0.5).term], DEFAULT) is None
 

@@ -15,6 +15,7 @@ from igrow.trainer.diagnosis.freerun import LogDays, Refittable, Stage, cross_va
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, activate
 from igrow.trainer.diagnosis.omission import fit_together
 from igrow.trainer.diagnosis.rules import DecisionRules
+from igrow.trainer.fit.climate import has_runs
 from igrow.trainer.fit.gaussian import Gaussian
 
 
@@ -52,21 +53,23 @@ def _by_runs(
 ) -> list[float] | None:
     """Return the sizes that the free runs of the fitted days ask for, since the latest beginning within the log.
 
-    None where there are too few days since then, or where something drifts from its beginning on: it has no one size.
+    None where there are too few days since then, or none that is complete, or where something drifts from its beginning
+    on: it has no one size.
     """
     record, every = log.record, (*standing, *asked)
     begun = [one.onset for one in every if one.onset is not None]
     if any(one.onset is not None and "elapsed_days" in EFFECTS[one.effect].drivers for one in every):
         return None
     since = record.time >= max(begun, default=record.time[0])
-    if since.sum() * record.step < rules.least_days * 86_400.0:
+    rows = log.split.fit_rows & since
+    if since.sum() * record.step < rules.least_days * 86_400.0 or not has_runs(record, rows):
         return None
     known = {
         **activate(record, [replace(one, onset=None) for one in standing]),
         **{one.effect: dict(one.shape) for one in asked},
     }
     sizes = {one.effect: one.amplitude for one in asked}
-    fitted = fit_together(record, log.split.fit_rows & since, prior, sizes, known).values
+    fitted = fit_together(record, rows, prior, sizes, known).values
     return [fitted[f"{name}:{EFFECTS[name].amplitude.name}"] for name in sizes]
 
 

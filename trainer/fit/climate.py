@@ -170,6 +170,11 @@ class _Runs:
         return np.asarray(self.record.measured[name][self.starts + 1 + self.kept[:, None]])
 
 
+def has_runs(record: Record, rows: Mask | None) -> bool:
+    """Tell whether a complete run lies within the rows, so that parameters can be fitted to them."""
+    return _runs_of(record, rows) is not None
+
+
 def _runs_of(record: Record, rows: Mask | None) -> _Runs | None:
     """Return the runs of a record, and the part of it that they need, or None where none is complete."""
     steps = max(1, round(RUN_HOURS * 3600.0 / record.step))
