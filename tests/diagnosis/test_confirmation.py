@@ -72,7 +72,7 @@ def test_of_what_began_within_the_log_the_days_since_then_tell_the_size() -> Non
 
 
 def test_of_several_each_has_its_size_beside_the_others() -> None:
-    """A sensor that nothing ails, held at what steps told of it, took half of another cause's size with it."""
+    """A sensor that nothing ails, held at what steps told of it, had a cause beside it refused for its size."""
     telemetry = virtual_log(16, seed=3, step=900.0)
     columns = dict(telemetry.columns) | {"air_temperature": telemetry.columns["air_temperature"] + 1.0}
     model = model_in_force()
