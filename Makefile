@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test page-pictures notebooks lint format soak bench bench-diagnosis results bundle wheel deb translations api clean
+.PHONY: help demo test test-slow page-pictures notebooks lint format soak bench bench-diagnosis results bundle wheel deb translations api clean
 
 help: ## List the targets.
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-16s %s\n", $$1, $$2}'
@@ -21,10 +21,15 @@ demo: $(STAMP) ## Run the whole loop on a virtual greenhouse with an undeclared 
 	$(BIN)/python config/demo/run.py --out out/demo
 
 # One thread of linear algebra a process: more of them wait for each other beside other processes, and burn twice the time.
-# Five processes on two cores, since many tests wait for a daemon, a line or a clock. They start hundreds of others, so
-# what Python has compiled is kept, whatever the environment says.
-test: $(STAMP) ## Run the tests (ten minutes on two fast cores, twenty on slow ones).
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/pytest -n 5 --dist worksteal -m 'not soak and not notebooks' tests
+# They start hundreds of others, so what Python has compiled is kept, whatever the environment says.
+PYTEST := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/pytest --dist worksteal
+
+# Five processes on two cores, since many tests wait for a daemon, a line or a clock.
+test: $(STAMP) ## Run the tests but the slow ones (ten minutes on two cores).
+	$(PYTEST) -n 5 -m 'not slow and not soak and not notebooks' tests
+
+test-slow: $(STAMP) ## Run the tests of whole diagnoses, calibrations, trainings and seasons (ten minutes on two cores).
+	$(PYTEST) -n 2 -m slow tests
 
 page-pictures: $(STAMP) ## Take the pictures of docs/page.md anew (needs Chromium).
 	IGROW_PICTURES=1 $(BIN)/pytest tests/page/test_page_in_a_browser.py

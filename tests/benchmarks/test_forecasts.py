@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from benchmarks.forecasts.combination import fit_combination
 from benchmarks.forecasts.disturbance import missing_fluxes, observed_runs
@@ -30,6 +31,7 @@ def test_the_remainder_finds_a_flux_that_follows_the_weather_and_stays_bounded()
     assert added["heat"].max() <= high
 
 
+@pytest.mark.slow
 def test_of_two_forecasts_the_better_one_gets_the_weight() -> None:
     record = site_record(virtual_log(16, seed=4), SITE, 300.0)
     generator = np.random.default_rng(0)

@@ -23,6 +23,7 @@ def unlit(quiet_log: Log) -> Diagnosis:
     return diagnose(quiet_log.without("lamp_power"), model_in_force())
 
 
+@pytest.mark.slow
 def test_lamps_that_the_log_lacks_are_named_as_such(unlit: Diagnosis, quiet_log: Log) -> None:
     found = unlit.findings[0]
     assert (found.effect, found.kind) == ("lamp_power", "actuator")
@@ -34,6 +35,7 @@ def test_lamps_that_the_log_lacks_are_named_as_such(unlit: Diagnosis, quiet_log:
     assert unlit.corrected.effects == ()
 
 
+@pytest.mark.slow
 def test_errors_are_those_of_the_log_as_it_is_until_the_correction(
     unlit: Diagnosis, quiet_diagnosis: Diagnosis
 ) -> None:

@@ -61,6 +61,7 @@ def test_a_leak_is_named_with_its_size_and_form(leak: Diagnosis) -> None:
     assert exponent.low < 1.0 < exponent.high
 
 
+@pytest.mark.slow
 def test_a_parameter_that_unseen_days_do_not_bear_out_takes_no_cause_with_it(
     leak: Diagnosis, leaky_log: Log, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -101,6 +102,7 @@ def test_the_corrected_model_carries_the_leak_and_the_correlations_of_its_parame
     assert leak.corrected.calibrated_on == SITE.name
 
 
+@pytest.mark.slow
 def test_the_same_log_and_seed_give_the_same_answer(leak: Diagnosis, leaky_log: Log) -> None:
     assert diagnose(leaky_log, model_in_force()).to_json() == leak.to_json()
 
@@ -159,6 +161,7 @@ def test_the_report_is_one_page_that_fetches_nothing(leak: Diagnosis, tmp_path: 
     assert document == leak.to_json()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "drier",
     [
@@ -183,11 +186,13 @@ def test_without_wind_a_leak_is_among_what_it_could_be_whatever_is_named(leaky_l
     assert "wind_infiltration" not in result.untestable, "the report said both, in one breath"
 
 
+@pytest.mark.slow
 def test_an_effect_that_is_taken_out_is_not_named(leaky_log: Log) -> None:
     result = diagnose(leaky_log, model_in_force(), without=["wind_infiltration"])
     assert "wind_infiltration" not in [one.effect for one in result.findings]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [7, 5])
 def test_a_sensor_that_is_off_from_a_day_on_is_named_with_its_size_and_day(seed: int) -> None:
     log = greenhouse_log(seed)
@@ -204,6 +209,7 @@ def test_a_sensor_that_is_off_from_a_day_on_is_named_with_its_size_and_day(seed:
     assert found.onset.low <= began <= found.onset.high
 
 
+@pytest.mark.slow
 def test_a_cause_outside_the_catalogue_is_told_by_its_hours_and_not_given_a_name(door_log: Log) -> None:
     result = diagnose(door_log, model_in_force())
     assert result.verdict == "unexplained"
@@ -223,6 +229,7 @@ def test_a_log_without_humidity_and_co2_is_diagnosed_on_what_it_has(quiet_log: L
     assert "co2_offset" in result.untestable
 
 
+@pytest.mark.slow
 def test_co2_is_judged_without_a_log_of_its_dose_where_none_can_be_dosed(quiet_log: Log) -> None:
     undosed = replace(SITE, greenhouse=replace(SITE.greenhouse, co2_dosing_capacity=0.0))
     log = replace(quiet_log.without("co2_dosing"), site=undosed)
@@ -291,6 +298,7 @@ def test_an_unknown_effect_to_leave_out_is_refused_with_the_known_ones(quiet_log
         diagnose(quiet_log, model_in_force(), without=["wind"])
 
 
+@pytest.mark.slow
 def test_a_correction_that_makes_a_quantity_worse_says_so(leak: Diagnosis) -> None:
     assert leak.worsened == ()
     day = {"deployed": 0.4, "recalibrated": 0.301, "corrected": 0.336}
@@ -316,6 +324,7 @@ def test_a_long_log_is_asked_in_equal_parts_the_oldest_first(quiet_log: Log) -> 
     assert len(weeks_in_turn(long.select(end=hours[43 * 24]), remembering, DEFAULT)) == 2
 
 
+@pytest.mark.slow
 def test_what_is_not_asked_of_vents_is_said(
     quiet_log: Log, quiet_diagnosis: Diagnosis, monkeypatch: pytest.MonkeyPatch
 ) -> None:

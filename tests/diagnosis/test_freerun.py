@@ -111,6 +111,7 @@ def test_skill_is_asked_of_all_days(falls: tuple[float | None, ...], skill: floa
     assert found == (None if skill is None else pytest.approx(skill))
 
 
+@pytest.mark.slow
 def test_a_turn_is_fitted_by_one_step_nearly_as_by_a_whole_search() -> None:
     known = nominal(SITE)
     log = virtual_log(16, seed=8, step=900.0, parameters=known | {"leakage_wind": 1.2 * known["leakage_wind"]})

@@ -64,6 +64,7 @@ def test_a_crop_is_new_where_the_calibration_was_mostly_of_another(quiet_log: Lo
     assert not has_new_crop(later.telemetry.time, later.known_site, model_in_force())
 
 
+@pytest.mark.slow
 def test_of_a_new_crop_nothing_is_named_and_the_model_follows_it(leaky_log: Log) -> None:
     site = leaky_log.known_site
     planted = leaky_log.telemetry.time[0].astype("datetime64[D]").item() - datetime.timedelta(days=100)
@@ -78,6 +79,7 @@ def test_of_a_new_crop_nothing_is_named_and_the_model_follows_it(leaky_log: Log)
     assert day["corrected"] == day["recalibrated"] < day["deployed"]
 
 
+@pytest.mark.slow
 def test_what_is_not_asked_of_a_crop_that_grew_is_said(quiet_log: Log) -> None:
     site = quiet_log.known_site
     planted = quiet_log.telemetry.time[0].astype("datetime64[D]").item() - datetime.timedelta(days=60)

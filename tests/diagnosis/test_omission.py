@@ -60,6 +60,7 @@ def test_a_term_that_was_taken_out_gains_and_one_that_is_there_does_not(record: 
     assert max(lacking, key=lacking.__getitem__) == "night_transpiration"
 
 
+@pytest.mark.slow
 def test_a_term_that_hides_behind_a_larger_one_is_named_beside_it() -> None:
     month = site_record(virtual_log(28, seed=3), SITE, 3600.0)
     lacking = held("transpiration_night_share", "leakage_wind")

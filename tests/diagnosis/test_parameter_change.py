@@ -191,6 +191,7 @@ def costs(told: Diagnosis, finding: Finding) -> None:
     assert worth(told, crop) is None
 
 
+@pytest.mark.slow
 def test_a_painted_cover_is_told_and_is_no_news_afterwards(
     log: tuple[Telemetry, Telemetry], known_model: FittedModel
 ) -> None:
@@ -213,6 +214,7 @@ def test_a_painted_cover_is_told_and_is_no_news_afterwards(
     assert all(one.effect != "transmissivity" for one in again.findings)
 
 
+@pytest.mark.slow
 def test_a_cover_that_is_painted_within_the_log_has_a_date(
     log: tuple[Telemetry, Telemetry], known_model: FittedModel
 ) -> None:
@@ -227,6 +229,7 @@ def test_a_cover_that_is_painted_within_the_log_has_a_date(
     assert finding.parameters["change"].low < -0.33 < finding.parameters["change"].high
 
 
+@pytest.mark.slow
 def test_leaves_that_wilt_within_the_log_have_a_date_and_are_no_sensor(
     log: tuple[Telemetry, Telemetry], known_model: FittedModel
 ) -> None:
@@ -242,6 +245,7 @@ def test_leaves_that_wilt_within_the_log_have_a_date_and_are_no_sensor(
     assert worth(told, finding) is None
 
 
+@pytest.mark.slow
 def test_a_leak_keeps_its_name_beside_the_parameter_that_it_is_more_of(
     log: tuple[Telemetry, Telemetry], known_model: FittedModel
 ) -> None:
@@ -253,6 +257,7 @@ def test_a_leak_keeps_its_name_beside_the_parameter_that_it_is_more_of(
     assert size.low < 0.12 < size.high
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("left", [0.6, 0.67])
 def test_a_cover_that_was_painted_some_days_ago_waits_for_a_later_log(
     log: tuple[Telemetry, Telemetry], known_model: FittedModel, left: float
@@ -265,5 +270,6 @@ def test_a_cover_that_was_painted_some_days_ago_waits_for_a_later_log(
     assert wording.WAITING in told.notes
 
 
+@pytest.mark.slow
 def test_the_cover_as_it_was_is_not_named(log: tuple[Telemetry, Telemetry], known_model: FittedModel) -> None:
     assert diagnose(later(*log, DAYS), known_model).verdict == "nothing"

@@ -28,6 +28,7 @@ def together(design: Design, sizes: dict[str, float]) -> list[Refitted]:
     return refit(design, linear.fit(design.grams, model), terms, ())
 
 
+@pytest.mark.slow
 def test_a_leak_has_its_size_and_form_wherever_the_refit_begins(leaky_log: Log) -> None:
     design = prepared(leaky_log)
     for begin in (0.03, 0.3):

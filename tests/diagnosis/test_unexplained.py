@@ -40,6 +40,7 @@ def within(first: float, last: float) -> Floats:
     return inside
 
 
+@pytest.mark.slow
 def test_a_door_that_steps_do_not_tell_unseen_days_tell(known_weeks: Telemetry, known_model: FittedModel) -> None:
     opened = within(7.0, 16.0) * (WEEKDAY < 5)
     told = diagnose(later(known_weeks, weeks(added={"air_exchange": 0.003 * opened})), known_model, rules=UNHEARD)
@@ -51,6 +52,7 @@ def test_a_door_that_steps_do_not_tell_unseen_days_tell(known_weeks: Telemetry, 
     assert size.low > 0.0
 
 
+@pytest.mark.slow
 def test_a_floor_that_is_hosed_on_thursdays_evaporates(
     known_weeks: Telemetry, known_model: FittedModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -85,6 +87,7 @@ def test_evaporation_is_vapour_and_the_heat_that_it_takes(known_weeks: Telemetry
     assert np.allclose(added["heat"], -2.0 * LATENT_HEAT * flux)
 
 
+@pytest.mark.slow
 def test_what_acts_on_one_day_of_the_week_has_a_bound_of_its_own(
     known_weeks: Telemetry, known_model: FittedModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:

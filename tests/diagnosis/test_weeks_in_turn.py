@@ -29,6 +29,7 @@ def warm(telemetry: Telemetry, kelvin: float) -> Telemetry:
     return telemetry.with_columns({"air_temperature": telemetry["air_temperature"] + kelvin})
 
 
+@pytest.mark.slow
 def test_what_the_oldest_part_tells_is_told_of_the_newest(known_weeks: Telemetry, known_model: FittedModel) -> None:
     told = diagnose(later(known_weeks, warm(known_weeks, 1.2)), known_model, rules=IN_PARTS)
     (finding,) = told.findings
@@ -43,6 +44,7 @@ def test_what_the_oldest_part_tells_is_told_of_the_newest(known_weeks: Telemetry
     assert day["corrected"] < 0.8 * day["deployed"]
 
 
+@pytest.mark.slow
 def test_what_is_no_longer_so_is_told_of_the_part_that_told_it(
     known_weeks: Telemetry, known_model: FittedModel
 ) -> None:

@@ -129,6 +129,7 @@ def moved() -> Telemetry:
     return simulate(GreenhouseParameters(), weather, schedule, start, end, seed=2).measured
 
 
+@pytest.mark.slow
 def test_how_a_computer_answers_to_further_setpoints_is_read_off_the_plants_log(moved: Telemetry) -> None:
     record = site_record(moved, ALL_SITE, 300.0)
     setpoints, inferred = setpoint_columns(moved, record, ALL_SITE)

@@ -81,6 +81,7 @@ def assert_same_posterior(one: FittedModel, other: FittedModel) -> None:
     assert dict(one.discrepancy) == dict(other.discrepancy)
 
 
+@pytest.mark.slow
 def test_the_command_gives_the_posterior_of_the_function(short: Telemetry, clean: FittedModel, tmp_path: Path) -> None:
     write_csv(tmp_path / "log.csv", short)
     given = [str(tmp_path / "log.csv"), "--site", str(site_file(tmp_path))]
@@ -168,6 +169,7 @@ def test_errors_are_of_weeks_that_no_fit_saw(telemetry: Telemetry, model: Fitted
     assert dirty["air_temperature", "24_h"] > clean["air_temperature", "24_h"] + 0.1
 
 
+@pytest.mark.slow
 def test_covariance_alignment_and_discrepancy_go_through_the_bundle(model: FittedModel, tmp_path: Path) -> None:
     bundle = export(replace(model, alignment=0.5), tmp_path / "bundle")
     again = read_model(read_bundle(tmp_path / "bundle"), SITE)

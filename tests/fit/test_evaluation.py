@@ -17,6 +17,7 @@ def record() -> Record:
     return site_record(virtual_log(10, seed=4), SITE, 300.0)
 
 
+@pytest.mark.slow
 def test_the_true_model_has_no_error_but_noise(record: Record) -> None:
     values = GREENHOUSE
     errors = evaluate(record, values, {}, ("1_h", "24_h"), np.arange(len(record)) > 2 * 288)

@@ -65,6 +65,7 @@ def test_weekly_counts_of_growth_tell_how_fast_the_crop_grows(telemetry: Telemet
     assert stages.covariance[0, 0] < prior_of(before)[0, 0]
 
 
+@pytest.mark.slow
 def test_a_total_of_every_hour_is_read_from_midnight_to_midnight(telemetry: Telemetry, before: CropStages) -> None:
     """Read at noon, each day's growth stood beside the light of half another day: light seemed to be worth little."""
     running = grown(telemetry, before)

@@ -45,6 +45,7 @@ def in_march(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cli, "utc_now", lambda: datetime(2020, 3, 5, tzinfo=UTC))
 
 
+@pytest.mark.slow
 def test_what_three_sites_share_is_the_fourths_prior_and_no_row_of_a_log_is_in_it(
     fleet: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -67,6 +68,7 @@ def test_what_sites_share_goes_to_those_alone_that_share(fleet: Path) -> None:
     assert cli.shared(entry, fleet / "none.json") is None
 
 
+@pytest.mark.slow
 def test_a_site_without_a_bundle_is_calibrated_and_published_once(
     fleet: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

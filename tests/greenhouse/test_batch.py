@@ -17,6 +17,7 @@ from igrow.core.telemetry import Telemetry
 from tests.greenhouse.greenhouse_seasons import SPRING, hours
 
 
+@pytest.mark.slow
 def test_each_of_a_batch_runs_as_it_would_alone(spring: Telemetry) -> None:
     rng = np.random.default_rng(4)
     parameters = [GreenhouseParameters().varied(rng) for _ in range(3)]
@@ -65,6 +66,7 @@ def test_each_of_a_batch_may_have_its_own_weather_and_setpoints(winter: Telemetr
     assert not np.allclose(first.true["wind_speed"], second.true["wind_speed"])
 
 
+@pytest.mark.slow
 def test_each_of_a_batch_may_have_its_own_disturbances(spring: Telemetry) -> None:
     end = SPRING + hours(48)
     each = [QUIET, Disturbances(), replace(Disturbances(), heat=12.0, correlation_hours=8.0)]

@@ -18,6 +18,8 @@ import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
 from igrow.edge.daemon_file import PAGE_PORT
 from tests.control.daemon_bench import free_port
 from tests.page.page_bench import ROOT, found_in
@@ -92,6 +94,7 @@ def page_shows(port: int, text: str) -> str:
     raise AssertionError(f"the page never showed {text!r}; last: {re.sub('<[^>]*>', ' ', seen)[:2000]}")
 
 
+@pytest.mark.slow
 def test_five_commands_lead_from_the_box_to_the_first_plan(tmp_path):
     clone, install, edit, commission, enable = typed()
     assert clone.startswith("git clone ")

@@ -182,6 +182,7 @@ def test_a_plan_is_explained_and_names_the_limits_that_bind() -> None:
     assert pickle.loads(pickle.dumps(plan)) == plan
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("taken", [False, True])
 def test_a_plan_holds_a_humidity_setpoint_only_where_the_site_takes_one(tmp_path: Path, taken: bool) -> None:
     """The bundle knows it in both cases."""

@@ -66,6 +66,7 @@ def test_no_season_is_lacking_where_none_can_be_planned(changed: dict[str, datet
     assert not seasons.lacking(built_in, with_crop(**changed), NOON)
 
 
+@pytest.mark.slow
 def test_a_season_that_cannot_be_planned_is_said_and_the_one_before_stays(planned: FittedModel) -> None:
     assert planned.season is not None
     endless = replace(planned, site=with_crop(end_date=None))
@@ -76,6 +77,7 @@ def test_a_season_that_cannot_be_planned_is_said_and_the_one_before_stays(planne
     )
 
 
+@pytest.mark.slow
 def test_the_season_of_a_crop_that_bears_begins_today_and_that_of_a_young_one_with_its_planting(
     planned: FittedModel,
 ) -> None:

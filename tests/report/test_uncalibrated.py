@@ -31,6 +31,7 @@ def misfitting(diagnosis: Diagnosis) -> Diagnosis:
     return replace(diagnosis, errors={**diagnosis.errors, "air_humidity": {"24_h": stages}})
 
 
+@pytest.mark.slow
 def test_that_it_was_never_calibrated_here_comes_before_the_verdict(elsewhere: Diagnosis) -> None:
     lines = elsewhere.summary(TYPED).splitlines()
     assert lines[0] == FIRST

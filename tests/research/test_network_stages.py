@@ -81,6 +81,7 @@ def trained():
     return train_simulator(training, hour, np.ones(HOURS, dtype=bool), SMALL), held_out, hour
 
 
+@pytest.mark.slow
 def test_two_workers_train_the_networks_of_one_to_the_last_digit() -> None:
     columns, hour = seasons(3)
     short = TrainingPlan(updates=((4, 20), (10, 5)), batch=16, learning_rate=1e-2)

@@ -69,6 +69,7 @@ def test_a_day_begins_where_the_one_before_ended_and_an_episode_ends(days) -> No
     assert ended == [False] * (days.EPISODE - 1) + [True]
 
 
+@pytest.mark.slow
 def test_it_learns_and_the_graph_does_what_the_actor_does(days, tmp_path: Path) -> None:
     needs.package("stable_baselines3", "research")
     import torch

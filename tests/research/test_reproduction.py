@@ -86,6 +86,7 @@ def test_a_folder_without_trajectories_is_refused(tmp_path: Path) -> None:
         read_seasons(tmp_path)
 
 
+@pytest.mark.slow
 def test_a_short_training_writes_a_bundle_that_evaluates_to_the_same_scores(data_folder: Path, tmp_path: Path) -> None:
     quick = replace(
         table1.LAYOUTS,
@@ -126,6 +127,7 @@ def test_light_use_finds_the_efficiency_it_was_given() -> None:
     np.testing.assert_allclose(predicted[others[0].harvest_day], others[0].harvested, atol=0.3)
 
 
+@pytest.mark.slow
 def test_no_predictor_reads_the_harvest_it_predicts() -> None:
     others, seen = [crop("a", 0.02), crop("b", 0.025)], crop("c", 0.02)
     changed = replace(seen, harvested=seen.harvested * 3)
@@ -207,6 +209,7 @@ def test_the_pilots_table_is_computed_again_with_its_spreads_and_tests(
     assert figures == {"figure5", *(f"figureS{number}" for number in range(4, 14))}
 
 
+@pytest.mark.slow
 def test_figure_3_has_both_panels_and_every_curve(
     data_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -41,6 +41,7 @@ def bundle(truth: FittedModel, tmp_path_factory: pytest.TempPathFactory) -> Bund
     return export(truth, tmp_path_factory.mktemp("truth") / "bundle")
 
 
+@pytest.mark.slow
 def test_the_true_model_has_no_error_but_noise_and_plans_come_close(telemetry: Telemetry, bundle: Bundle) -> None:
     found = score_bundle(prepare_log(telemetry, SITE), bundle)
     assert set(found) == {ACTUATORS, BY_SETPOINTS}
@@ -62,6 +63,7 @@ def test_effects_of_the_bundle_are_active(telemetry: Telemetry, truth: FittedMod
     assert score_bundle(prepare_log(right, SITE), wrong, ("24_h",))[ACTUATORS]["air_temperature"]["24_h"].mae < 0.1
 
 
+@pytest.mark.slow
 def test_days_that_the_bundle_was_calibrated_on_are_left_out(
     telemetry: Telemetry, truth: FittedModel, tmp_path: Path
 ) -> None:
@@ -77,6 +79,7 @@ def test_days_that_the_bundle_was_calibrated_on_are_left_out(
     assert unseen_part(log, elsewhere.manifest) is log
 
 
+@pytest.mark.slow
 def test_a_diagnosis_leaves_out_the_days_that_its_bundle_was_calibrated_on(
     telemetry: Telemetry, truth: FittedModel, tmp_path: Path
 ) -> None:

@@ -37,6 +37,7 @@ def planned() -> SeasonPlan:
     return season.plan_season(SITE, read_bundle(default_bundle_folder()), generations=3)
 
 
+@pytest.mark.slow
 def test_a_bundle_carries_its_season_and_the_day_s_plan_speaks_of_it(
     planned: SeasonPlan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -58,6 +59,7 @@ def test_a_bundle_carries_its_season_and_the_day_s_plan_speaks_of_it(
     assert make_plan(SITE, replace(request(), bundle=other.folder)).season == ()
 
 
+@pytest.mark.slow
 def test_a_search_that_was_cut_short_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, planned: SeasonPlan
 ) -> None:
