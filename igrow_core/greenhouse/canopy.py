@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import Any
 
 from igrow.core.arrays import Array
-from igrow.core.greenhouse.namespace import sigmoid
 from igrow.core.greenhouse.parameters import GreenhouseParameters
+from igrow.core.namespace import sigmoid
 
 GAS_CONSTANT = 8.314
 """J mol-1 K-1."""

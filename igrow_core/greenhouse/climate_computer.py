@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from igrow.core.arrays import Array
-from igrow.core.greenhouse.namespace import clip, ramp
 from igrow.core.greenhouse.parameters import GreenhouseParameters
+from igrow.core.namespace import clip, ramp
 
 SAFE_SETPOINTS: Mapping[str, float] = {
     "heating_setpoint": 17.0,

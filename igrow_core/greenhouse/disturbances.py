@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from igrow.core.arrays import Array
-from igrow.core.greenhouse.namespace import namespace
+from igrow.core.namespace import namespace
 
 INTERVAL = 300.0
 """Seconds between two innovations."""

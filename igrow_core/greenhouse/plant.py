@@ -21,12 +21,12 @@ from igrow.core.greenhouse.climate_state import Climate, Conditions
 from igrow.core.greenhouse.disturbances import Disturbances
 from igrow.core.greenhouse.hidden import EffectBank, HiddenEffect
 from igrow.core.greenhouse.light import distribute
-from igrow.core.greenhouse.namespace import clip, namespace
 from igrow.core.greenhouse.parameters import GreenhouseParameters
 from igrow.core.greenhouse.sensors import Sensors
 from igrow.core.greenhouse.state import PlantState, add
 from igrow.core.greenhouse.tomato import Crop
 from igrow.core.greenhouse.weather_table import WeatherTable
+from igrow.core.namespace import clip, namespace
 from igrow.core.sun import solar_day
 
 __all__ = ["SCAN", "SLOW", "TICK", "Plant", "PlantState"]

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from igrow.core.arrays import Array
-from igrow.core.greenhouse.namespace import clip, ramp, sigmoid
 from igrow.core.greenhouse.parameters import GreenhouseParameters
+from igrow.core.namespace import clip, ramp, sigmoid
 
 CARBOHYDRATE_PER_MOL = 0.030026
 """kg CH2O in a mol of CO2 fixed."""

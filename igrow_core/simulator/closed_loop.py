@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from igrow.core.arrays import Array, Floats, Integers
 from igrow.core.effects.definition import Values
+from igrow.core.namespace import FloatNamespace
 from igrow.core.simulator import actuation
 from igrow.core.simulator.hybrid import climate, measurement
 from igrow.core.simulator.hybrid.climate import ActiveEffects
@@ -44,25 +46,39 @@ def closed_run(
         ``ventilation`` (m s-1).
     """
     begin = np.asarray(starts, dtype=np.int64)
+    rows = begin + np.arange(steps)[:, None]
     substeps = max(1, round(record.step / SUBSTEP))
     seconds = record.step / substeps
-    state: dict[str, Array] = {name: values[begin] for name, values in states.items()}
-    position: dict[str, Array] = {name: record.inputs[name][begin] for name in actuation.POSITIONS}
-    actuators = {name: record.inputs[name][begin] for name in actuation.OUTPUTS}
-    shown: dict[str, list[Floats]] = {}
+    varied = (*parameters.values(), *rules.values(), *(value for one in effects.values() for value in one.values()))
+    # Floats are several times as fast as arrays of one element.
+    single = len(begin) == 1 and not any(np.ndim(value) for value in varied)
+    xp: Any = FloatNamespace if single else np
+
+    def courses(columns: Mapping[str, Floats]) -> Mapping[str, Array]:
+        """Return what each of the runs reads at each step, by name."""
+        of_runs = {name: values[rows] if values.ndim == 1 else values for name, values in columns.items()}
+        return {name: values[:, 0].tolist() if single else values for name, values in of_runs.items()}
+
+    def at(columns: Mapping[str, Array], step: int) -> dict[str, Array]:
+        return {name: values[step] for name, values in columns.items()}
+
+    outside, asked, further = courses(record.inputs), courses(setpoints), courses(added or {})
+    state: dict[str, Array] = {
+        name: float(values[begin[0]]) if single else values[begin] for name, values in states.items()
+    }
+    actuators = {name: outside[name][0] for name in actuation.OUTPUTS}
+    position = {name: outside[name][0] for name in actuation.POSITIONS}
+    shown: dict[str, list[Array]] = {}
     for k in range(steps):
-        row = begin + k
-        inputs: dict[str, Array] = {name: values[row] for name, values in record.inputs.items()}
-        asked = {name: values[row] for name, values in setpoints.items()}
-        fluxes = {channel: flux[row] if flux.ndim == 1 else flux[k] for channel, flux in (added or {}).items()}
+        inputs, fluxes = at(outside, k), at(further, k)
         drivers: Mapping[str, Array] = {}
         for _ in range(substeps):
-            drivers = climate.derive(np, state, inputs | actuators, parameters, record.lamp_efficacy)
-            sensed = dict(drivers) | measurement.measured(np, drivers, state, effects)
-            actuators = actuation.act(np, asked, inputs, sensed, position, rules, seconds=seconds)
+            drivers = climate.derive(xp, state, inputs | actuators, parameters, record.lamp_efficacy)
+            sensed = dict(drivers) | measurement.measured(xp, drivers, state, effects)
+            actuators = actuation.act(xp, at(asked, k), inputs, sensed, position, rules, seconds=seconds)
             position = {name: actuators[name] for name in actuation.POSITIONS}
             state = climate.advance(
-                np,
+                xp,
                 state,
                 inputs | actuators,
                 parameters,
@@ -71,12 +87,14 @@ def closed_run(
                 lamp_efficacy=record.lamp_efficacy,
                 added=fluxes,
             )
-        after = climate.derive(np, state, inputs | actuators, parameters, record.lamp_efficacy)
-        row_result = measurement.measured(np, after, state, effects) | actuators
+        after = climate.derive(xp, state, inputs | actuators, parameters, record.lamp_efficacy)
+        row_result = measurement.measured(xp, after, state, effects) | actuators
         row_result["heat"] = pipe_heat(drivers, parameters)
         row_result["ventilation"] = after["ventilation"]
         for name, values in row_result.items():
             shown.setdefault(name, []).append(values)
+    if single:
+        return {name: np.array(values)[:, None] for name, values in shown.items()}
     return {name: np.stack(np.broadcast_arrays(*values)) for name, values in shown.items()}
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from igrow.core.greenhouse.climate_computer import ClimateComputer, Control, Readings, at_rest, control
-from igrow.core.greenhouse.namespace import FloatNamespace
 from igrow.core.greenhouse.parameters import GreenhouseParameters
+from igrow.core.namespace import FloatNamespace
 
 MILD = Readings(
     air_temperature=20.0, air_humidity=75.0, air_co2=600.0, rail_temperature=30.0, grow_temperature=25.0,

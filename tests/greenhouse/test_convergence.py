@@ -33,7 +33,7 @@ def test_half_the_step_gives_the_same_day(season: str, request: pytest.FixtureRe
 def test_the_error_of_the_climate_step_is_of_second_order(winter: Telemetry) -> None:
     from igrow.core.greenhouse.climate import advance
     from igrow.core.greenhouse.climate_state import Conditions, initial
-    from igrow.core.greenhouse.namespace import FloatNamespace
+    from igrow.core.namespace import FloatNamespace
 
     conditions = Conditions(
         outdoor_temperature=2.0, outdoor_vapour=0.004, outdoor_co2=7.6e-4, wind_speed=4.0, sky_temperature=-8.0,
@@ -57,7 +57,7 @@ def test_the_error_of_the_climate_step_is_of_second_order(winter: Telemetry) -> 
 def test_no_weather_makes_the_step_unstable(wind: float) -> None:
     from igrow.core.greenhouse.climate import advance
     from igrow.core.greenhouse.climate_state import Conditions, initial
-    from igrow.core.greenhouse.namespace import FloatNamespace
+    from igrow.core.namespace import FloatNamespace
 
     state = initial(FloatNamespace, 19.0, 75.0, 600.0, -20.0)
     conditions = Conditions(

@@ -12,9 +12,9 @@ from igrow.core.errors import IgrowError
 from igrow.core.greenhouse import GreenhouseParameters, HiddenEffect, recipe, simulate_many
 from igrow.core.greenhouse.disturbances import QUIET
 from igrow.core.greenhouse.hidden import REFERENCE_DRIVERS, EffectBank
-from igrow.core.greenhouse.namespace import FloatNamespace
 from igrow.core.greenhouse.sensors import EXACT
 from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
+from igrow.core.namespace import FloatNamespace
 from igrow.core.telemetry import Telemetry
 from tests.greenhouse.greenhouse_seasons import SPRING, hours
 

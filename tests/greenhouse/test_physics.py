@@ -9,10 +9,10 @@ from igrow.core.greenhouse import tomato
 from igrow.core.greenhouse.canopy import photosynthesis, stomatal_resistance, vapour_conductance
 from igrow.core.greenhouse.light import canopy_absorption, distribute
 from igrow.core.greenhouse.linear import solve
-from igrow.core.greenhouse.namespace import FloatNamespace
 from igrow.core.greenhouse.parameters import GreenhouseParameters
 from igrow.core.greenhouse.sky import sky_temperature
 from igrow.core.greenhouse.ventilation import leakage, past_screens, through_vents
+from igrow.core.namespace import FloatNamespace
 
 P = GreenhouseParameters()
 
