@@ -33,6 +33,7 @@ def plain() -> Telemetry:
     return run()
 
 
+@pytest.mark.slow
 def test_steps_are_short_enough(plain: Telemetry) -> None:
     shorter = run(tick=20.0)
     bounds = {"air_temperature": 0.1, "air_humidity": 0.5, "air_co2": 8.0}
@@ -66,6 +67,7 @@ def test_without_lamps_it_is_dark_at_night(plain: Telemetry) -> None:
     assert unlit["par"][night].max() < 5.0 < plain["par"][night].max()
 
 
+@pytest.mark.slow
 def test_a_planted_crop_grows_and_a_grown_one_is_picked() -> None:
     end = START + np.timedelta64(8, "D")
     weather = generate_weather(START, end, seed=3, climate=WeatherClimate(PLANT.latitude, PLANT.longitude))

@@ -90,6 +90,7 @@ def test_the_share_of_a_course_is_found_beside_the_parameters(
     assert (found.log_odds >= DEFAULT.least_actuator_odds) == (share == 1.0)
 
 
+@pytest.mark.slow
 def test_an_actuator_that_stood_still_is_not_named(dark_log: Log) -> None:
     found = diagnose(dark_log.without("lamp_power"), model_in_force())
     assert "lamp_power" not in {one.effect for one in found.findings}

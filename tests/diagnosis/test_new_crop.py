@@ -91,6 +91,7 @@ def test_what_is_not_asked_of_a_crop_that_grew_is_said(quiet_log: Log) -> None:
     assert "structure_shade" in result.untestable
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("new", "few"), [(0.2, True), (0.4, False)])
 def test_where_many_leaves_are_new_days_alone_tell_nothing_and_that_is_said(
     new: float, few: bool, quiet_log: Log, monkeypatch: pytest.MonkeyPatch

@@ -81,6 +81,7 @@ print(json.dumps({one.name: [one.ending.value, one.result] for one in run_tasks(
 """
 
 
+@pytest.mark.slow
 def test_a_local_ray_of_two_workers_gives_the_same_digits_when_one_is_killed(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-c", ON_RAY, str(tmp_path / "marks")],

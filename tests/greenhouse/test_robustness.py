@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import pytest
 
 from igrow.core.greenhouse import Disturbances, GreenhouseParameters, generate_weather, recipe, simulate, simulate_many
 from igrow.core.greenhouse.sensors import EXACT
@@ -55,6 +56,7 @@ def test_wild_setpoints_in_odd_greenhouses_stay_physical() -> None:
         assert season.true["air_humidity"].max() < 115.0
 
 
+@pytest.mark.slow
 def test_unwatered_crops_close_their_stomata() -> None:
     weather = generate_weather(SPRING, SPRING + hours(24 * 6 + 1), seed=3)
 

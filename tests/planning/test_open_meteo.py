@@ -96,6 +96,7 @@ def test_an_unknown_unit_is_refused(tmp_path: Path) -> None:
         read_forecast(write(tmp_path, content(wind_speed_10m="furlong")))
 
 
+@pytest.mark.slow
 def test_a_plan_holds_against_the_spread_of_an_ensemble(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Members that differ add to the doubt that caution takes off."""
     monkeypatch.setattr("igrow.edge.planning.make_plan.Budget", lambda: Budget(candidates=400))

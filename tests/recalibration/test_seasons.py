@@ -88,6 +88,7 @@ def test_the_season_of_a_crop_that_bears_begins_today_and_that_of_a_young_one_wi
     assert bearing.season.covers(np.datetime64("2020-03-01T12:00:00"))
 
 
+@pytest.mark.slow
 def test_of_a_crop_that_stands_for_years_a_year_is_planned(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[tuple[Any, Any]] = []
 
@@ -100,6 +101,7 @@ def test_of_a_crop_that_stands_for_years_a_year_is_planned(monkeypatch: pytest.M
     assert asked == [(datetime.date(2020, 3, 1), datetime.date(2021, 2, 28))]
 
 
+@pytest.mark.slow
 def test_a_model_in_force_that_has_no_season_is_published_once_with_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, planned: FittedModel
 ) -> None:

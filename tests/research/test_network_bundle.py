@@ -109,6 +109,7 @@ def season(bundle: Bundle, simulator: NetworkSimulator) -> tuple[Columns, NDArra
     return run_graph_by_days(open_session(bundle.graph("simulator")), simulator, columns())
 
 
+@pytest.mark.slow
 def test_the_graph_by_days_gives_the_free_run_of_a_season(simulator: NetworkSimulator, season) -> None:
     free = free_run(simulator, columns(), HOUR)
     for stage in (simulator.climate, simulator.growth):

@@ -97,6 +97,7 @@ def test_two_workers_train_the_networks_of_one_to_the_last_digit() -> None:
     assert simulator_to_bytes(one) == simulator_to_bytes(two)
 
 
+@pytest.mark.slow
 def test_a_held_out_season_run_freely_follows_the_truth(trained) -> None:
     simulator, held_out, hour = trained
     run = free_run(simulator, held_out, hour)
