@@ -118,6 +118,10 @@ def table(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int, str]]:
     rows.append(("size, median relative error", float(np.median(sizes)) if sizes else np.nan, len(sizes), "<= .10"))
     covered = [one for one in outcomes if one.covered is not None]
     share("90 % intervals that cover", covered, lambda one: bool(one.covered), ".85 to .95")
+    widths = [one.half_width for one in outcomes if one.half_width is not None]
+    rows.append(
+        ("half of the interval over the size, median", float(np.median(widths)) if widths else np.nan, len(widths), "-")
+    )
     begun = [one for one in of("onset") if one.onset_error is not None]
     share("beginning within 2 days, where found", begun, lambda one: (one.onset_error or 0.0) <= 2.0, ">= .90")
     share("outside the catalogue: wrong name", of("outside"), lambda one: bool(one.confounded), "<= .05")

@@ -52,6 +52,8 @@ class Outcome:
     """Estimate over truth of the first finding, where it is right."""
     covered: bool | None
     """The truth lies in its 90 % interval."""
+    half_width: float | None
+    """Half of that interval over the truth."""
     onset_error: float | None
     """Days."""
     recalibrated: float
@@ -98,7 +100,7 @@ def judge(
     causes = [one for one in diagnosis.findings if one.effect in EFFECTS]
     found = tuple(one.effect for one in diagnosis.findings)
     truth = {one.name: one for one in hidden(case, reference.unit, reference.greenhouse.start)}
-    relative, covered, onset_error = None, None, None
+    relative, covered, half_width, onset_error = None, None, None, None
     for one in causes:
         if one.effect not in truth:
             continue
@@ -106,6 +108,7 @@ def judge(
         amplitude = one.parameters[EFFECTS[one.effect].amplitude.name]
         relative = amplitude.value / float(true.size or 1.0)
         covered = amplitude.low <= float(true.size or 0.0) <= amplitude.high
+        half_width = 0.5 * (amplitude.high - amplitude.low) / abs(float(true.size or 1.0))
         if true.start is not None:
             onset_error = (
                 abs((one.onset.time - true.start) / np.timedelta64(1, "h")) / 24.0 if one.onset is not None else 99.0
@@ -121,6 +124,7 @@ def judge(
         true_changes(diagnosis.findings, reference.greenhouse.plant, plant),
         relative,
         covered,
+        half_width,
         onset_error,
         _sum(errors, "recalibrated"),
         _sum(errors, "corrected"),
