@@ -13,6 +13,7 @@ from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import Log
 from igrow.trainer.diagnosis import DEFAULT, candidates, diagnose, sensitivity, unexplained
 from igrow.trainer.diagnosis.candidates import UNIT_FLUX, Pattern
+from igrow.trainer.diagnosis.correction import correct, with_unexplained
 from igrow.trainer.diagnosis.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import knowledge_of
 from igrow.trainer.diagnosis.null_gains import NullGains
@@ -94,12 +95,49 @@ def test_what_acts_on_one_day_of_the_week_has_a_bound_of_its_own(
     opened = within(7.0, 16.0) * (WEEKDAY < 5)
     change = search(later(known_weeks, weeks(added={"air_exchange": 0.003 * opened})), known_model)
     monkeypatch.setattr(unexplained, "read_null_pattern_skills", lambda: NullGains({"weekly": 0.9}, 0.02))
-    (found,) = change.unexplained(np.random.default_rng(0))
-    assert isinstance(found.cause, Pattern)
-    assert (found.cause.channel, found.cause.kind) == ("air_exchange", "air_exchange")
+    best, *others_of_a_kind = change.unexplained(np.random.default_rng(0))
+    assert isinstance(best.cause, Pattern)
+    assert (best.cause.channel, best.cause.kind) == ("air_exchange", "air_exchange")
+    kinds = [one.cause.kind for one in others_of_a_kind if isinstance(one.cause, Pattern)]
+    assert kinds
+    assert len({*kinds, "air_exchange", "weekly"}) == len(kinds) + 2
     others = dict.fromkeys(candidates.CHANNELS, 0.9)
     monkeypatch.setattr(unexplained, "read_null_pattern_skills", lambda: NullGains(others, 0.0))
     (found,) = change.unexplained(np.random.default_rng(0))
     assert isinstance(found.cause, Pattern)
     assert found.cause.kind == "weekly"
     assert not found.cause.when.endswith(("Saturdays", "Sundays"))
+
+
+@pytest.mark.slow
+def test_of_several_patterns_that_is_told_which_free_runs_bear_out(
+    known_weeks: Telemetry, known_model: FittedModel
+) -> None:
+    """Its opposite makes them worse; told alone it is nothing."""
+    opened = within(7.0, 16.0) * (WEEKDAY < 5)
+    change = search(later(known_weeks, weeks(added={"air_exchange": 0.003 * opened})), known_model)
+    patterns = change.unexplained(np.random.default_rng(0))
+    opposite = tuple(replace(one, amplitude=-one.amplitude) for one in patterns)
+    days, known = change.days, change.knowledge
+    plain = correct(days, known, (), (), SITE.longitude, DEFAULT)
+    assert with_unexplained(days, known, plain, opposite, SITE.longitude, DEFAULT) == (plain, ())
+    result, (told,) = with_unexplained(days, known, plain, (*opposite, *patterns), SITE.longitude, DEFAULT)
+    assert told in patterns
+    assert isinstance(told.cause, Pattern)
+    assert told.cause.channel == "air_exchange"
+    assert set(result.stages["corrected"].patterns) == {told.cause}
+
+
+@pytest.mark.slow
+def test_what_gained_as_much_in_the_calibrations_own_weeks_is_no_news(
+    known_weeks: Telemetry, known_model: FittedModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened = within(7.0, 16.0) * (WEEKDAY < 5)
+    change = search(later(known_weeks, weeks(added={"air_exchange": 0.003 * opened})), known_model)
+    always = dict.fromkeys((one.key for one in change.resolved().patterns), 1e6)
+    used_to_it = replace(change, history=replace(change.history, own_gains=always))
+    # What is no pattern of a calibration is not asked here.
+    finer = {"weekly": 0.9, "evaporation": 0.9}
+    monkeypatch.setattr(unexplained, "read_null_pattern_skills", lambda: NullGains(finer, 0.0))
+    assert change.unexplained(np.random.default_rng(0))
+    assert used_to_it.unexplained(np.random.default_rng(0)) == ()

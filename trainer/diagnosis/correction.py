@@ -68,14 +68,51 @@ def correct(
         if tried is not None and _is_proven(tried[0], kept, knowledge, rules):
             judged, current = tried
             kept.append(judged)
-    if patterns:
-        current = _with_patterns(log, knowledge, current, patterns, longitude, rules)
+    if patterns and (fitted := _with_patterns(log, knowledge, current, patterns, longitude, rules)) is not None:
+        before, after = log.run(current), log.run(fitted)
+        if before is not None and after is not None and freerun.skill(before, after) > 0.0:
+            current = fitted
     stages = {
         "deployed": Stage(knowledge.posterior, knowledge.terms),
         "recalibrated": recalibrated,
         "corrected": current,
     }
     return Corrected(stages, tuple(kept))
+
+
+def with_unexplained(
+    log: LogDays,
+    knowledge: Knowledge,
+    result: Corrected,
+    patterns: Sequence[Hypothesis],
+    longitude: float,
+    rules: DecisionRules,
+) -> tuple[Corrected, tuple[Hypothesis, ...]]:
+    """Return a correction with that of several patterns which makes free runs of unseen days best, and this pattern.
+
+    Where none makes them better, as a cause must, nothing is told: what steps ask for, parameters may follow as well.
+
+    Args:
+        log: of the diagnosis.
+        knowledge: of the model in force.
+        result: of the correction, with nothing found.
+        patterns: that unseen days tell by their steps.
+        longitude: degrees east.
+        rules: what a pattern must remove, and the bound of its amplitude.
+    """
+    recalibrated, prior = result.stages["recalibrated"], knowledge.prior
+    told, largest = (result, tuple[Hypothesis, ...]()), rules.least_skill
+    for one in patterns:
+        fitted = _with_patterns(log, knowledge, recalibrated, (one,), longitude, rules)
+        if fitted is None:
+            continue
+        try:
+            skill = cross_validated_skill(log, Refittable(recalibrated, prior), Refittable(fitted, prior))
+        except DivergenceError:
+            continue
+        if skill is not None and skill >= largest:
+            told, largest = (replace(result, stages={**result.stages, "corrected": fitted}), (one,)), skill
+    return told
 
 
 def _tried(
@@ -195,8 +232,8 @@ def _with_patterns(
     patterns: Sequence[Hypothesis],
     longitude: float,
     rules: DecisionRules,
-) -> Stage:
-    """Return the stage with bounded fluxes on outside drivers, if they help on unseen days."""
+) -> Stage | None:
+    """Return the stage fitted beside bounded fluxes on outside drivers; None where its runs leave all bounds."""
     amplitudes = {
         one.cause: float(np.clip(one.amplitude, -rules.largest_pattern, rules.largest_pattern))
         for one in patterns
@@ -206,10 +243,8 @@ def _with_patterns(
     try:
         fitted = log.fit(knowledge.prior, current.terms, current.posterior.values, added)
     except DivergenceError:
-        return current
-    trial = Stage(fitted, current.terms, amplitudes, added)
-    before, after = log.run(current), log.run(trial)
-    return trial if before is not None and after is not None and freerun.skill(before, after) > 0.0 else current
+        return None
+    return Stage(fitted, current.terms, amplitudes, added)
 
 
 def corrected_model(

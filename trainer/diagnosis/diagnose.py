@@ -25,7 +25,7 @@ from igrow.trainer.diagnosis.answers import Answer, bears_out, begun, is_same
 from igrow.trainer.diagnosis.candidates import hidden_by_missing_weather
 from igrow.trainer.diagnosis.circumstances import Circumstances, circumstances_of
 from igrow.trainer.diagnosis.compare import Round
-from igrow.trainer.diagnosis.correction import Corrected, correct, corrected_model, until_outdone
+from igrow.trainer.diagnosis.correction import Corrected, correct, corrected_model, until_outdone, with_unexplained
 from igrow.trainer.diagnosis.crop import of_one_crop
 from igrow.trainer.diagnosis.diagnosed_days import since_calibration, weeks_in_turn
 from igrow.trainer.diagnosis.estimate import Estimated, from_before, normal_quantile
@@ -180,8 +180,8 @@ class _Question:
         if outdoing and result.parameter is None and not patterns:
             result, patterns = correct(days, knowledge, sure, outdoing, site.longitude, rules), outdoing
         explained = bool(around.completed.found or result.kept or result.parameter or patterns)
-        if not (explained or nothing_asked) and (patterns := search.unexplained(rng)):
-            result = correct(days, knowledge, (), patterns, site.longitude, rules)
+        if not (explained or nothing_asked):
+            result, patterns = with_unexplained(days, knowledge, result, search.unexplained(rng), site.longitude, rules)
         followed = remembering(replace(self.model, history=seen), result.parameter, rules).history
         if not (around.new_crop or result.parameter is not None):
             followed = search.history_after(result.kept)

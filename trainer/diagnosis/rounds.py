@@ -200,12 +200,10 @@ class Change(Search):
         return parameter_change.find(self._expected(surely), rng)
 
     def unexplained(self, rng: np.random.Generator) -> tuple[Hypothesis, ...]:
-        """Return the pattern that unseen days tell where nothing else is told."""
+        """Return the patterns that unseen days tell where nothing else is told, one of each kind."""
         if not self.by_days:
             return ()
-        by_physics = self.knowledge.by_physics(self.rules)
-        found = unexplained.find(self.resolved(), self.site.longitude, by_physics, rng)
-        return () if found is None else (found,)
+        return unexplained.find(self.resolved(), self.site.longitude, self.knowledge.by_physics(self.rules), rng)
 
     def _expected(self, laid_out: Design) -> Design:
         return history.expected(self.history, laid_out, self.misfit, self.without, self.null_gains)

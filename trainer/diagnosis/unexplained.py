@@ -2,7 +2,8 @@
 
 A pattern says at which hours, on which days or in which weather something acts, and in what: heat, vapour, CO2, air,
 light, or water that evaporates. Asked of steps alone it must gain much, since greenhouses drift with the weather. What
-such drift takes off the error of unseen days is known (`null_gains`), and what takes off more is there.
+such drift takes off the error of unseen days is known (`null_gains`), and what takes off more is there, if it gains
+more than in the calibration's own weeks, and free runs bear it out (`correction.with_unexplained`).
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ import numpy as np
 from igrow.core.arrays import Floats
 from igrow.trainer.diagnosis import candidates, linear, search
 from igrow.trainer.diagnosis.candidates import Pattern
-from igrow.trainer.diagnosis.cross_validation import CrossValidated, best, cross_validated
+from igrow.trainer.diagnosis.change import net_gain
+from igrow.trainer.diagnosis.cross_validation import CrossValidated, cross_validated
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.linear import Term
 from igrow.trainer.diagnosis.null_gains import read_null_pattern_skills
@@ -49,8 +51,10 @@ def judged(design: Design, longitude: float, by_physics: Gaussian) -> Unexplaine
     return Unexplained(laid_out, tuple(cross_validated(laid_out, by_physics, hypotheses)))
 
 
-def find(design: Design, longitude: float, by_physics: Gaussian, rng: np.random.Generator) -> Hypothesis | None:
-    """Return the pattern that takes most off unseen days, more than where nothing has changed; None for none.
+def find(design: Design, longitude: float, by_physics: Gaussian, rng: np.random.Generator) -> tuple[Hypothesis, ...]:
+    """Return of each kind the pattern that takes most off unseen days, more than where nothing has changed.
+
+    What gained as much in weeks of the calibration log is how this greenhouse always is, and no news.
 
     Args:
         design: of the log, with its greenhouse's history.
@@ -60,13 +64,16 @@ def find(design: Design, longitude: float, by_physics: Gaussian, rng: np.random.
     """
     asked = judged(design, longitude, by_physics)
     known = read_null_pattern_skills()
-    told = best(
-        [one for one in asked.found if one.skill >= known.needed(_pattern(one).kind, design.rules.days_over_null)]
-    )
-    if told is None:
-        return None
-    column = search.column_of(asked.design, told.hypothesis.term)
-    return _sized(design, told.hypothesis, column, told.p_value(design.rules, rng))
+    told = dict[str, Hypothesis]()
+    for one in sorted(asked.found, key=lambda one: -one.skill):
+        kind = _pattern(one).kind
+        if kind in told or one.skill < known.needed(kind, design.rules.days_over_null):
+            continue
+        column = search.column_of(asked.design, one.hypothesis.term)
+        sized = _sized(design, one.hypothesis, column, one.p_value(design.rules, rng))
+        if net_gain(design, sized) > 0.0:
+            told[kind] = sized
+    return tuple(told.values())
 
 
 def _pattern(one: CrossValidated) -> Pattern:
