@@ -85,8 +85,8 @@ def test_beside_another_a_cause_must_do_more(values: dict[str, float], stays: bo
         ({"change_skill": 0.02, "over_null": 3.0}, True),
         ({"change_skill": 0.005, "over_null": 3.0}, False),
         # Less than this is chance.
-        ({"skill": -0.01, "change_skill": 0.2, "bootstrap_p": 0.9}, True),
-        ({"skill": -0.03, "change_skill": 0.2, "bootstrap_p": 0.0}, False),
+        ({"skill": 0.0, "change_skill": 0.2, "bootstrap_p": 0.9}, True),
+        ({"skill": -0.01, "change_skill": 0.2, "bootstrap_p": 0.0}, False),
         ({"skill": 0.04, "change_skill": -0.1, "bootstrap_p": 0.9}, False),
         ({"change_skill": 0.1, "bootstrap_p": 0.1, "effect_to_noise": 0.1}, False),
     ],

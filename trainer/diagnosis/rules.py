@@ -88,9 +88,7 @@ class DecisionRules:
     far_over_null: float = _tuned(
         2.5, "times what a change must gain from which on `least_skill` is enough of it, and no null skill is asked"
     )
-    least_change_skill: float = _tuned(
-        -0.02, "share that the shipped model gains at least with a change in it: chance makes as much"
-    )
+    least_change_skill: float = _tuned(0.0, "share that the shipped model gains at least with a change in it")
     least_unproven_change: float = _tuned(2.0, "gain from which on a change is asked of unseen days alone")
     days_over_null: float = _tuned(
         1.3, "times what it took off unseen days at most where nothing had changed, that it must take off to be told so"
