@@ -28,7 +28,7 @@ PYTEST := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BI
 test: $(STAMP) ## Run the tests but the slow ones (ten minutes on two cores).
 	$(PYTEST) -n 5 -m 'not slow and not soak and not notebooks' tests
 
-test-slow: $(STAMP) ## Run the tests of whole diagnoses, calibrations, trainings and seasons (ten minutes more).
+test-slow: $(STAMP) ## Run the tests of whole diagnoses, calibrations, trainings and seasons (some twelve minutes).
 	$(PYTEST) -n 2 -m slow tests
 
 page-pictures: $(STAMP) ## Take the pictures of docs/page.md anew (needs Chromium).
