@@ -25,7 +25,7 @@ demo: $(STAMP) ## Run the whole loop on a virtual greenhouse with an undeclared 
 PYTEST := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/pytest --dist worksteal
 
 # Five processes on two cores, since many tests wait for a daemon, a line or a clock.
-test: $(STAMP) ## Run the tests but the slow ones (ten minutes on two cores).
+test: $(STAMP) ## Run the tests but the slow ones (ten minutes on two fast cores, twenty on slow ones).
 	$(PYTEST) -n 5 -m 'not slow and not soak and not notebooks' tests
 
 test-slow: $(STAMP) ## Run the tests of whole diagnoses, calibrations, trainings and seasons (some twelve minutes).

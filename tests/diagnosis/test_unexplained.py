@@ -41,10 +41,15 @@ def within(first: float, last: float) -> Floats:
     return inside
 
 
+def with_a_door(before: Telemetry) -> Log:
+    """A log in which a door stands open at work, as it did not in the weeks before."""
+    opened = within(7.0, 16.0) * (WEEKDAY < 5)
+    return later(before, weeks(added={"air_exchange": 0.003 * opened}))
+
+
 @pytest.mark.slow
 def test_a_door_that_steps_do_not_tell_unseen_days_tell(known_weeks: Telemetry, known_model: FittedModel) -> None:
-    opened = within(7.0, 16.0) * (WEEKDAY < 5)
-    told = diagnose(later(known_weeks, weeks(added={"air_exchange": 0.003 * opened})), known_model, rules=UNHEARD)
+    told = diagnose(with_a_door(known_weeks), known_model, rules=UNHEARD)
     assert told.verdict == "unexplained"
     (found,) = told.findings
     assert "hour" in found.drivers
@@ -92,8 +97,7 @@ def test_evaporation_is_vapour_and_the_heat_that_it_takes(known_weeks: Telemetry
 def test_what_acts_on_one_day_of_the_week_has_a_bound_of_its_own(
     known_weeks: Telemetry, known_model: FittedModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    opened = within(7.0, 16.0) * (WEEKDAY < 5)
-    change = search(later(known_weeks, weeks(added={"air_exchange": 0.003 * opened})), known_model)
+    change = search(with_a_door(known_weeks), known_model)
     monkeypatch.setattr(unexplained, "read_null_pattern_skills", lambda: NullGains({"weekly": 0.9}, 0.02))
     best, *others_of_a_kind = change.unexplained(np.random.default_rng(0))
     assert isinstance(best.cause, Pattern)
@@ -114,8 +118,7 @@ def test_of_several_patterns_that_is_told_which_free_runs_bear_out(
     known_weeks: Telemetry, known_model: FittedModel
 ) -> None:
     """Its opposite makes them worse; told alone it is nothing."""
-    opened = within(7.0, 16.0) * (WEEKDAY < 5)
-    change = search(later(known_weeks, weeks(added={"air_exchange": 0.003 * opened})), known_model)
+    change = search(with_a_door(known_weeks), known_model)
     patterns = change.unexplained(np.random.default_rng(0))
     opposite = tuple(replace(one, amplitude=-one.amplitude) for one in patterns)
     days, known = change.days, change.knowledge
@@ -132,8 +135,7 @@ def test_of_several_patterns_that_is_told_which_free_runs_bear_out(
 def test_what_gained_as_much_in_the_calibrations_own_weeks_is_no_news(
     known_weeks: Telemetry, known_model: FittedModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    opened = within(7.0, 16.0) * (WEEKDAY < 5)
-    change = search(later(known_weeks, weeks(added={"air_exchange": 0.003 * opened})), known_model)
+    change = search(with_a_door(known_weeks), known_model)
     always = dict.fromkeys((one.key for one in change.resolved().patterns), 1e6)
     used_to_it = replace(change, history=replace(change.history, own_gains=always))
     # What is no pattern of a calibration is not asked here.

@@ -183,7 +183,7 @@ class DecisionRules:
     most_causes: int = _chosen(3, "causes of one log")
     least_certainty: float = _tuned(2.0, "standard errors that each of several causes measures at least")
     least_effect_to_noise: float = _chosen(0.15, "ENR below which a cause is too small to be named")
-    least_skill: float = _chosen(0.01, "share of the squared error of unseen days that a cause must remove")
+    least_skill: float = _chosen(0.01, "share of unseen days' squared error that a cause, or a pattern, must remove")
     clear_skill: float = _chosen(0.03, "share that needs no other proof")
     further_skill: float = _chosen(0.03, "share that a second or third cause must remove")
     further_bootstrap_p: float = _chosen(0.2, "largest bootstrap p-value of a second or third cause")
