@@ -1,7 +1,7 @@
 """The elementwise functions that the equations use, for python floats.
 
-For one greenhouse numpy spends 1 microsecond where a float operation takes 0.05, so a single plant, or a single run of a
-simulator, runs on floats through this namespace and a batch runs through numpy itself.
+For one greenhouse numpy spends 1 microsecond where a float operation takes 0.05, so a single plant, or a single run of
+a simulator, is computed on floats through this namespace and a batch through numpy itself.
 """
 
 from __future__ import annotations
