@@ -59,6 +59,8 @@ def canopy_drivers(xp: Any, climate: Values, parameters: Values, forcing: Values
         forcing: from `forcing_canopy`.
     """
     temperature, deficit, ppm = climate["air_temperature"], climate["vapour_deficit"], climate["air_co2"]
+    # Air that is just saturated is about to leave it: leaves answer to that, and to fog the less the thicker it is.
+    fog = xp.maximum(climate["air_humidity"] - 100.0, 0.0 * deficit)
     # Stomata close as the air dries (Leuning 1995), so that a crop answers to drier air less than in proportion.
     open_share = _CLOSING_DEFICIT / (_CLOSING_DEFICIT + xp.maximum(deficit, 0.0 * deficit))
     response = forcing["in_moist_air"] * open_share
@@ -69,7 +71,7 @@ def canopy_drivers(xp: Any, climate: Values, parameters: Values, forcing: Values
     return {
         "transpiration": evaporation / air.LATENT_HEAT,
         "sun_transpiration": forcing["sun_transpiration"],
-        "transpiration_response": response * open_share * deficit / (deficit + 1.0),
+        "transpiration_response": response * open_share / (1.0 + fog),
         "long_wave_response": forcing["long_wave_response"],
         "assimilation": forcing["assimilation_in_light"] * (ppm / (ppm + parameters["assimilation_co2"])),
     }
