@@ -38,6 +38,8 @@ class Corrected:
     """One that has changed, where no effect is missing."""
     refused: Stage | None = None
     """With a parameter at what the log asks of it, though it is not told."""
+    unproven: frozenset[str] = frozenset()
+    """Effects that unseen days did not bear out."""
 
 
 def correct(
@@ -60,6 +62,7 @@ def correct(
     """
     current = recalibrated = Stage(log.fit(knowledge.prior, knowledge.terms), knowledge.terms)
     kept: list[Estimated] = []
+    unproven: set[str] = set()
     for place, one in enumerate(found, 1):
         # It was found beside those before it. Where one of them does not stand, it must gain enough by itself.
         if len(kept) < place - 1 and one.over_null < 1.0:
@@ -68,6 +71,8 @@ def correct(
         if tried is not None and _is_proven(tried[0], kept, knowledge, rules):
             judged, current = tried
             kept.append(judged)
+        else:
+            unproven.add(one.effect)
     if patterns and (fitted := _with_patterns(log, knowledge, current, patterns, longitude, rules)) is not None:
         before, after = log.run(current), log.run(fitted)
         if before is not None and after is not None and freerun.skill(before, after) > 0.0:
@@ -77,7 +82,7 @@ def correct(
         "recalibrated": recalibrated,
         "corrected": current,
     }
-    return Corrected(stages, tuple(kept))
+    return Corrected(stages, tuple(kept), unproven=frozenset(unproven))
 
 
 def with_unexplained(

@@ -143,10 +143,7 @@ class _Question:
             np.random.default_rng(self.seed),
         )
         search = self._search(around, site)
-        progress("searching for causes")
-        first, last, found = search.run(rng, earlier)
-        unseen = hidden_by_missing_weather(first.design.line)
-        found = [replace(one, confounded=(*one.confounded, *unseen)) for one in found]
+        first, last, found, beside = self._borne_out(around, search, rng, earlier)
         # A parameter can stand in for an actuator that the log lacks, found or not.
         hiding = may_hide_in_parameters(around.logged.record.missing)
         waiting = False
@@ -159,10 +156,10 @@ class _Question:
             waiting = log.select(parameter.onset.time).days < rules.least_days
             parameter = None
         leads = parameter is not None and parameter.leads
-        progress("correcting the model")
         nothing_asked = waiting or around.new_crop
-        causes, patterns = ([], ()) if leads or nothing_asked else (found, last.patterns)
-        result = correct(days, knowledge, causes, patterns, site.longitude, rules)
+        result, patterns = beside, last.patterns
+        if leads or nothing_asked:
+            result, patterns = correct(days, knowledge, [], (), site.longitude, rules), ()
         if parameter is not None and not patterns and may_give_way(result.kept):
             # A fault of a sensor that gave way to one that leads is its rival on unseen days all the same.
             told_beside = found if leads and may_give_way(found) else result.kept
@@ -173,7 +170,6 @@ class _Question:
                 return told
         if parameter is not None and leads and not nothing_asked and (found or last.patterns):
             # What the search told beside the parameter stands where unseen days do not bear that out, or less.
-            beside = correct(days, knowledge, found, last.patterns, site.longitude, rules)
             if stands_in_its_place(days, beside, last.patterns, result, parameter, rules):
                 result, patterns = beside, last.patterns
         sure, outdoing = until_outdone(result.kept)
@@ -189,6 +185,30 @@ class _Question:
         if waiting:
             diagnosis = replace(diagnosis, notes=(wording.WAITING, *diagnosis.notes))
         return Answer(diagnosis, result.kept, result.parameter, followed)
+
+    def _borne_out(
+        self, around: Circumstances, search: Search, rng: np.random.Generator, earlier: Sequence[Estimated]
+    ) -> tuple[Round, Round, list[Estimated], Corrected]:
+        """Return the first and the last round of a search, its causes, and the correction by them.
+
+        Where unseen days bear none of them out, the search is made again without those that they refuse: what explains
+        most may stand in for the true cause, by a law that bends less.
+        """
+        days, knowledge, rules, longitude = around.completed.days, around.knowledge, around.rules, search.site.longitude
+        first: Round | None = None
+        for _ in range(rules.most_causes):
+            self.progress("searching for causes")
+            begun, last, found = search.run(rng, earlier)
+            first = first or begun
+            unseen = hidden_by_missing_weather(first.design.line)
+            found = [replace(one, confounded=(*one.confounded, *unseen)) for one in found]
+            self.progress("correcting the model")
+            result = correct(days, knowledge, found, last.patterns, longitude, rules)
+            if result.kept or not result.unproven:
+                break
+            search = replace(search, without=search.without | result.unproven)
+        assert first is not None
+        return first, last, found, result
 
     def _search(self, around: Circumstances, site: Site) -> Search:
         """Return the search that the circumstances of a log leave."""
