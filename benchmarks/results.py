@@ -271,6 +271,13 @@ RESULTS = {
         "none",
         long=True,
     ),
+    "diagnosis-real-faults": Result(
+        "Faults in real logs",
+        ("benchmarks.diagnosis", "real-faults", "../shared/data"),
+        "The same weeks of the same compartments, with a sensor that is off, or something else that the log has wrong.",
+        "none",
+        long=True,
+    ),
 }
 
 

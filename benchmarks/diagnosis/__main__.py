@@ -6,10 +6,11 @@ each with a model calibrated on its own first weeks; `transferred` diagnoses the
 `matched` does the like with greenhouses of the simulator's own structure; `same` with greenhouses that have drifted a
 little since their calibration, and asks what has changed in them (`--foreign`: of another structure); `omission` takes
 terms out of the model before the calibration (with DATA: of the public logs) and asks the calibration log for them;
-`real` diagnoses the public logs. `nuisance` learns anew what greenhouses show though nothing is missing, and `rules`
-fits the bounds that are fitted, both from seeds that no case has, and `null-bounds` what a change must gain, and what
-it must take off unseen days; `separating` asks what tests of the plant bring, and `thresholds` prints all rules.
-Everything is made afresh: an hour or so on two cores, most of it for simulated weeks.
+`real` diagnoses the public logs, `real-faults` the same with faults put into them. `nuisance` learns anew what
+greenhouses show though nothing is missing, and `rules` fits the bounds that are fitted, both from seeds that no case
+has, and `null-bounds` what a change must gain, and what it must take off unseen days; `separating` asks what tests of
+the plant bring, and `thresholds` prints all rules. Everything is made afresh: an hour or so on two cores, most of it
+for simulated weeks.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ import sys
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from benchmarks.diagnosis import matched, nuisance, null_bounds, omission, real, rules, same, separating
+from benchmarks.diagnosis import matched, nuisance, null_bounds, omission, real, real_faults, rules, same, separating
 from benchmarks.diagnosis.cases import SEASONS, draw
 from benchmarks.diagnosis.greenhouses import of_seasons, others
 from benchmarks.diagnosis.logs import built_in, reference, simulated_cases
@@ -39,6 +40,7 @@ WHAT = (
     "same",
     "omission",
     "real",
+    "real-faults",
     "null-bounds",
     "separating",
 )
@@ -49,7 +51,7 @@ SEASONS_USED = ("winter", "spring")
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.diagnosis", description=__doc__)
     parser.add_argument("what", nargs="?", default="scoring", choices=WHAT)
-    parser.add_argument("data", nargs="?", type=Path, help="folder of the public data sets, for `real`")
+    parser.add_argument("data", nargs="?", type=Path, help="folder of the public data sets, for `real`, `real-faults`")
     parser.add_argument("--cases", type=int, help="default: 208; of `same` 60, of `separating` 1 of each cause")
     parser.add_argument(
         "--greenhouses", type=int, help="of `same`, `separating`: in the nursery of a season (default: 6; 2)"
@@ -69,6 +71,8 @@ def main() -> int:
     options = parser.parse_args()
     if options.what == "real":
         return real.main(options.data, options.compartment, withheld_only=options.withheld_only)
+    if options.what == "real-faults":
+        return real_faults.main(options.data, options.compartment, options.processes)
     if options.what == "matched":
         return matched.main(options.processes)
     if options.what == "nuisance":
