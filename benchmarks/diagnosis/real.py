@@ -32,7 +32,8 @@ COMPARTMENTS = (
     ("agc2018", "Croperators"),
     ("agc2018", "deep_greens"),
 )
-CALIBRATION_DAYS, DIAGNOSIS_DAYS = 56, 28
+BEGINNING, CALIBRATION_DAYS, DIAGNOSIS_DAYS = 14, 56, 28
+"""Days of the log that are left out, those that a model is calibrated on, and those that follow and are diagnosed."""
 WITHHELD = ("lamp_power", "rail_pipe_temperature", "grow_pipe_temperature", "energy_screen", "blackout_screen")
 """Columns that are taken out of the log."""
 RISE = 0.2
@@ -48,14 +49,20 @@ class Compartment:
     after: Log
 
 
-def compartments(data: Path) -> Iterator[Compartment]:
+def compartments(data: Path, beginning: int = BEGINNING) -> Iterator[Compartment]:
+    """Yield the compartments of the public data; one whose log cannot be read is said so.
+
+    Args:
+        data: folder of the public data sets.
+        beginning: days of each log that are left out.
+    """
     for folder, name in COMPARTMENTS:
         try:
             log = read_log(data / folder, compartment=name)
         except IgrowError as error:
             print(f"{folder} {name}: {error}")
             continue
-        start = log.telemetry.time[0] + np.timedelta64(14, "D")
+        start = log.telemetry.time[0] + np.timedelta64(beginning, "D")
         middle = start + np.timedelta64(CALIBRATION_DAYS, "D")
         end = middle + np.timedelta64(DIAGNOSIS_DAYS, "D")
         yield Compartment(f"{folder} {name}", log.known_site, log.select(start, middle), log.select(middle, end))
