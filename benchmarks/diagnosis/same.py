@@ -116,6 +116,10 @@ def table(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int, str]]:
     share("both of a pair", of("pair"), has_all, ">= .45")
     sizes = [abs(one.relative_size - 1.0) for one in outcomes if one.relative_size is not None]
     rows.append(("size, median relative error", float(np.median(sizes)) if sizes else np.nan, len(sizes), "<= .10"))
+    fluxes = [abs(one.relative_flux - 1.0) for one in outcomes if one.relative_flux is not None]
+    rows.append(
+        ("what it adds, RMS, median relative error", float(np.median(fluxes)) if fluxes else np.nan, len(fluxes), "-")
+    )
     covered = [one for one in outcomes if one.covered is not None]
     share("90 % intervals that cover", covered, lambda one: bool(one.covered), ".85 to .95")
     widths = [one.half_width for one in outcomes if one.half_width is not None]

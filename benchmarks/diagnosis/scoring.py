@@ -16,9 +16,10 @@ from benchmarks.diagnosis.naming import is_named, kind
 from igrow.core import sun
 from igrow.core.arrays import Floats
 from igrow.core.effects import EFFECTS
-from igrow.core.greenhouse import HiddenEffect
+from igrow.core.greenhouse.hidden import EffectBank, HiddenEffect
 from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
 from igrow.core.site import Site
+from igrow.core.sun import unix_seconds
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import prepare_log
 from igrow.trainer.diagnosis import DEFAULT, DecisionRules, compare, diagnose, linear, sensitivity
@@ -27,6 +28,7 @@ from igrow.trainer.diagnosis.evidence import Evidence, errors_with
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
 from igrow.trainer.diagnosis.linear import Term
 from igrow.trainer.diagnosis.result import Finding
+from igrow.trainer.diagnosis.sensitivity import Linearisation
 
 NOISE = {"air_temperature": 0.5, "air_humidity": 2.0, "air_co2": 35.0}
 """Scales under which errors of different quantities are added."""
@@ -49,7 +51,10 @@ class Outcome:
     true_changes: tuple[str, ...]
     """Of what was found, the parameters that have changed as told."""
     relative_size: float | None
-    """Estimate over truth of the first finding, where it is right."""
+    """Estimate over truth of the first finding, where it is right: of the amplitude, which is not the same where the
+    truth has another form, or another value of the nonlinear parameter beside it."""
+    relative_flux: float | None
+    """The same of what it adds, root mean square along the log."""
     covered: bool | None
     """The truth lies in its 90 % interval."""
     half_width: float | None
@@ -100,13 +105,15 @@ def judge(
     causes = [one for one in diagnosis.findings if one.effect in EFFECTS]
     found = tuple(one.effect for one in diagnosis.findings)
     truth = {one.name: one for one in hidden(case, reference.unit, reference.greenhouse.start)}
-    relative, covered, half_width, onset_error = None, None, None, None
+    relative, flux, covered, half_width, onset_error = None, None, None, None, None
     for one in causes:
         if one.effect not in truth:
             continue
         true = truth[one.effect]
         amplitude = one.parameters[EFFECTS[one.effect].amplitude.name]
         relative = amplitude.value / float(true.size or 1.0)
+        if evidence is not None:
+            flux = relative_flux(evidence.first.design.line, one, true)
         covered = amplitude.low <= float(true.size or 0.0) <= amplitude.high
         half_width = 0.5 * (amplitude.high - amplitude.low) / abs(float(true.size or 1.0))
         if true.start is not None:
@@ -123,6 +130,7 @@ def judge(
         tuple(one.confounded for one in diagnosis.findings if one.kind in {"process", "sensor", "parameter"}),
         true_changes(diagnosis.findings, reference.greenhouse.plant, plant),
         relative,
+        flux,
         covered,
         half_width,
         onset_error,
@@ -132,6 +140,31 @@ def judge(
         *gains,
         seconds,
     )
+
+
+def relative_flux(line: Linearisation, told: Finding, true: HiddenEffect) -> float:
+    """Return what an effect adds as it is told over what it truly adds, root mean squares along a log.
+
+    Both act on the drivers along the measured climate, from the day on which the truth began.
+
+    Args:
+        line: of the log.
+        told: with all its parameters.
+        true: of the same name, with the form that the plant gave it.
+    """
+    effect = EFFECTS[true.name]
+    shape = {one.name: told.parameters[one.name].value for one in effect.shapes}
+    amount = told.parameters[effect.amplitude.name].value
+    now = unix_seconds(line.record.time)
+    begun = np.ones(len(now), dtype=bool) if true.start is None else now >= unix_seconds(true.start)
+    bank, memory, channel = EffectBank(np, [true], None, float(now[0])), list[object](), ""
+    truly = np.zeros(len(now))
+    for row, moment in enumerate(now):
+        drivers = {name: values if np.ndim(values) == 0 else values[row] for name, values in line.drivers.items()}
+        added = bank.evaluate(drivers, float(moment), line.record.step, memory)
+        channel, truly[row] = next(iter(added.items()))
+    as_told = amount * sensitivity.unit_fluxes(line, effect, shape)[channel]
+    return float(np.sqrt(np.mean(as_told[begun] ** 2) / max(np.mean(truly[begun] ** 2), 1e-300)))
 
 
 def true_changes(findings: Sequence[Finding], before: Plant, now: Plant) -> tuple[str, ...]:

@@ -51,12 +51,14 @@ def test_nothing_is_claimed_where_nothing_is_missing(quiet_diagnosis: Diagnosis)
     assert quiet_diagnosis.corrected.posterior.values != quiet_diagnosis.model.posterior.values
 
 
-def test_a_leak_is_named_with_its_size_and_form(leak: Diagnosis) -> None:
+def test_a_leak_is_named_with_its_size_and_form(leak: Diagnosis, leaky_log: Log) -> None:
     (found,) = leak.findings
     assert found.effect == "wind_infiltration"
     assert leak.exit_code in {10, 11}
     size, exponent = found.parameters["air_changes"], found.parameters["exponent"]
-    assert size.value == pytest.approx(LEAK, rel=0.15)
+    # More at a metre per second and a lower exponent are the same leak, which is known where the wind mostly is.
+    wind = float(np.nanmean(leaky_log.telemetry["wind_speed"]))
+    assert size.value * wind ** (exponent.value - 1.0) == pytest.approx(LEAK, rel=0.1)
     assert size.low < LEAK < size.high
     assert exponent.low < 1.0 < exponent.high
 
