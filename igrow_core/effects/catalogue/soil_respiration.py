@@ -1,4 +1,4 @@
-"""CO2 that soil and substrate respire."""
+"""CO2 that soil and substrate respire, litter on them included."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ EFFECT = Effect(
     signature="CO2 rises at night with the temperature of the soil",
     separating_test="a cup over the substrate and a CO2 sensor",
     title="CO2 from the soil",
-    sentence="the soil gives off CO2: about {value} g/m2 per hour at 20 degC",
+    sentence="the soil, or leaves that rot on it, gives off CO2: about {value} g/m2 per hour at 20 degC",
     source="Lloyd and Taylor (1994), Funct. Ecol. 8; Q10 of 2",
     memory=lagged(lambda _xp, drivers: drivers["air_temperature"], "time_constant", 3600.0),
     resembles=("respiration",),
