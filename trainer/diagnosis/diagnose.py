@@ -4,8 +4,9 @@ log, model --> circumstances --> design --> compare --> estimate --> refit --+--
                                    ^                                         |
                                    +------------ the cause put in -----------+
 
-Beside the causes it is asked which parameter has changed; of one that began within the log the days since then are
-diagnosed by themselves. A long log is asked in parts, the oldest first.
+Where unseen days bear no cause out, the search is made again without those that they refuse. Beside the causes it is
+asked which parameter has changed; of one that began within the log the days since then are diagnosed by themselves. A
+long log is asked in parts, the oldest first.
 """
 
 from __future__ import annotations
