@@ -169,10 +169,11 @@ class _Question:
                 result = with_parameter(days, knowledge, result, parameter, faults, rules)
             elif (told := self._since(parameter, parameter.onset.time, log, faults)) is not None:
                 return told
-        if parameter is not None and leads and not nothing_asked and (found or last.patterns):
-            # What the search told beside the parameter stands where unseen days do not bear that out, or less.
-            if stands_in_its_place(days, beside, last.patterns, result, parameter, rules):
-                result, patterns = beside, last.patterns
+        # What the search told beside a parameter that leads stands where unseen days do not bear that out, or less.
+        told_too = leads and not nothing_asked and bool(found or last.patterns)
+        if told_too and parameter is not None:
+            stands = stands_in_its_place(days, beside, last.patterns, result, parameter, rules)
+            result, patterns = (beside, last.patterns) if stands else (result, patterns)
         sure, outdoing = until_outdone(result.kept)
         if outdoing and result.parameter is None and not patterns:
             result, patterns = correct(days, knowledge, sure, outdoing, site.longitude, rules), outdoing
