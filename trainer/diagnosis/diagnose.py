@@ -204,6 +204,9 @@ class _Question:
             first = first or begun
             unseen = hidden_by_missing_weather(first.design.line)
             found = [replace(one, confounded=(*one.confounded, *unseen)) for one in found]
+            if found and unseen:
+                # What a pattern says beside them, a cause whose weather is not logged says as well.
+                last = replace(last, patterns=())
             self.progress("correcting the model")
             result = correct(days, knowledge, found, last.patterns, longitude, rules)
             if result.kept or not result.unproven:
