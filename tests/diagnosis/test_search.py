@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -84,3 +86,13 @@ def test_beginnings_stay_away_from_both_ends_and_are_few_in_a_long_log() -> None
 @pytest.mark.parametrize(("gains", "middle"), [([1.0, 3.0, 3.0, 3.0, 2.0], 2), ([5.0, 1.0], 0)])
 def test_of_several_equal_beginnings_the_middle_one_is_taken(gains: list[float], middle: int) -> None:
     assert search.middle_of_best(np.array(gains)) == middle
+
+
+def test_a_log_that_shows_no_effect_has_no_candidate() -> None:
+    """The last effect that a short real log could show had been refused, and the next search fell over."""
+    design = make_design(Truth({}, {}, (0.0, 0.0, 0.0)), seed=1)
+    effects = design.block("effect")
+    none = replace(effects, labels=(), columns=range(effects.columns.start, effects.columns.start))
+    bare = replace(design, candidates=(), blocks={**design.blocks, "effect": none, "ageing": none})
+    null = linear.fit(bare.grams, bare.null_model())
+    assert search.score_candidates(bare, null, [None, 5], np.random.default_rng(0)) == []

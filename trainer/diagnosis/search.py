@@ -191,7 +191,9 @@ def onset_days(design: Design) -> list[int | None]:
 def score_candidates(
     design: Design, current: Fit, onsets: Sequence[int | None], rng: np.random.Generator
 ) -> list[Hypothesis]:
-    """Return the best hypothesis of every effect, the likeliest first."""
+    """Return the best hypothesis of every effect, the likeliest first; none where a log shows no effect."""
+    if not design.candidates:
+        return []
     ageing = [
         shift if candidate.ages else None
         for shift, candidate in zip(design.block("ageing").columns, design.candidates, strict=True)
