@@ -274,7 +274,7 @@ RESULTS = {
     "diagnosis-real-faults": Result(
         "Faults in real logs",
         ("benchmarks.diagnosis", "real-faults", "../shared/data"),
-        "The same weeks of the same compartments, with a sensor that is off, or something else that the log has wrong.",
+        "The same compartments four weeks later, with a sensor that is off, or something else that the log has wrong.",
         "none",
         long=True,
     ),

@@ -46,7 +46,7 @@ class Fault:
 
     name: str
     cause: str
-    """Effect of the catalogue, or parameter of the model, that it is; empty where there is none."""
+    """Effect of the catalogue that it is; empty where there is none."""
     size: float | None
     """In the unit of the effect's amplitude; None where it has another form."""
     columns: Callable[[Telemetry, Floats], Columns]
@@ -117,14 +117,12 @@ _ALL = (
     Fault("pipe sensors -5 K", "pipe_temperature_offset", -5.0, _pipes(-5.0)),
     Fault("pipe sensors +5 K", "pipe_temperature_offset", 5.0, _pipes(5.0)),
     Fault("lamps half as much again as logged", "lamp_heat", None, _times("lamp_power", 1.0 / 1.5)),
-    Fault("the same, from day 8", "lamp_heat", None, _times("lamp_power", 1.0 / 1.5), True),
+    Fault("lamps the same, from day 8", "lamp_heat", None, _times("lamp_power", 1.0 / 1.5), True),
     Fault("outdoor sensor +2 K", "", None, _shifted("outdoor_temperature", 2.0)),
     Fault("anemometer at two fifths", "", None, _times("wind_speed", 0.4)),
     Fault("vents 10 % wider than logged", "", None, _vents(10.0)),
     Fault("energy screen logged an hour late", "", None, _late("energy_screen", 12)),
 )
-
-
 FAULTS = {one.name: one for one in _ALL}
 
 
@@ -147,7 +145,7 @@ class Told:
     """A day ahead: quantity -> stage -> mean absolute error."""
 
     @property
-    def is_named(self) -> bool:
+    def has_name(self) -> bool:
         """Something has a name."""
         return self.verdict in {"named", "ambiguous"}
 
@@ -155,7 +153,7 @@ class Told:
     def is_right(self) -> bool:
         """The first name is the fault's."""
         cause = FAULTS[self.fault].cause
-        return self.is_named and bool(cause) and is_named(cause, self.names[:1])
+        return self.has_name and bool(cause) and is_named(cause, self.names[:1])
 
 
 @dataclass(frozen=True)
@@ -252,13 +250,13 @@ def rows(cases: Sequence[Case]) -> list[tuple[str, float, int]]:
     return [
         ("right first, where an error rises by a fifth", *mean([one.told.is_right for one in own if one.matters])),
         ("right first, where none does", *mean([one.told.is_right for one in own if not one.matters])),
-        ("right, where a name is given", *mean([one.told.is_right for one in own if one.told.is_named])),
+        ("right, where a name is given", *mean([one.told.is_right for one in own if one.told.has_name])),
         ("something unexplained instead", *mean([one.told.verdict == "unexplained" for one in own])),
         ("size, median relative error", float(np.median(sizes)) if sizes else float("nan"), len(sizes)),
         ("90 % intervals that cover", *mean([one.told.covered for one in own if one.told.covered is not None])),
         (f"beginning within {NEAR:g} days", *mean([one <= NEAR for one in days_off])),
         ("share of such an error that a right name removes", *mean(recovered)),
-        ("no cause of the catalogue: a name all the same", *mean([one.is_named for one in beyond])),
+        ("no cause of the catalogue: a name all the same", *mean([one.has_name for one in beyond])),
         ("no cause of the catalogue: silence", *mean([one.verdict == "nothing" for one in beyond])),
     ]
 

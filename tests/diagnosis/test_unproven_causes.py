@@ -51,7 +51,7 @@ def searched(
 
     monkeypatch.setattr(MODULE, "correct", judged)
     monkeypatch.setattr(MODULE, "hidden_by_missing_weather", lambda _line: ())
-    around = SimpleNamespace(completed=SimpleNamespace(days=None), knowledge=None, rules=DEFAULT)
+    around = SimpleNamespace(completed=SimpleNamespace(days=None), knowledge=None, rules=DEFAULT, new_crop=False)
     question = SimpleNamespace(progress=lambda _line: None)
     asked: list[frozenset[str]] = []
     first, _, found, result = MODULE._Question._borne_out(

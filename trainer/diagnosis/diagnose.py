@@ -209,7 +209,7 @@ class _Question:
                 last = replace(last, patterns=())
             self.progress("correcting the model")
             result = correct(days, knowledge, found, last.patterns, longitude, rules)
-            if result.kept or not result.unproven:
+            if result.kept or not result.unproven or around.new_crop:
                 break
             search = replace(search, without=search.without | result.unproven)
         assert first is not None
