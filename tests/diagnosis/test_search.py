@@ -89,7 +89,7 @@ def test_of_several_equal_beginnings_the_middle_one_is_taken(gains: list[float],
 
 
 def test_a_log_that_shows_no_effect_has_no_candidate() -> None:
-    """The last effect that a short real log could show had been refused, and the next search fell over."""
+    """Beside a cause the model of a real log had run to 300,000 K: nothing showed there, and the search fell over."""
     design = make_design(Truth({}, {}, (0.0, 0.0, 0.0)), seed=1)
     effects = design.block("effect")
     none = replace(effects, labels=(), columns=range(effects.columns.start, effects.columns.start))
