@@ -7,7 +7,7 @@ least with which these logs, each greenhouse judged by the gains of the others, 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,9 +17,8 @@ from benchmarks.diagnosis.null_logs import Later, circumstances
 from benchmarks.jobs import Jobs
 from igrow.trainer.data import prepare_log
 from igrow.trainer.diagnosis import change, diagnose, history, linear, parameter_change, search
-from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX
-from igrow.trainer.diagnosis.null_gains import NullGains
+from igrow.trainer.diagnosis.null_gains import BEGINNING_PREFIX, NullGains
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.diagnosis.visible_parameters import members
 
@@ -36,7 +35,15 @@ class Gained:
     greenhouse: str
     group: str
     effects: dict[str, float]
+    beginnings: dict[str, float]
+    """Of effects within the log, beyond what they gain there all the time."""
     parameters: dict[str, float]
+
+    @property
+    def all(self) -> dict[str, float]:
+        """By the names of `NullGains.largest`."""
+        begun = {BEGINNING_PREFIX + name: gain for name, gain in self.beginnings.items()}
+        return self.effects | begun | self.parameters
 
 
 def gained(job: Later) -> Gained:
@@ -47,22 +54,21 @@ def gained(job: Later) -> Gained:
     days, rules = log.completed.days, log.rules
     plain = history.laid_out(days, site, known, (), rules)
     design = history.expected(known, plain, history.expected_misfit(known, plain))
-    effects = _gains(design, search.score_candidates)
-    parameters = _gains(parameter_change.joined(design), parameter_change.score)
+    fitted, rng = linear.fit(design.grams, design.null_model()), np.random.default_rng(0)
+    ranked = sorted(change.scored(design, fitted, rng), key=lambda one: -change.net_gain(design, one))
+    effects = {one.effect: change.proven_gain(design, one) for one in ranked}
+    beginnings = {one.effect: change.proven_begun_gain(design, one) for one in ranked if one.always is not None}
+    joined = parameter_change.joined(design)
+    scored = parameter_change.score(
+        joined, linear.fit(joined.grams, joined.null_model()), search.onset_days(joined), np.random.default_rng(0)
+    )
+    parameters = {one.key: change.proven_gain(joined, one) for one in scored}
     asked = {
         key: gain
         for key, gain in parameters.items()
         if log.not_asked.isdisjoint(members(key.removeprefix(PARAMETER_PREFIX)))
     }
-    return Gained(site.name, case.group, effects, asked)
-
-
-def _gains(design: Design, score: Callable[..., list[search.Hypothesis]]) -> dict[str, float]:
-    """Return the proven gain of all, that first which would be named."""
-    fitted = linear.fit(design.grams, design.null_model())
-    scored = score(design, fitted, search.onset_days(design), np.random.default_rng(0))
-    ranked = sorted(scored, key=lambda one: -change.net_gain(design, one))
-    return {one.key: change.proven_gain(design, one) for one in ranked}
+    return Gained(site.name, case.group, effects, beginnings, asked)
 
 
 def largest(gains: Sequence[Mapping[str, float]]) -> dict[str, float]:
@@ -73,14 +79,12 @@ def largest(gains: Sequence[Mapping[str, float]]) -> dict[str, float]:
 
 def of_others(found: Sequence[Gained], greenhouse: str, least: float) -> NullGains:
     """Return what greenhouses other than one have gained."""
-    others = [one for one in found if one.greenhouse != greenhouse]
-    return NullGains(largest([one.effects for one in others]) | largest([one.parameters for one in others]), least)
+    return NullGains(largest([one.all for one in found if one.greenhouse != greenhouse]), least)
 
 
 def is_asked(one: Gained, known: NullGains) -> bool:
-    """Tell whether the effect that would be named gains what it must."""
-    first = next(iter(one.effects), "")
-    return bool(first) and one.effects[first] >= known.needed(first)
+    """Tell whether an effect gains what it must, or what begins within the log: a diagnosis may name it."""
+    return any(gain >= known.needed(name) for name, gain in one.all.items() if name not in one.parameters)
 
 
 def named(job: tuple[Later, NullGains]) -> tuple[str, ...]:
@@ -131,5 +135,4 @@ def learn(jobs: Jobs, logs: Sequence[Later], made: Mapping[str, Any]) -> NullGai
     print(f"{len(found)} logs with nothing missing; each greenhouse by the gains of the others:")
     least = least_gain(jobs, logs, found)
     print(f"parameters that would be named by the gains of other greenhouses: {false_parameters(found)}")
-    gains = largest([one.effects for one in found]) | largest([one.parameters for one in found])
-    return NullGains(gains, least, made)
+    return NullGains(largest([one.all for one in found]), least, made)

@@ -213,8 +213,9 @@ def change_of(design: Design, *, by_days: bool = True) -> rounds.Change:
     unasked = cast(Any, None)
     known = knowledge_of(model_in_force(), SITE, DEFAULT)
     return rounds.Change(
-        unasked, SITE, known, frozenset(), DEFAULT, unasked, unasked, design, np.zeros(0), NullGains({}, 8.0), by_days
-    )
+        unasked, SITE, known, frozenset(), DEFAULT, unasked, unasked, design, np.zeros(0), NullGains({}, 8.0),
+        by_days=by_days,
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize(

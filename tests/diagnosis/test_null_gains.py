@@ -9,6 +9,7 @@ from benchmarks.diagnosis.null_skills import Told
 from igrow.core.effects import EFFECTS
 from igrow.trainer.diagnosis.candidates import CHANNELS
 from igrow.trainer.diagnosis.null_gains import (
+    BEGINNING_PREFIX,
     PATTERN_SKILLS_FILE,
     SKILLS_FILE,
     NullGains,
@@ -57,21 +58,26 @@ def test_patterns_have_bounds_of_their_own_by_kind() -> None:
 def test_what_came_with_the_trainer_knows_effects_and_parameters() -> None:
     known = read_null_gains()
     assert known.least >= learning.LEAST
-    assert {name for name in known.largest if not name.startswith("parameter:")} <= set(EFFECTS)
+    effects = (name.removeprefix(BEGINNING_PREFIX) for name in known.largest if not name.startswith("parameter:"))
+    assert set(effects) <= set(EFFECTS)
     assert "parameter:transmissivity" in known.largest
+    assert any(name.startswith(BEGINNING_PREFIX) for name in known.largest)
 
 
 def test_a_greenhouse_is_judged_by_the_gains_of_the_others() -> None:
     found = [
-        Gained("one", "nothing", {"co2_drift": 30.0, "lamp_heat": 2.0}, {}),
-        Gained("one", "noise", {"co2_drift": 12.0}, {}),
-        Gained("two", "nothing", {"lamp_heat": 10.0, "co2_drift": 9.0}, {}),
+        Gained("one", "nothing", {"co2_drift": 30.0, "lamp_heat": 2.0}, {"lamp_heat": 20.0}, {}),
+        Gained("one", "noise", {"co2_drift": 12.0}, {}, {}),
+        Gained("two", "nothing", {"lamp_heat": 10.0, "co2_drift": 9.0}, {"lamp_heat": 5.0}, {}),
     ]
     alone = learning.of_others(found, "one", 8.0)
-    assert alone.largest == {"lamp_heat": 10.0, "co2_drift": 9.0}
+    assert alone.largest == {"lamp_heat": 10.0, "co2_drift": 9.0, "beginning:lamp_heat": 5.0}
     assert all(learning.is_asked(one, learning.of_others(found, one.greenhouse, 8.0)) for one in found)
     # What gains less than a change must at least is not asked, nor what the others have gained too.
     assert not learning.is_asked(found[1], learning.of_others(found, "one", 13.0))
-    assert not learning.is_asked(
-        Gained("three", "nothing", {"co2_drift": 29.0}, {}), learning.of_others(found, "", 8.0)
-    )
+    every = learning.of_others(found, "", 8.0)
+    assert not learning.is_asked(Gained("three", "nothing", {"co2_drift": 29.0}, {}, {}), every)
+    # What begins within a log has a bound of its own, first or not.
+    for gain, asked in ((19.0, False), (21.0, True)):
+        one = Gained("three", "nothing", {"co2_drift": 29.0}, {"lamp_heat": gain}, {})
+        assert learning.is_asked(one, every) == asked

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from igrow.core.bundle import Estimate
-from igrow.trainer.diagnosis import rounds
-from igrow.trainer.diagnosis.candidates import Candidate
+from igrow.trainer.diagnosis import DEFAULT, cross_validation, history, rounds
+from igrow.trainer.diagnosis.candidates import Candidate, Pattern
 from igrow.trainer.diagnosis.compare import Round
 from igrow.trainer.diagnosis.estimate import Estimated
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
@@ -86,6 +86,65 @@ def test_beside_one_that_adds_nothing_another_is_looked_for(monkeypatch: pytest.
     _, _, found = search.run(np.random.default_rng(0))
     assert effects(found) == ["rain_cooling", "night_transpiration"]
     assert asked == [frozenset(), frozenset(), frozenset({"lamp_heat"}), frozenset({"lamp_heat"})]
+
+
+def test_beside_what_no_cause_explains_causes_are_looked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A greenhouse unlike its calibration (CO2 at dawn, in spring) hid a CO2 sensor that was off by 120 ppm."""
+    search, judged = searched([(0.1, 0.01)], monkeypatch)
+    dawn, dusk = (
+        replace(of("").hypothesis, cause=Pattern("co2", when, ("hour",))) for when in ("06 to 08 h", "18 to 20 h")
+    )
+    rounds_told: list[Round] = []
+
+    def judge(one: rounds.Change, _design: Any, found: Sequence[Estimated], *_rest: Any, **_causes: Any) -> Round:
+        rest = [pattern for pattern in (dawn, dusk) if pattern not in one.unnamed]
+        named = replace(judged, cause=cast(Any, "co2_offset" if not (rest or found) else None))
+        rounds_told.append(replace(named, patterns=tuple(rest[:1])))
+        assert one.is_unlike == bool(one.unnamed)
+        return rounds_told[-1]
+
+    monkeypatch.setattr(rounds.Change, "judge", judge)
+    for name in ("resolved", "design"):
+        monkeypatch.setattr(rounds.Change, name, lambda *_asked: judged.design)
+    monkeypatch.setattr(rounds, "estimate", lambda one, _rng: of(one.cause) if one.cause else None)
+    monkeypatch.setattr(rounds.Change, "joined_by", lambda _one, new, _round, found, _led: [*found, new])
+    first, last, found = search.run(np.random.default_rng(0))
+    assert (first, effects(found), last.patterns) == (rounds_told[0], ["co2_offset"], (dawn, dusk))
+    assert len(rounds_told) == 4
+
+
+def test_where_much_is_unexplained_a_change_must_gain_far_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    search, _ = searched([(0.1, 0.01)], monkeypatch)
+    asked: list[tuple[float, set[str]]] = []
+
+    def expected(_known: Any, laid_out: Any, _misfit: Any, _without: Any, gains: Any, beside: set[str]) -> Any:
+        asked.append((gains.least, beside))
+        return laid_out
+
+    monkeypatch.setattr(history, "expected", expected)
+    dawn = replace(of("").hypothesis, cause=Pattern("co2", "06 to 08 h", ("hour",)))
+    beside = search.beside([dawn])
+    assert beside is not None and search.beside([]) is None
+    search.design([], 300.0), beside.design([], 300.0)
+    assert asked == [(8.0, set()), (8.0 * DEFAULT.far_over_null, {"co2:06 to 08 h"})]
+
+
+def test_beside_the_last_pattern_no_further_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    search, judged = searched([(0.1, 0.01)], monkeypatch)
+    asked: list[bool] = []
+    monkeypatch.setattr(cross_validation, "find", lambda *_: None)
+
+    def changed(*_: Any, patterns: bool, **__: Any) -> Round:
+        asked.append(patterns)
+        return judged
+
+    monkeypatch.setattr(rounds, "changed", changed)
+    for count in range(DEFAULT.most_patterns + 1):
+        unnamed = (of("").hypothesis,) * count
+        replace(search, unnamed=unnamed, is_unlike=bool(count)).judge(
+            judged.design, [], np.random.default_rng(0), causes=True
+        )
+    assert asked == [True] * DEFAULT.most_patterns + [False]
 
 
 def searched(sizes: Sequence[tuple[float, float]], monkeypatch: pytest.MonkeyPatch) -> tuple[rounds.Change, Round]:

@@ -18,22 +18,27 @@ from igrow.trainer.diagnosis.candidates import Pattern
 from igrow.trainer.diagnosis.compare import Contender, Profile, Round, bootstrap_p
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.linear import Fit
+from igrow.trainer.diagnosis.null_gains import BEGINNING_PREFIX
 from igrow.trainer.diagnosis.search import Hypothesis
 
 
-def changed(design: Design, explained: float, rng: np.random.Generator, *, causes: bool = True) -> Round:
+def changed(
+    design: Design, explained: float, rng: np.random.Generator, *, causes: bool = True, patterns: bool = True
+) -> Round:
     """Return the change that stands in a log, or the patterns that no cause explains.
 
     Args:
         design: of the log, with its greenhouse's history.
         explained: gain of the changes found before, now part of the model.
         rng: for flips and bootstraps.
-        causes: look for a cause, and not for patterns only.
+        causes: look for a cause.
+        patterns: look for patterns.
     """
     rules, null = design.rules, linear.fit(design.grams, design.null_model())
     onsets = search.onset_days(design)
-    cause = best(design, search.score_candidates(design, null, onsets, rng)) if causes else None
-    pattern = best(design, search.score_patterns(design, null, onsets[:: rules.pattern_onset_stride], rng))
+    cause = chosen(design, scored(design, null, rng)) if causes else None
+    times = onsets[:: rules.pattern_onset_stride]
+    pattern = best(design, search.score_patterns(design, null, times, rng)) if patterns else None
     nothing = Round(design, null, null, None, ())
     if pattern is not None:
         gained = 0.0 if cause is None else net_gain(design, cause)
@@ -46,6 +51,28 @@ def changed(design: Design, explained: float, rng: np.random.Generator, *, cause
     if pattern is not None and left_by_hour(design, null, cause, rng) >= left:
         return replace(nothing, patterns=(pattern,))
     return round_of(design, null, cause, rng)
+
+
+def scored(design: Design, null: Fit, rng: np.random.Generator) -> list[Hypothesis]:
+    """Return the best hypothesis of every effect, with what the same gains there all the time."""
+    found = search.score_candidates(design, null, search.onset_days(design), rng)
+    always = {one.effect: one.gain for one in search.score_candidates(design, null, [None], rng)}
+    return [one if one.term.onset is None else replace(one, always=always.get(one.effect, 0.0)) for one in found]
+
+
+def chosen(design: Design, found: list[Hypothesis]) -> Hypothesis | None:
+    """Return the hypothesis with the largest net gain.
+
+    Where that gains less than it must, another may gain about as much and more than it must. And what a calibration
+    misses in another season gains much all along, and hides nothing that begins within the log.
+    """
+    first = best(design, found)
+    if first is None or over_null(design, first) >= 1.0:
+        return first
+    gain = net_gain(design, first)
+    near = [one for one in found if net_gain(design, one) >= gain - design.rules.confounded_within(gain)]
+    sure = best(design, [one for one in near if over_null(design, one) >= 1.0])
+    return sure or best(design, [one for one in found if begun_over_null(design, one) >= 1.0]) or first
 
 
 def left_by_hour(design: Design, null: Fit, cause: Hypothesis, rng: np.random.Generator) -> float:
@@ -67,29 +94,53 @@ def best(design: Design, scored: list[Hypothesis]) -> Hypothesis | None:
 
 
 def net_gain(design: Design, one: Hypothesis) -> float:
-    """Return the gain over what the hypothesis gained where nothing had changed."""
-    assert design.history is not None
-    return one.gain - design.history.own_gains.get(one.key, 0.0)
+    """Return the gain over what the hypothesis gained where nothing had changed.
+
+    That is learned of weeks with each other. Where it begins within the log its first days tell what was there before:
+    the gain over the same effect there all the time counts, if that is more.
+    """
+    return one.gain - min(_own_gain(design, one), np.inf if one.always is None else one.always)
 
 
 def proven_gain(design: Design, one: Hypothesis) -> float:
-    """Return the net gain, or its geometric mean with the same by the scatter of day scores where that is less.
+    """Return the gain over what it gained where nothing had changed, as far as the scatter of days bears it out."""
+    return _proven(design, one, _own_gain(design, one))
 
-    Alone the scatter says too little of what comes on few days: a drizzle, a cold night.
-    """
-    price = 0.0 if one.term.onset is None else design.onset_price
-    by_noise = net_gain(design, one)
-    by_days = net_gain(design, replace(one, gain=0.5 * one.statistic**2 - price))
-    if by_days >= by_noise or by_days <= 0.0:
-        return min(by_noise, by_days)
-    return math.sqrt(by_noise * by_days)
+
+def proven_begun_gain(design: Design, one: Hypothesis) -> float:
+    """Return the same over what the effect gains there all the time; 0 where it does not begin within the log."""
+    return 0.0 if one.always is None else _proven(design, one, one.always)
 
 
 def over_null(design: Design, one: Hypothesis) -> float:
     """Return what an effect surely gains, over what it must; 0 where no history tells what that is."""
     if design.history is None or design.history.null_gains is None:
         return 0.0
-    return proven_gain(design, one) / design.history.null_gains.needed(one.effect)
+    return max(proven_gain(design, one) / design.history.null_gains.needed(one.effect), begun_over_null(design, one))
+
+
+def begun_over_null(design: Design, one: Hypothesis) -> float:
+    """Return the same of its beginning within the log."""
+    if design.history is None or design.history.null_gains is None:
+        return 0.0
+    return proven_begun_gain(design, one) / design.history.null_gains.needed(BEGINNING_PREFIX + one.effect)
+
+
+def _own_gain(design: Design, one: Hypothesis) -> float:
+    assert design.history is not None
+    return design.history.own_gains.get(one.key, 0.0)
+
+
+def _proven(design: Design, one: Hypothesis, without: float) -> float:
+    """Return a gain less another, or its geometric mean with the same by the scatter of day scores where that is less.
+
+    Alone the scatter says too little of what comes on few days: a drizzle, a cold night.
+    """
+    price = 0.0 if one.term.onset is None else design.onset_price
+    by_noise, by_days = one.gain - without, 0.5 * one.statistic**2 - price - without
+    if by_days >= by_noise or by_days <= 0.0:
+        return min(by_noise, by_days)
+    return math.sqrt(by_noise * by_days)
 
 
 def round_of(design: Design, null: Fit, cause: Hypothesis, rng: np.random.Generator) -> Round:

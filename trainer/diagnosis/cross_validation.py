@@ -93,7 +93,7 @@ def settled(design: Design, by_physics: Gaussian, told: Round, rng: np.random.Ge
     assert told.cause is not None
     rules, null, known = design.rules, linear.fit(design.grams, design.null_model()), read_null_skills()
     nothing, first = Round(design, null, null, None, ()), told.cause.hypothesis
-    scored = search.score_candidates(design, null, search.onset_days(design), rng)
+    scored = change.scored(design, null, rng)
     own, *others = cross_validated(design, by_physics, [first, *rivals(design, first, scored)])
     rival = best(others)
     # What makes days worse that no fit saw is no rival.

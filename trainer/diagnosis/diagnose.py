@@ -220,7 +220,7 @@ class _Question:
         is_later = self.history is not None
         return search_of(
             around.completed.days, site, around.knowledge, self.without | around.not_asked, around.rules,
-            self.nuisance, self.null_gains, is_later=is_later, by_days=around.by_days and not is_later,
+            self.nuisance, self.null_gains, is_later=is_later, by_days=around.by_days,
         )  # fmt: skip
 
     def _diagnosis(
@@ -320,11 +320,11 @@ def _verdict(
         *(wording.finding(one) for one in sorted(result.kept, key=lambda one: -one.certainty)),
         *(() if result.parameter is None else (wording.parameter(result.parameter),)),
     )
+    verdict: Verdict = "ambiguous" if any(len(one.confounded) > 1 for one in findings) else "named"
     if patterns:
-        return "unexplained", (*findings, wording.discrepancy(patterns, rules))
-    if not findings:
-        return "nothing", ()
-    return ("ambiguous" if any(len(one.confounded) > 1 for one in findings) else "named"), findings
+        # What has a name has it, whatever else goes on.
+        return verdict if findings else "unexplained", (*findings, wording.discrepancy(patterns, rules))
+    return verdict if findings else "nothing", findings
 
 
 def _data_fault(log: Log, model: FittedModel) -> Diagnosis:

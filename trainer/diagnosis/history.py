@@ -201,6 +201,7 @@ def expected(
     misfit: Floats,
     without: Collection[str] = (),
     null_gains: NullGains | None = None,
+    beside: Collection[str] = (),
 ) -> Design:
     """Return the design of a later log: what is expected of it taken off, under the history's colour.
 
@@ -210,11 +211,13 @@ def expected(
         misfit: (b, r, intervals), from `expected_misfit`, of the log without the causes that have been found in it.
         without: effects that are no candidates.
         null_gains: of greenhouses in which nothing has changed (None: what came with the trainer).
+        beside: patterns by key of which nothing is expected: they have been found in this log.
     """
     null_gains = null_gains or read_null_gains()
     balances = averaging(plain.line, plain.interval, plain.rules).balances
     filters = tuple(noise.filter_of(known.filters[balance]) for balance in balances)
-    now = drifted(known, plain)
+    found = np.array([key in beside for key in keys(plain)])
+    now = drifted(known, plain).widened(plain.rules.largest_pattern * found)
     values = plain.values.copy()
     values[0] += misfit
     design = replace(

@@ -16,6 +16,8 @@ from igrow.trainer.diagnosis.rules import came_with_the_trainer
 FILE = "learned/null_gains.json"
 SKILLS_FILE = "learned/null_skills.json"
 PATTERN_SKILLS_FILE = "learned/null_pattern_skills.json"
+BEGINNING_PREFIX = "beginning:"
+""" "beginning:humidity_offset": what begins within a log, over the same effect there all the time."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +25,7 @@ class NullGains:
     """What is gained where nothing has changed: log-likelihoods in nats, or shares of the error of unseen days."""
 
     largest: Mapping[str, float]
-    """In any such log, of effects, parameters (``parameter:name``) or kinds of patterns."""
+    """In any such log, of effects, beginnings, parameters (``parameter:name``) or kinds of patterns."""
     least: float
     """What any change must gain: of such logs none or nearly none is given a name then, each by the gains of others."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
@@ -33,7 +35,7 @@ class NullGains:
         """Return what a change must gain: more than it did in any greenhouse in which nothing had changed.
 
         Args:
-            name: of an effect, a parameter, or a kind of patterns.
+            name: of an effect, a beginning, a parameter, or a kind of patterns.
             over: times that.
         """
         return max(self.least, over * self.largest.get(name, 0.0))

@@ -81,7 +81,7 @@ def find(design: Design, rng: np.random.Generator) -> ParameterChange | None:
     }
     together = dict.fromkeys(TOGETHER, rules.confounded_gain)
     sized.sort(key=lambda two: change.net_gain(*two) + together.get(two[1].parameter, 0.0), reverse=True)
-    effects = {one.effect: change.net_gain(design, one) for one in search.score_candidates(design, null, onsets, rng)}
+    effects = {one.effect: change.net_gain(design, one) for one in change.scored(design, null, rng)}
     by_slope = {one.parameter: change.net_gain(design, one) for one in scored}
 
     def leads(its: Design, one: Hypothesis) -> bool:

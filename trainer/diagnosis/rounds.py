@@ -44,6 +44,8 @@ class Search:
     without: frozenset[str]
     rules: DecisionRules
     nuisance: NuisanceSubspace
+    unnamed: tuple[Hypothesis, ...] = field(default=(), kw_only=True)
+    """Patterns that no cause explains, found before: the model has them."""
 
     def run(self, rng: np.random.Generator, earlier: Sequence[Estimated] = ()) -> tuple[Round, Round, list[Estimated]]:
         """Return the first and the last round, and the causes that were found.
@@ -66,7 +68,12 @@ class Search:
             first = first or judged
             new = estimate(judged, rng)
             if new is None:
-                return first, judged, found
+                further = asked.beside(judged.patterns)
+                if further is None:
+                    return first, replace(judged, patterns=(*asked.unnamed, *judged.patterns)), found
+                asked = further
+                design = asked.design([*self.knowledge.terms, *(one.term for one in found)], design.interval)
+                continue
             terms = self.joined_by(new, judged, found, led)
             if not terms:
                 # It only mops up what is left; another may be there.
@@ -75,8 +82,12 @@ class Search:
                 design = asked.design([*self.knowledge.terms, *(one.term for one in terms)], design.interval)
             except DivergenceError:
                 # No cause: the log itself stayed within all bounds.
-                return first, judged, found
+                return first, replace(judged, patterns=asked.unnamed), found
             found = terms
+
+    def beside(self, _patterns: Sequence[Hypothesis]) -> Search | None:
+        """Return the search for causes beside patterns; None where there is none."""
+        return None
 
     def history_after(self, _causes: Sequence[Estimated]) -> Discrepancy | None:
         """Return None: there is no history."""
@@ -158,8 +169,10 @@ class Change(Search):
     """The log without any cause, before any noise."""
     misfit: Floats
     """What the model is expected to miss in this log."""
-    null_gains: NullGains | None
-    """Of greenhouses in which nothing has changed; None: what came with the trainer."""
+    null_gains: NullGains
+    """Of greenhouses in which nothing has changed."""
+    is_unlike: bool = False
+    """More is gained here where nothing has changed than in the weeks that this was learned of."""
     by_days: bool = True
     """Unseen days alone may tell something; not in weeks or of leaves unlike those that null skills were learned of."""
     _latest: list[tuple[list[ActiveTerm], Design]] = field(default_factory=list)
@@ -167,7 +180,8 @@ class Change(Search):
 
     def judge(self, design: Design, found: Sequence[Estimated], rng: np.random.Generator, *, causes: bool) -> Round:
         """Return what one round finds; where time steps tell nothing, or not which, unseen days are asked."""
-        judged = changed(design, _explained(found), rng, causes=causes)
+        more = len(self.unnamed) < self.rules.most_patterns
+        judged = changed(design, _explained(found), rng, causes=causes, patterns=more)
         by_physics = self.knowledge.by_physics(self.rules)
         if judged.patterns:
             return cross_validation.clearest(design, by_physics, judged, rng)
@@ -175,7 +189,7 @@ class Change(Search):
             return judged
         if judged.cause is not None:
             judged = cross_validation.settled(design, by_physics, judged, rng)
-        if judged.cause is None and self.by_days:
+        if judged.cause is None and self.by_days and not self.is_unlike:
             judged = cross_validation.find(design, by_physics, rng) or judged
         if judged.cause is None:
             return judged
@@ -184,6 +198,15 @@ class Change(Search):
     def design(self, terms: Sequence[ActiveTerm], interval: float) -> Design:
         """Return the design of a model with terms, about the calibrated parameters."""
         return self._expected(self._laid_out(list(terms)))
+
+    def beside(self, patterns: Sequence[Hypothesis]) -> Search | None:
+        """Return the search for causes beside patterns: a greenhouse that is unlike its calibration can break as well.
+
+        What a change gains where nothing breaks is not known of such a greenhouse: only what gains far more is told.
+        """
+        if not patterns:
+            return None
+        return replace(self, unnamed=(*self.unnamed, *patterns), is_unlike=True)
 
     def history_after(self, causes: Sequence[Estimated]) -> Discrepancy | None:
         """Return the history that has seen this log too, with the causes that stand in it."""
@@ -201,12 +224,14 @@ class Change(Search):
 
     def unexplained(self, rng: np.random.Generator) -> tuple[Hypothesis, ...]:
         """Return the patterns that unseen days tell where nothing else is told, one of each kind."""
-        if not self.by_days:
+        if not self.by_days or self.is_unlike:
             return ()
         return unexplained.find(self.resolved(), self.site.longitude, self.knowledge.by_physics(self.rules), rng)
 
     def _expected(self, laid_out: Design) -> Design:
-        return history.expected(self.history, laid_out, self.misfit, self.without, self.null_gains)
+        null_gains = self.null_gains.times(self.rules.far_over_null if self.is_unlike else 1.0)
+        unnamed = {one.key for one in self.unnamed}
+        return history.expected(self.history, laid_out, self.misfit, self.without, null_gains, unnamed)
 
     def _laid_out(self, terms: list[ActiveTerm]) -> Design:
         if not terms:
@@ -245,9 +270,8 @@ def search_of(
     plain = history.laid_out(days, site, known, (), rules)
     if not history.applies(known, plain):
         return Search(*common)
-    if is_later:
-        null_gains = (null_gains or read_null_gains()).times(rules.far_over_null)
-    return Change(*common, known, plain, history.expected_misfit(known, plain), null_gains, by_days)
+    misfit = history.expected_misfit(known, plain)
+    return Change(*common, known, plain, misfit, null_gains or read_null_gains(), is_later, by_days)
 
 
 def _explained(found: Sequence[Estimated]) -> float:

@@ -160,6 +160,8 @@ class Hypothesis:
     amplitude: float
     statistic: float
     p_value: float
+    always: float | None = None
+    """Gain of the same effect there all the time, of one that begins within the log; None: it does not."""
 
     @property
     def key(self) -> str:
