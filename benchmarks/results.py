@@ -278,13 +278,6 @@ RESULTS = {
         "none",
         long=True,
     ),
-    "diagnosis-real-faults-others": Result(
-        "Faults in other real logs",
-        ("benchmarks.diagnosis", "real-faults", "../shared/data", "--others"),
-        "The same in five compartments that no rule was chosen by.",
-        "none",
-        long=True,
-    ),
 }
 
 

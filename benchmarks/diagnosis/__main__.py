@@ -59,9 +59,6 @@ def main() -> int:
     parser.add_argument("--tuning", action="store_true", help="of `same`: greenhouses and seeds that rules are set on")
     parser.add_argument("--foreign", action="store_true", help="of `same`: greenhouses of another structure")
     parser.add_argument("--compartment", default="", help="of `real`: those whose name has this in it (default: all)")
-    parser.add_argument(
-        "--others", action="store_true", help="of `real-faults`: compartments that no rule was chosen by"
-    )
     parser.add_argument("--withheld-only", action="store_true", help="of `real`: leave out built-in bundle and placebo")
     parser.add_argument("--history-only", action="store_true", help="of `same`: leave out what is known in general")
     parser.add_argument("--days", type=int, default=28)
@@ -75,7 +72,7 @@ def main() -> int:
     if options.what == "real":
         return real.main(options.data, options.compartment, withheld_only=options.withheld_only)
     if options.what == "real-faults":
-        return real_faults.main(options.data, options.compartment, options.processes, others=options.others)
+        return real_faults.main(options.data, options.compartment, options.processes)
     if options.what == "matched":
         return matched.main(options.processes)
     if options.what == "nuisance":

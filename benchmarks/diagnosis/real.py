@@ -12,7 +12,7 @@ model lacks is asked of its calibration log: `omission DATA`.)
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,8 +32,6 @@ COMPARTMENTS = (
     ("agc2018", "Croperators"),
     ("agc2018", "deep_greens"),
 )
-OTHER_COMPARTMENTS = tuple(("agc2019", name) for name in ("AICU", "Automatoes", "Digilog", "IUACAAS", "TheAutomators"))
-"""No rule was chosen by these."""
 BEGINNING, CALIBRATION_DAYS, DIAGNOSIS_DAYS = 14, 56, 28
 """Days of the log that are left out, those that a model is calibrated on, and those that follow and are diagnosed."""
 WITHHELD = ("lamp_power", "rail_pipe_temperature", "grow_pipe_temperature", "energy_screen", "blackout_screen")
@@ -51,17 +49,14 @@ class Compartment:
     after: Log
 
 
-def compartments(
-    data: Path, beginning: int = BEGINNING, names: Sequence[tuple[str, str]] = COMPARTMENTS
-) -> Iterator[Compartment]:
-    """Yield compartments of the public data; one whose log cannot be read is said so.
+def compartments(data: Path, beginning: int = BEGINNING) -> Iterator[Compartment]:
+    """Yield the compartments of the public data; one whose log cannot be read is said so.
 
     Args:
         data: folder of the public data sets.
         beginning: days of each log that are left out.
-        names: folder and compartment of each.
     """
-    for folder, name in names:
+    for folder, name in COMPARTMENTS:
         try:
             log = read_log(data / folder, compartment=name)
         except IgrowError as error:

@@ -1,14 +1,13 @@
 """Faults put into what real greenhouses logged: does the diagnosis say which, how large and since when?
 
-    python -m benchmarks.diagnosis real-faults DATA [--others]
+    python -m benchmarks.diagnosis real-faults DATA
 
-DATA is the folder with ``agc2019`` and ``agc2018``. The compartments are those of `real`, four weeks later:
-calibrated on eight weeks as they were logged, diagnosed on the four that follow, or as many as there are, which
-`real` does not see; or, with `--others`, five more, by which no rule of a diagnosis was chosen. Into these a fault is
-put that the model knows nothing of: a sensor that is off, drifts or lags, lamps that give more than is logged. The
-greenhouse and its disturbances are as they were; what the climate computer would have done otherwise, had it read the
-faulty sensor, is not in the log. A fault counts as one that matters where it raises an error a day ahead by a fifth,
-recalibrated, beside the log without it.
+DATA is the folder with ``agc2019`` and ``agc2018``. The compartments are those of `real`, four weeks later: calibrated
+on eight weeks as they were logged, diagnosed on the four that follow, or as many as there are, which `real` does not
+see. Into these a fault is put that the model knows nothing of: a sensor that is off, drifts or lags, lamps that give
+more than is logged. The greenhouse and its disturbances are as they were; what the climate computer would have done
+otherwise, had it read the faulty sensor, is not in the log. A fault counts as one that matters where it raises an error
+a day ahead by a fifth, recalibrated, beside the log without it.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.diagnosis.naming import is_named
-from benchmarks.diagnosis.real import COMPARTMENTS, OTHER_COMPARTMENTS, RISE, Compartment, compartments
+from benchmarks.diagnosis.real import RISE, Compartment, compartments
 from benchmarks.jobs import Jobs
 from igrow.core.arrays import Floats
 from igrow.core.effects import EFFECTS
@@ -262,16 +261,15 @@ def rows(cases: Sequence[Case]) -> list[tuple[str, float, int]]:
     ]
 
 
-def main(data: Path | None, only: str, processes: int, *, others: bool = False) -> int:
-    """Print every case and the table; `only` compartments of this name, `others` those that no rule was chosen by."""
+def main(data: Path | None, only: str, processes: int) -> int:
+    """Print every case and the table; `only` compartments of this name."""
     if data is None or not data.is_dir():
         print("error: name the folder of the public data sets: python -m benchmarks.diagnosis real-faults DATA")
         return 2
-    names = OTHER_COMPARTMENTS if others else COMPARTMENTS
-    chosen = [one for one in compartments(data, BEGINNING, names) if only in one.name]
+    chosen = [one for one in compartments(data, BEGINNING) if only in one.name]
     plain: dict[str, Told] = {}
     cases: list[Case] = []
-    with Jobs("diagnosis real-faults" + " others" * others, processes) as jobs:
+    with Jobs("diagnosis real-faults", processes) as jobs:
         models = list(jobs.each(calibrated, chosen))
         wanted = [(one, model, name) for one, model in zip(chosen, models, strict=True) for name in _names(one)]
         for number, told in enumerate(jobs.each(asked, wanted), 1):
