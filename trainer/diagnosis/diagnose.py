@@ -40,6 +40,7 @@ from igrow.trainer.diagnosis.result import Diagnosis, Finding, Verdict
 from igrow.trainer.diagnosis.rounds import Search, search_of
 from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules
 from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.diagnosis.shipping import shipped
 from igrow.trainer.diagnosis.unseen_errors import errors_of, runs_of, stages_of
 from igrow.trainer.diagnosis.visible_parameters import members
 from igrow.trainer.fit.discrepancy import Discrepancy
@@ -183,7 +184,8 @@ class _Question:
         followed = remembering(replace(self.model, history=seen), result.parameter, rules).history
         if not (around.new_crop or result.parameter is not None):
             followed = search.history_after(result.kept)
-        diagnosis = self._diagnosis(log, around, first, result, patterns)
+        completed, result = shipped(around.completed, around.logged, knowledge, result)
+        diagnosis = self._diagnosis(log, replace(around, completed=completed), first, result, patterns)
         if waiting:
             diagnosis = replace(diagnosis, notes=(wording.WAITING, *diagnosis.notes))
         return Answer(diagnosis, result.kept, result.parameter, followed)

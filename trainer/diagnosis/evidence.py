@@ -36,5 +36,5 @@ def errors_with(
         added: further fluxes that are known to be there, by channel, (n,).
     """
     log, causes = evidence.log, (*evidence.knowledge.terms, *terms)
-    fitted = log.fit(evidence.knowledge.prior, causes, added=added)
+    fitted = log.fit(evidence.knowledge.shipped_prior, causes, added=added)
     return mean_absolute_errors(log.run(Stage(fitted, causes, {}, added or {})))

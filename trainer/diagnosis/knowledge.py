@@ -60,6 +60,8 @@ class Knowledge:
     """Of the parameters, as the model has it."""
     prior: Gaussian
     """Of the parameters in this log, about the calibration itself: for fits to free runs."""
+    shipped_prior: Gaussian
+    """The same for the model that is shipped."""
     short_prior: Gaussian
     """The same about where the diagnosis of the calibration log put them: for the search."""
     terms: tuple[ActiveTerm, ...]
@@ -83,14 +85,17 @@ def knowledge_of(model: FittedModel, site: Site, rules: DecisionRules) -> Knowle
     if not at_home:
         posterior = posterior.widened(drift(posterior.values, rules.transferred_drift, rules))
     # Fits to free runs may move further than a greenhouse changes: a parameter also stands in for what has no name.
-    usual = drift(posterior.values, rules.parameter_drift, rules)
-    prior = posterior.widened(np.maximum(usual, home_drift(posterior.values, rules)))
+    # The model that is shipped may follow it wherever that predicts better: what that hides has been told by then.
+    prior, shipped_prior = (
+        posterior.widened(np.maximum(drift(posterior.values, share, rules), home_drift(posterior.values, rules)))
+        for share in (rules.parameter_drift, rules.shipped_drift)
+    )
     history = model.history if at_home and rules.history else None
     low, high = bounds(prior.names)
     shift = np.array([discrepancy.get(PARAMETER_PREFIX + name, 0.0) for name in prior.names])
     centred = prior.moved(np.clip(prior.mean + shift, low, high))
     terms = tuple(active_term(one) for one in model.effects if one.name in EFFECTS)
-    return Knowledge(model.posterior, prior, centred, terms, discrepancy, not discrepancy, history)
+    return Knowledge(model.posterior, prior, shipped_prior, centred, terms, discrepancy, not discrepancy, history)
 
 
 def active_term(record: EffectRecord) -> ActiveTerm:

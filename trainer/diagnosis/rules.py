@@ -44,6 +44,7 @@ class DecisionRules:
 
     # What is known of the parameters before the log.
     parameter_drift: float = _chosen(0.08, "relative change of a parameter between calibration and log")
+    shipped_drift: float = _tuned(0.25, "the same in the model that is shipped, which follows whatever has no name")
     transferred_drift: float = _chosen(0.25, "the same between the greenhouse of the calibration and another one")
     least_drift_share: float = _chosen(0.3, "share of a parameter's usual value that the drift is at least taken of")
     drift_days: float = _chosen(84.0, "days in which a parameter may drift so far to either side of its mean")

@@ -1,0 +1,55 @@
+"""The model that is shipped: its parameters refitted, once it is known which causes it has.
+
+What a diagnosis may tell is judged with parameters that move little, since those that move far take over what is
+missing. A day ahead they predict better: a season changes more of a greenhouse than its walls.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from igrow.trainer.diagnosis.actuators import Completed
+from igrow.trainer.diagnosis.correction import Corrected
+from igrow.trainer.diagnosis.freerun import LogDays, Stage
+from igrow.trainer.diagnosis.knowledge import Knowledge
+from igrow.trainer.diagnosis.visible_parameters import members
+from igrow.trainer.fit.gaussian import Gaussian
+from igrow.trainer.fit.solver import DivergenceError
+
+
+def shipped(
+    completed: Completed, logged: LogDays, knowledge: Knowledge, result: Corrected
+) -> tuple[Completed, Corrected]:
+    """Return what a diagnosis has fitted, refitted as it is shipped.
+
+    Args:
+        completed: the log with actuators that it lacks, and the model recalibrated without them.
+        logged: the log as it was logged.
+        knowledge: of the model in force.
+        result: of the correction.
+    """
+    prior, parameter = knowledge.shipped_prior, result.parameter
+    changed = prior
+    if parameter is not None:
+        here = np.array([name in members(parameter.parameter) for name in prior.names])
+        changed = prior.widened_along(knowledge.posterior.mean * here)
+    stages = {
+        "recalibrated": refitted(result.stages["recalibrated"], completed.days, prior),
+        "corrected": refitted(result.stages["corrected"], completed.days, changed),
+    }
+    before = completed.recalibrated
+    return (
+        replace(completed, recalibrated=None if before is None else refitted(before, logged, prior)),
+        replace(result, stages={**result.stages, **stages}),
+    )
+
+
+def refitted(stage: Stage, log: LogDays, prior: Gaussian) -> Stage:
+    """Return a stage with its parameters refitted under another prior; as it was where its runs leave all bounds."""
+    try:
+        fitted = log.fit(prior, stage.terms, stage.posterior.values, stage.added or None)
+    except DivergenceError:
+        return stage
+    return replace(stage, posterior=fitted)
