@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from igrow.trainer.diagnosis import DEFAULT
+from igrow.trainer.diagnosis import DEFAULT, shipping
 from igrow.trainer.diagnosis.actuators import Completed
 from igrow.trainer.diagnosis.correction import Corrected
 from igrow.trainer.diagnosis.freerun import LogDays, Stage
@@ -52,7 +52,7 @@ def completed(days: Fits, recalibrated: Stage | None = None) -> Completed:
 
 def test_both_stages_are_refitted_beside_their_causes_and_the_deployed_is_as_it_was() -> None:
     knowledge, days = known(), Fits()
-    _, result = shipped(completed(days), cast(Any, None), knowledge, corrected(knowledge))
+    _, result = shipped(completed(days), cast(Any, None), knowledge, corrected(knowledge), DEFAULT)
     wide = knowledge.shipped_prior
     assert days.asked == [(wide, ()), (wide, LAMPS)]
     assert result.stages["corrected"] == Stage(wide, LAMPS)
@@ -60,19 +60,24 @@ def test_both_stages_are_refitted_beside_their_causes_and_the_deployed_is_as_it_
     assert np.all(wide.standard_deviation > knowledge.prior.standard_deviation)
 
 
-def test_a_parameter_that_has_changed_stays_free() -> None:
+@pytest.mark.parametrize(("skill", "free"), [(0.02, True), (0.0, False), (-0.01, False), (None, False)])
+def test_a_parameter_that_has_changed_stays_free_where_that_adds_something(
+    skill: float | None, free: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A third more air through the vents is more than any parameter is given otherwise."""
     knowledge, days = known(), Fits()
-    shipped(completed(days), cast(Any, None), knowledge, corrected(knowledge, "transmissivity"))
-    (plain, _), (freed, _) = days.asked
+    monkeypatch.setattr(shipping, "cross_validated_skill", lambda *_: skill)
+    _, result = shipped(completed(days), cast(Any, None), knowledge, corrected(knowledge, "transmissivity"), DEFAULT)
+    plain, freed = knowledge.shipped_prior, days.asked[-1][0]
     wider = freed.standard_deviation > plain.standard_deviation + 1e-12
     assert [name for name, more in zip(freed.names, wider, strict=True) if more] == ["transmissivity"]
+    assert result.stages["corrected"].posterior is (freed if free else plain)
 
 
 def test_where_an_actuator_is_not_logged_the_model_without_it_is_refitted_to_the_log_as_it_is() -> None:
     knowledge, days, logged = known(), Fits(), Fits()
     before = Stage(knowledge.prior, LAMPS)
-    around, _ = shipped(completed(days, before), cast(Any, logged), knowledge, corrected(knowledge))
+    around, _ = shipped(completed(days, before), cast(Any, logged), knowledge, corrected(knowledge), DEFAULT)
     assert logged.asked == [(knowledge.shipped_prior, LAMPS)]
     assert around.recalibrated == Stage(knowledge.shipped_prior, LAMPS)
 

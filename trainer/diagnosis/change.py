@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from igrow.core.effects import EFFECTS
 from igrow.trainer.diagnosis import linear, search
 from igrow.trainer.diagnosis.candidates import Pattern
 from igrow.trainer.diagnosis.compare import Contender, Profile, Round, bootstrap_p
@@ -54,10 +55,15 @@ def changed(
 
 
 def scored(design: Design, null: Fit, rng: np.random.Generator) -> list[Hypothesis]:
-    """Return the best hypothesis of every effect, with what the same gains there all the time."""
+    """Return the best hypothesis of every effect, with what the same gains there all the time.
+
+    Beside what is unexplained a process that is there all the time may be a part of it: it is none.
+    """
     found = search.score_candidates(design, null, search.onset_days(design), rng)
     always = {one.effect: one.gain for one in search.score_candidates(design, null, [None], rng)}
-    return [one if one.term.onset is None else replace(one, always=always.get(one.effect, 0.0)) for one in found]
+    found = [one if one.term.onset is None else replace(one, always=always.get(one.effect, 0.0)) for one in found]
+    alone = design.history is None or not design.history.beside
+    return [one for one in found if alone or one.always is not None or EFFECTS[one.effect].kind == "sensor"]
 
 
 def chosen(design: Design, found: list[Hypothesis]) -> Hypothesis | None:

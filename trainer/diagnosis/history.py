@@ -220,9 +220,8 @@ def expected(
     now = drifted(known, plain).widened(plain.rules.largest_pattern * found)
     values = plain.values.copy()
     values[0] += misfit
-    design = replace(
-        plain, values=values, history=History(now, misfit, filters, known.own_gains, frozenset(without), null_gains)
-    )
+    within = History(now, misfit, filters, known.own_gains, frozenset(without), null_gains, frozenset(beside))
+    design = replace(plain, values=values, history=within)
     _, design = solve_jointly(design)
     # Parameters as the rest of the history leaves them, for fits that hold it.
     count = len(plain.prior.names)

@@ -12,15 +12,16 @@ import numpy as np
 
 from igrow.trainer.diagnosis.actuators import Completed
 from igrow.trainer.diagnosis.correction import Corrected
-from igrow.trainer.diagnosis.freerun import LogDays, Stage
+from igrow.trainer.diagnosis.freerun import LogDays, Refittable, Stage, cross_validated_skill
 from igrow.trainer.diagnosis.knowledge import Knowledge
+from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.diagnosis.visible_parameters import members
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.solver import DivergenceError
 
 
 def shipped(
-    completed: Completed, logged: LogDays, knowledge: Knowledge, result: Corrected
+    completed: Completed, logged: LogDays, knowledge: Knowledge, result: Corrected, rules: DecisionRules
 ) -> tuple[Completed, Corrected]:
     """Return what a diagnosis has fitted, refitted as it is shipped.
 
@@ -29,21 +30,32 @@ def shipped(
         logged: the log as it was logged.
         knowledge: of the model in force.
         result: of the correction.
+        rules: what a parameter that has changed must add to be free.
     """
-    prior, parameter = knowledge.shipped_prior, result.parameter
-    changed = prior
-    if parameter is not None:
-        here = np.array([name in members(parameter.parameter) for name in prior.names])
-        changed = prior.widened_along(knowledge.posterior.mean * here)
-    stages = {
-        "recalibrated": refitted(result.stages["recalibrated"], completed.days, prior),
-        "corrected": refitted(result.stages["corrected"], completed.days, changed),
-    }
+    prior, days = knowledge.shipped_prior, completed.days
+    recalibrated = refitted(result.stages["recalibrated"], days, prior)
+    corrected = refitted(result.stages["corrected"], days, prior)
+    if result.parameter is not None:
+        here = np.array([name in members(result.parameter.parameter) for name in prior.names])
+        freed = prior.widened_along(knowledge.posterior.mean * here)
+        changed = refitted(result.stages["corrected"], days, freed)
+        # Recalibration may have followed the change.
+        adds = _skill(days, Refittable(recalibrated, prior), Refittable(changed, freed)) >= rules.least_skill
+        corrected = changed if adds else recalibrated
+    stages = {**result.stages, "recalibrated": recalibrated, "corrected": corrected}
     before = completed.recalibrated
     return (
         replace(completed, recalibrated=None if before is None else refitted(before, logged, prior)),
-        replace(result, stages={**result.stages, **stages}),
+        replace(result, stages=stages),
     )
+
+
+def _skill(days: LogDays, before: Refittable, after: Refittable) -> float:
+    try:
+        skill = cross_validated_skill(days, before, after)
+    except DivergenceError:
+        return 0.0
+    return skill or 0.0
 
 
 def refitted(stage: Stage, log: LogDays, prior: Gaussian) -> Stage:
