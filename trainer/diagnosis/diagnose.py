@@ -324,8 +324,10 @@ def _verdict(
     )
     verdict: Verdict = "ambiguous" if any(len(one.confounded) > 1 for one in findings) else "named"
     if patterns:
-        # What has a name has it, whatever else goes on.
-        return verdict if findings else "unexplained", (*findings, wording.discrepancy(patterns, rules))
+        # A process that was there all along may be a part of it.
+        apart = any(EFFECTS[one.effect].kind == "sensor" or one.onset is not None for one in result.kept)
+        verdict = verdict if apart or completed.found else "unexplained"
+        return verdict, (*findings, wording.discrepancy(patterns, rules))
     return verdict if findings else "nothing", findings
 
 
