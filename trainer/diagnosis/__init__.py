@@ -12,9 +12,9 @@ noise) or, where the greenhouse's own calibration log taught what is missing eve
 `null_gains` and `change` (what has changed since; `cross_validation` asks unseen days where time steps tell nothing or
 not which, `unexplained` what has no name, `parameter_change` the parameters, `omission` what it lacked from the first
 day), `estimate`, `refit` (size, beginning, confounded causes), `confirmation` (the same by free runs), `correction`
-(what stands on unseen days; `parameter_or_causes` where both explain the log), `unseen_errors`, `evidence`, `wording`,
-`result`, `answers` (what parts of a log tell beside each other). `rules` holds every threshold, `nuisance` what
-greenhouses show though nothing is missing, `sharing` what one tells others.
+(what stands on unseen days; `parameter_or_causes` where both explain the log), `shipping` (the model that is shipped),
+`unseen_errors`, `evidence`, `wording`, `result`, `answers` (what parts of a log tell beside each other). `rules` holds
+every threshold, `nuisance` what greenhouses show though nothing is missing, `sharing` what one tells others.
 docs/method.md tells why.
 """
 
