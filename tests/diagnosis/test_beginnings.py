@@ -64,10 +64,10 @@ def test_beside_what_is_unexplained_a_process_that_was_there_all_along_is_not_as
     """A warm neighbour was told as a floor that stores heat, once a pattern had taken the most of it."""
     design = with_parameters(Truth({"lamp_heat": 0.8}, {}), 1)
     assert design.history is not None
-    beside = replace(design, history=replace(design.history, beside=frozenset({"heat:cold weather"})))
+    beside = replace(design, history=replace(design.history, unnamed=frozenset({"heat:cold weather"})))
     assert {one.effect for one in scored(design)} >= {"lamp_heat"}
     assert all(one.always is not None for one in scored(beside))
     begun = with_parameters(Truth({"lamp_heat": 0.8}, {}, onset=16), 1)
     assert begun.history is not None
-    begun = replace(begun, history=replace(begun.history, beside=frozenset({"heat:cold weather"})))
+    begun = replace(begun, history=replace(begun.history, unnamed=frozenset({"heat:cold weather"})))
     assert [(one.effect, one.term.onset) for one in scored(begun)] == [("lamp_heat", 16)]

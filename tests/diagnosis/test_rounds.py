@@ -117,8 +117,8 @@ def test_where_much_is_unexplained_a_change_must_gain_far_more(monkeypatch: pyte
     search, _ = searched([(0.1, 0.01)], monkeypatch)
     asked: list[tuple[float, set[str]]] = []
 
-    def expected(_known: Any, laid_out: Any, _misfit: Any, _without: Any, gains: Any, beside: set[str]) -> Any:
-        asked.append((gains.least, beside))
+    def expected(_known: Any, laid_out: Any, _misfit: Any, _without: Any, gains: Any, unnamed: set[str]) -> Any:
+        asked.append((gains.least, unnamed))
         return laid_out
 
     monkeypatch.setattr(history, "expected", expected)

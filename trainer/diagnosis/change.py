@@ -1,9 +1,9 @@
 """What has changed in a greenhouse since its calibration: the cause that stands, or patterns that no cause explains.
 
 Every effect and every pattern is scored against what the history of this very greenhouse leads to expect. A beginning
-has a price. What a hypothesis gained in windows of the calibration log, where nothing had changed, is taken off its
-gain, so that the bound is this greenhouse's own; and the scatter of its day scores must bear out a part of what the
-noise says, or a few odd days would speak for all.
+has a price, and is judged by the days before it. What a hypothesis gained in windows of the calibration log, where
+nothing had changed, is taken off its gain, so that the bound is this greenhouse's own; and the scatter of its day
+scores must bear out a part of what the noise says, or a few odd days would speak for all.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def scored(design: Design, null: Fit, rng: np.random.Generator) -> list[Hypothes
     found = search.score_candidates(design, null, search.onset_days(design), rng)
     always = {one.effect: one.gain for one in search.score_candidates(design, null, [None], rng)}
     found = [one if one.term.onset is None else replace(one, always=always.get(one.effect, 0.0)) for one in found]
-    alone = design.history is None or not design.history.beside
+    alone = design.history is None or not design.history.unnamed
     return [one for one in found if alone or one.always is not None or EFFECTS[one.effect].kind == "sensor"]
 
 

@@ -60,8 +60,8 @@ class History:
     """Effects that are no candidates, though they may have been there before."""
     null_gains: NullGains | None = None
     """Of greenhouses in which nothing has changed; None in the calibration log itself."""
-    beside: frozenset[str] = frozenset()
-    """Patterns by key that have been found: of them nothing is expected."""
+    unnamed: frozenset[str] = frozenset()
+    """Patterns by key that no cause explains, found before: of them nothing is expected."""
 
 
 @dataclass(frozen=True)

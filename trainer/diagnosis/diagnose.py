@@ -184,7 +184,7 @@ class _Question:
         followed = remembering(replace(self.model, history=seen), result.parameter, rules).history
         if not (around.new_crop or result.parameter is not None):
             followed = search.history_after(result.kept)
-        completed, result = shipped(around.completed, around.logged, knowledge, result, rules)
+        completed, result = shipped(around.completed, around.logged, knowledge, result)
         diagnosis = self._diagnosis(log, replace(around, completed=completed), first, result, patterns)
         if waiting:
             diagnosis = replace(diagnosis, notes=(wording.WAITING, *diagnosis.notes))

@@ -201,7 +201,7 @@ def expected(
     misfit: Floats,
     without: Collection[str] = (),
     null_gains: NullGains | None = None,
-    beside: Collection[str] = (),
+    unnamed: Collection[str] = (),
 ) -> Design:
     """Return the design of a later log: what is expected of it taken off, under the history's colour.
 
@@ -211,16 +211,16 @@ def expected(
         misfit: (b, r, intervals), from `expected_misfit`, of the log without the causes that have been found in it.
         without: effects that are no candidates.
         null_gains: of greenhouses in which nothing has changed (None: what came with the trainer).
-        beside: patterns by key of which nothing is expected: they have been found in this log.
+        unnamed: patterns by key that no cause of this log explains: of them nothing is expected.
     """
     null_gains = null_gains or read_null_gains()
     balances = averaging(plain.line, plain.interval, plain.rules).balances
     filters = tuple(noise.filter_of(known.filters[balance]) for balance in balances)
-    found = np.array([key in beside for key in keys(plain)])
+    found = np.array([key in unnamed for key in keys(plain)])
     now = drifted(known, plain).widened(plain.rules.largest_pattern * found)
     values = plain.values.copy()
     values[0] += misfit
-    within = History(now, misfit, filters, known.own_gains, frozenset(without), null_gains, frozenset(beside))
+    within = History(now, misfit, filters, known.own_gains, frozenset(without), null_gains, frozenset(unnamed))
     design = replace(plain, values=values, history=within)
     _, design = solve_jointly(design)
     # Parameters as the rest of the history leaves them, for fits that hold it.

@@ -14,14 +14,13 @@ from igrow.trainer.diagnosis.actuators import Completed
 from igrow.trainer.diagnosis.correction import Corrected
 from igrow.trainer.diagnosis.freerun import LogDays, Refittable, Stage, cross_validated_skill
 from igrow.trainer.diagnosis.knowledge import Knowledge
-from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.diagnosis.visible_parameters import members
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.solver import DivergenceError
 
 
 def shipped(
-    completed: Completed, logged: LogDays, knowledge: Knowledge, result: Corrected, rules: DecisionRules
+    completed: Completed, logged: LogDays, knowledge: Knowledge, result: Corrected
 ) -> tuple[Completed, Corrected]:
     """Return what a diagnosis has fitted, refitted as it is shipped.
 
@@ -30,18 +29,16 @@ def shipped(
         logged: the log as it was logged.
         knowledge: of the model in force.
         result: of the correction.
-        rules: what a parameter that has changed must add to be free.
     """
-    prior, days = knowledge.shipped_prior, completed.days
+    prior, days, judged = knowledge.shipped_prior, completed.days, result.stages["corrected"]
     recalibrated = refitted(result.stages["recalibrated"], days, prior)
-    corrected = refitted(result.stages["corrected"], days, prior)
-    if result.parameter is not None:
+    if result.parameter is None:
+        corrected = refitted(judged, days, prior)
+    else:
+        # Known which has changed, the others need not move far; but recalibration may have followed it better.
         here = np.array([name in members(result.parameter.parameter) for name in prior.names])
-        freed = prior.widened_along(knowledge.posterior.mean * here)
-        changed = refitted(result.stages["corrected"], days, freed)
-        # Recalibration may have followed the change.
-        adds = _skill(days, Refittable(recalibrated, prior), Refittable(changed, freed)) >= rules.least_skill
-        corrected = changed if adds else recalibrated
+        freed = Refittable(judged, knowledge.prior.widened_along(knowledge.posterior.mean * here))
+        corrected = judged if _is_no_worse(days, freed, Refittable(recalibrated, prior)) else recalibrated
     stages = {**result.stages, "recalibrated": recalibrated, "corrected": corrected}
     before = completed.recalibrated
     return (
@@ -50,12 +47,13 @@ def shipped(
     )
 
 
-def _skill(days: LogDays, before: Refittable, after: Refittable) -> float:
+def _is_no_worse(days: LogDays, one: Refittable, other: Refittable) -> bool:
+    """Tell whether a model predicts days that it was not fitted to no worse than another."""
     try:
-        skill = cross_validated_skill(days, before, after)
+        skill = cross_validated_skill(days, other, one)
     except DivergenceError:
-        return 0.0
-    return skill or 0.0
+        return False
+    return skill is not None and skill >= 0.0
 
 
 def refitted(stage: Stage, log: LogDays, prior: Gaussian) -> Stage:
