@@ -187,8 +187,11 @@ def test_an_effect_is_tried_at_every_shape_of_its_grid_and_has_a_key_for_each(li
     assert asked.isdisjoint(found.untestable)
 
 
-def test_a_model_that_runs_out_of_all_bounds_says_so(line: Linearisation) -> None:
-    absurd = {"lamp_heat": {"share": 1e300}}
+@pytest.mark.parametrize("share", [1e300, 100.0])
+def test_a_model_that_runs_out_of_all_bounds_says_so_though_its_air_has_a_temperature(
+    line: Linearisation, share: float
+) -> None:
+    absurd = {"lamp_heat": {"share": share}}
     with pytest.raises(DivergenceError, match="lamp_heat runs out of all bounds"):
         sensitivity.linearise(line.record, line.runs, line.parameters, absurd)
 
