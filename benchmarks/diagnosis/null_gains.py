@@ -1,7 +1,7 @@
 """Learn what a change must gain: more than effects and parameters do in greenhouses in which nothing has changed.
 
 What an effect gained in any of these logs is what it must exceed. Above that stands what every change must gain: the
-least with which these logs, each greenhouse judged by the gains of the others, get a name no more often than they may.
+least with which none of these logs gets a name, each greenhouse judged by the gains of the others.
 """
 
 from __future__ import annotations
@@ -22,8 +22,6 @@ from igrow.trainer.diagnosis.null_gains import BEGINNING_PREFIX, NullGains
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.diagnosis.visible_parameters import members
 
-FALSE_CLAIMS = 0.02
-"""Share of logs with nothing missing that may be given a name, each greenhouse judged by the gains of the others."""
 LEAST, MOST = 8, 30
 """Bounds that are tried."""
 
@@ -108,14 +106,14 @@ def false_parameters(found: Sequence[Gained]) -> list[str]:
 
 
 def least_gain(jobs: Jobs, logs: Sequence[Later], found: Sequence[Gained]) -> float:
-    """Return the least that every change must gain, so that few enough of these logs are given a name."""
+    """Return the least that every change must gain, so that none of these logs is given a name."""
     for least in range(LEAST, MOST + 1):
         known = [of_others(found, one.greenhouse, float(least)) for one in found]
         asked = [place for place, (one, mine) in enumerate(zip(found, known, strict=True)) if is_asked(one, mine)]
         told = list(jobs.each(named, [(logs[place], known[place]) for place in asked]))
         claims = [(found[place].greenhouse, names) for place, names in zip(asked, told, strict=True) if names]
         print(f"  least gain {least}: {len(asked)} gain what they must; named: {len(claims)} {claims}", flush=True)
-        if len(claims) <= FALSE_CLAIMS * len(found):
+        if not claims:
             return float(least)
     return float(MOST)
 

@@ -27,7 +27,7 @@ class NullGains:
     largest: Mapping[str, float]
     """In any such log, of effects, beginnings, parameters (``parameter:name``) or kinds of patterns."""
     least: float
-    """What any change must gain: of such logs none or nearly none is given a name then, each by the gains of others."""
+    """What any change must gain: of such logs none or nearly none is told one then, each by what others gained."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
     """The command that learned it, its date and seeds."""
 
