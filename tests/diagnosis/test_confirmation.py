@@ -36,7 +36,7 @@ def test_the_size_is_that_of_free_runs(size: float) -> None:
     found = confirmed(log, knowledge_of(model, SITE, DEFAULT), (), [change(size)], DEFAULT)
     assert found is not None
     assert found.term.amplitude == pytest.approx(1.0, abs=0.3)
-    assert found.change_skill > DEFAULT.clear_change_skill
+    assert found.change_skill > DEFAULT.clear_skill
     # What is known of it keeps its share.
     assert (found.amplitude.low, found.amplitude.high) == pytest.approx(
         (0.5 * found.term.amplitude, 1.5 * found.term.amplitude)

@@ -160,7 +160,7 @@ def stands(one: Estimated, kept: Sequence[Estimated], rules: DecisionRules) -> b
     if not _is_large(one, rules):
         return False
     if kept:
-        return one.skill >= rules.further_skill and _adds_to(one, kept, rules)
+        return one.skill >= rules.clear_skill and _adds_to(one, kept, rules)
     likelier = one.bootstrap_p <= rules.largest_bootstrap_p
     return one.skill >= rules.clear_skill or (one.skill >= rules.least_skill and likelier)
 
@@ -170,8 +170,8 @@ def is_proven_change(one: Estimated, rules: DecisionRules) -> bool:
     if not _is_large(one, rules):
         return False
     far_beyond_null = one.over_null >= rules.far_over_null
-    enough = rules.least_skill if far_beyond_null else rules.clear_change_skill
-    return one.change_skill >= enough and one.skill >= rules.least_change_skill
+    enough = rules.least_skill if far_beyond_null else rules.clear_skill
+    return one.change_skill >= enough and one.skill >= 0.0
 
 
 def _is_large(one: Estimated, rules: DecisionRules) -> bool:

@@ -83,18 +83,14 @@ class DecisionRules:
     later_days: float = _chosen(42.0, "days from a calibration to a later log up to which these hold; then as a walk")
     change_onset_price: float = _tuned(12.0, "gain that a beginning of a change must add")
     change_last_days: int = _tuned(5, "days at the end of a log in which no beginning of a change is looked for")
-    clear_change_skill: float = _tuned(
-        0.03, "share of the squared error of unseen days that a change must remove, all else changing by physics"
-    )
     far_over_null: float = _tuned(
         2.5, "times what a change must gain from which on `least_skill` is enough of it, and no null skill is asked"
     )
-    least_change_skill: float = _tuned(0.0, "share that the shipped model gains at least with a change in it")
     least_unproven_change: float = _tuned(2.0, "gain from which on a change is asked of unseen days alone")
     days_over_null: float = _tuned(
         1.3, "times what it took off unseen days at most where nothing had changed, that it must take off to be told so"
     )
-    least_pattern_change: float = _tuned(60.0, "the same of a pattern: greenhouses drift with the weather")
+    least_pattern_change: float = _tuned(60.0, "gain that a pattern must bring: greenhouses drift with the weather")
     least_proven_pattern: float = _tuned(20.0, "of it, what the scatter of day scores must bear out")
     pattern_over_change: float = _tuned(1.5, "times a change's gain at which a pattern replaces it")
     pattern_over_skill: float = _tuned(
@@ -185,8 +181,9 @@ class DecisionRules:
     least_certainty: float = _tuned(2.0, "standard errors that each of several causes measures at least")
     least_effect_to_noise: float = _chosen(0.15, "ENR below which a cause is too small to be named")
     least_skill: float = _chosen(0.01, "share of unseen days' squared error that a cause, or a pattern, must remove")
-    clear_skill: float = _chosen(0.03, "share that needs no other proof")
-    further_skill: float = _chosen(0.03, "share that a second or third cause must remove")
+    clear_skill: float = _tuned(
+        0.03, "share that a change, or a further cause, must remove, and that needs no other proof"
+    )
     further_bootstrap_p: float = _chosen(0.2, "largest bootstrap p-value of a second or third cause")
     further_gain_share: float = _chosen(0.2, "gain of a second or third cause over that of those before it")
     least_actuator_odds: float = _chosen(
