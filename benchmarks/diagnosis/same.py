@@ -106,13 +106,15 @@ def table(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int, str]]:
         lambda one: bool(one.confounded) and not is_first(one),
         "-",
     )
-    enough = read_null_gains().least
+    bounds = read_null_gains()
     for size in (1.0, 0.3):
         alone = [one for one in of("single", size=size) if one.expected_gain is not None]
         right = f"oracle: gain enough at ENR {size:g}, were the structure right"
-        share(right, alone, lambda one: (one.expected_gain or 0.0) >= enough, "-")
+        share(right, alone, lambda one: (one.expected_gain or 0.0) >= bounds.least, "-")
         known = [one for one in alone if one.known_gain is not None]
-        share("oracle: the same, parameters known", known, lambda one: (one.known_gain or 0.0) >= enough, "-")
+        share("oracle: the same, parameters known", known, lambda one: (one.known_gain or 0.0) >= bounds.least, "-")
+        own = "oracle: gain enough, by what its effect must gain"
+        share(own, alone, lambda one: (one.expected_gain or 0.0) >= bounds.needed(one.case.causes[0]), "-")
     share("both of a pair", of("pair"), has_all, ">= .45")
     sizes = [abs(one.relative_size - 1.0) for one in outcomes if one.relative_size is not None]
     rows.append(("size, median relative error", float(np.median(sizes)) if sizes else np.nan, len(sizes), "<= .10"))
