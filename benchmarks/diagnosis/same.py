@@ -43,6 +43,8 @@ GROUPS = (
     ("parameter", 0.0, 0.2),
 )  # fmt: skip
 """Group, ENR and share of the cases."""
+MATTERS = 1.1
+"""Times the error of a model with the true cause that a recalibrated one makes, from which on the cause matters."""
 RULES = {"history": replace(DEFAULT, history=True), "in general": replace(DEFAULT, history=False)}
 
 
@@ -94,9 +96,13 @@ def table(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int, str]]:
         share(f"false claims, {what}", of(group), lambda one: one.verdict != "nothing", "<= .02")
     for size, bound in ((3.0, "-"), (1.0, ">= .80"), (0.3, ">= .35")):
         share(f"right cause first, ENR {size:g}", of("single", size=size), is_first, bound)
-    named = [one for one in of("single", "onset") if one.confounded]
+    alone = of("single", "onset")
+    for matters, where in ((True, "errs a tenth more"), (False, "does not")):
+        mine = [one for one in alone if (one.recalibrated >= MATTERS * one.perfect) == matters]
+        share(f"right first, where recalibration {where}", mine, is_first, "-")
+    named = [one for one in alone if one.confounded]
     share("right cause first, where a name was given", named, is_first, ">= .95")
-    share("a pattern in place of a cause", of("single", "onset"), lambda one: one.verdict == "unexplained", "-")
+    share("a pattern in place of a cause", alone, lambda one: one.verdict == "unexplained", "-")
     for change, (factor, _) in CHANGES.items():
         mine = [one for one in of("parameter") if one.case.changed == change]
         share(f"right: {change} times {factor:g}", mine, is_first, "-")
@@ -108,13 +114,13 @@ def table(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int, str]]:
     )
     bounds = read_null_gains()
     for size in (1.0, 0.3):
-        alone = [one for one in of("single", size=size) if one.expected_gain is not None]
+        seen = [one for one in of("single", size=size) if one.expected_gain is not None]
         right = f"oracle: gain enough at ENR {size:g}, were the structure right"
-        share(right, alone, lambda one: (one.expected_gain or 0.0) >= bounds.least, "-")
-        known = [one for one in alone if one.known_gain is not None]
+        share(right, seen, lambda one: (one.expected_gain or 0.0) >= bounds.least, "-")
+        known = [one for one in seen if one.known_gain is not None]
         share("oracle: the same, parameters known", known, lambda one: (one.known_gain or 0.0) >= bounds.least, "-")
         own = "oracle: gain enough, by what its effect must gain"
-        share(own, alone, lambda one: (one.expected_gain or 0.0) >= bounds.needed(one.case.causes[0]), "-")
+        share(own, seen, lambda one: (one.expected_gain or 0.0) >= bounds.needed(one.case.causes[0]), "-")
     share("both of a pair", of("pair"), has_all, ">= .45")
     sizes = [abs(one.relative_size - 1.0) for one in outcomes if one.relative_size is not None]
     rows.append(("size, median relative error", float(np.median(sizes)) if sizes else np.nan, len(sizes), "<= .10"))
