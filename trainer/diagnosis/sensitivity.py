@@ -29,9 +29,9 @@ PARAMETER_DIFFERENCE = 0.05
 """Finite difference of a parameter, in prior standard deviations."""
 EFFECT_DIFFERENCE = 0.1
 """The same of a sensor effect's amplitude, in typical ones."""
-ESCAPED = 200.0
-"""K between predicted and measured air. A balance that feeds itself may climb for a day without overflowing; no slope
-there says anything about a greenhouse."""
+DIVERGED = 200.0
+"""K between predicted and measured air beyond which a run has diverged. A balance that feeds itself may climb for a day
+without overflowing; no slope there says anything about a greenhouse."""
 _SCALARS = SimpleNamespace(maximum=max, minimum=min, abs=abs, exp=np.exp, sqrt=np.sqrt, tanh=np.tanh)
 """The few functions that memories use, for plain floats: ten times faster than numpy's on scalars."""
 _AIR_TEMPERATURE = measurement.PREDICTED.index("air_temperature")
@@ -116,14 +116,14 @@ def linearise(
     """Run the model once along a log; `added` are further fluxes by channel, (n,).
 
     Raises:
-        DivergenceError: a prediction that counts is no finite number, or the air's is off by more than `ESCAPED`.
+        DivergenceError: a prediction that counts is no finite number, or the air's is off by more than `DIVERGED`.
     """
     states = observe(record, parameters, effects)
     shown = free_run(record, states, runs.starts, runs.steps, parameters, effects, added)
     drivers = climate.derive(np, states, record.inputs, parameters, record.lamp_efficacy)
     line = Linearisation(record, runs, parameters, effects, _stacked(shown), states, drivers, added or {})
     errors = line.errors
-    if not (np.isfinite(errors).all() and (np.abs(errors[_AIR_TEMPERATURE]) <= ESCAPED).all()):
+    if not (np.isfinite(errors).all() and (np.abs(errors[_AIR_TEMPERATURE]) <= DIVERGED).all()):
         active = f" with {', '.join(effects)}" if effects else ""
         raise DivergenceError(
             f"the model{active} runs out of all bounds on this log: calibrate it on this greenhouse first"
