@@ -75,13 +75,6 @@ RESULTS = {
         "26000 and on; greenhouses from 60000",
         long=True,
     ),
-    "diagnosis-matched": Result(
-        "Greenhouses of the simulator's own structure",
-        ("benchmarks.diagnosis", "matched"),
-        "What silence is the model's, and what is the log's.",
-        "9500 and on",
-        long=True,
-    ),
     "season-tuning": Result(
         "A season's rule and strategy, tuned",
         ("benchmarks.seasons", "tune"),
@@ -208,21 +201,21 @@ RESULTS = {
     ),
     "diagnosis-same": Result(
         "The same greenhouse later",
-        ("benchmarks.diagnosis", "same", "--greenhouses", "4", "--cases", "160", "--history-only"),
+        ("benchmarks.diagnosis", "same", "--greenhouses", "4", "--cases", "160"),
         "Calibrated on eight weeks of its own, diagnosed weeks later by its history.",
         "900000 and on",
         long=True,
     ),
     "diagnosis-foreign": Result(
         "Greenhouses of another structure",
-        ("benchmarks.diagnosis", "same", "--foreign", "--greenhouses", "4", "--cases", "120", "--history-only"),
+        ("benchmarks.diagnosis", "same", "--foreign", "--greenhouses", "4", "--cases", "120"),
         "A simulator that shares no balance with the project's own plant; nothing was learned or tuned on its seeds.",
         "800000 and on",
         long=True,
     ),
     "diagnosis-same-season": Result(
         "The same greenhouse later, over twelve weeks",
-        ("benchmarks.diagnosis", "same", "--days", "84", "--greenhouses", "2", "--cases", "60", "--history-only"),
+        ("benchmarks.diagnosis", "same", "--days", "84", "--greenhouses", "2", "--cases", "60"),
         "The same greenhouses and causes; a log that is longer than six weeks is asked in parts, the oldest first.",
         "900000 and on",
         long=True,

@@ -20,7 +20,7 @@ from igrow.core.local_time import utc_datetime
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.data import Log
 from igrow.trainer.data.splits import held_out_weeks
-from igrow.trainer.diagnosis import DEFAULT, discrepancy_of, examine, history_of
+from igrow.trainer.diagnosis import DEFAULT, examine, history_of
 from igrow.trainer.diagnosis.wording import thin_air
 from igrow.trainer.fit.actuation import by_its_own_rules, fit_actuation, setpoint_columns, unanswered
 from igrow.trainer.fit.climate import fit_climate
@@ -82,7 +82,6 @@ def calibrate(
         calibrated_on=site.name,
         alignment=alignment,
         effects=(),
-        discrepancy={},
         history=None,
         omission=None,
         actuation=rules,
@@ -137,10 +136,11 @@ def _with_discrepancy(
     model: FittedModel, record: Record, days: float, population: Population | None, progress: Progress
 ) -> FittedModel:
     """Return the model with what it misses on its own log, and without it where that cannot be told."""
+    if not DEFAULT.learns_history(days):
+        return model
     progress("learning what the model misses on its own log")
     try:
-        known = history_of(record, model, DEFAULT, population) if DEFAULT.learns_history(days) else None
-        return replace(model, discrepancy=discrepancy_of(record, model, DEFAULT), history=known)
+        return replace(model, history=history_of(record, model, DEFAULT, population))
     except (IgrowError, np.linalg.LinAlgError) as error:
         note = (
             f"what the model misses on its own log could not be learned, so a diagnosis sees large causes only: {error}"

@@ -3,14 +3,12 @@
 `scoring` (the default) draws 208 cases, simulates their logs and those that the models are calibrated on, diagnoses
 each, and prints the table beside its bounds. `others` does the same with greenhouses that nothing was learned from,
 each with a model calibrated on its own first weeks; `transferred` diagnoses the same logs with the built-in bundle.
-`matched` does the like with greenhouses of the simulator's own structure; `same` with greenhouses that have drifted a
-little since their calibration, and asks what has changed in them (`--foreign`: of another structure); `omission` takes
-terms out of the model before the calibration (with DATA: of the public logs) and asks the calibration log for them;
-`real` diagnoses the public logs, `real-faults` the same with faults put into them. `nuisance` learns anew what
-greenhouses show though nothing is missing, and `rules` fits the bounds that are fitted, both from seeds that no case
-has, and `null-bounds` what a change must gain, and what it must take off unseen days; `separating` asks what tests of
-the plant bring, and `thresholds` prints all rules. Everything is made afresh: an hour or so on two cores, most of it
-for simulated weeks.
+`same` does the like with greenhouses that have drifted a little since their calibration, and asks what has changed in
+them (`--foreign`: of another structure); `omission` takes terms out of the model before the calibration (with DATA: of
+the public logs) and asks the calibration log for them; `real` diagnoses the public logs, `real-faults` the same with
+faults put into them. `null-bounds` learns what a change must gain, and what it must take off unseen days, from seeds
+that no case has; `separating` asks what tests of the plant bring, and `thresholds` prints all rules. Everything is made
+afresh: an hour or so on two cores, most of it for simulated weeks.
 """
 
 from __future__ import annotations
@@ -21,7 +19,7 @@ import sys
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from benchmarks.diagnosis import matched, nuisance, null_bounds, omission, real, real_faults, rules, same, separating
+from benchmarks.diagnosis import null_bounds, omission, real, real_faults, rules, same, separating
 from benchmarks.diagnosis.cases import SEASONS, draw
 from benchmarks.diagnosis.greenhouses import of_seasons, others
 from benchmarks.diagnosis.logs import built_in, reference, simulated_cases
@@ -33,9 +31,6 @@ WHAT = (
     "tuning",
     "others",
     "transferred",
-    "matched",
-    "nuisance",
-    "rules",
     "thresholds",
     "same",
     "omission",
@@ -60,7 +55,6 @@ def main() -> int:
     parser.add_argument("--foreign", action="store_true", help="of `same`: greenhouses of another structure")
     parser.add_argument("--compartment", default="", help="of `real`: those whose name has this in it (default: all)")
     parser.add_argument("--withheld-only", action="store_true", help="of `real`: leave out built-in bundle and placebo")
-    parser.add_argument("--history-only", action="store_true", help="of `same`: leave out what is known in general")
     parser.add_argument("--days", type=int, default=28)
     parser.add_argument(
         "--season", action="append", choices=tuple(SEASONS), help="default: winter and spring; of `same` all"
@@ -73,14 +67,8 @@ def main() -> int:
         return real.main(options.data, options.compartment, withheld_only=options.withheld_only)
     if options.what == "real-faults":
         return real_faults.main(options.data, options.compartment, options.processes)
-    if options.what == "matched":
-        return matched.main(options.processes)
-    if options.what == "nuisance":
-        return nuisance.main(options.processes)
     if options.what == "null-bounds":
         return null_bounds.main(options.processes)
-    if options.what == "rules":
-        return rules.main(options.processes)
     if options.what == "thresholds":
         return rules.show()
     if options.what == "separating":

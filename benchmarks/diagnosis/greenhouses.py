@@ -14,9 +14,8 @@ from igrow.core.greenhouse.weather import WeatherClimate
 from igrow.core.site import Crop, Greenhouse, Lamps, Site
 from igrow.core.telemetry import Telemetry
 
-OTHERS_SEED, LEARNING_SEED, PLACES_SEED = 60_000, 80_000, 90_000
-"""Of greenhouses that cases are drawn for, of those that the nuisance subspace is learned from, and of places at which
-it is learned how the built-in bundle fares."""
+OTHERS_SEED = 60_000
+"""Of other greenhouses that cases are drawn for."""
 OTHERS_SPREAD = 0.25
 """How far other greenhouses lie from the usual one in each of their parameters, relative."""
 STANDING = Crop(planting_date=datetime.date(2019, 11, 1))
@@ -65,19 +64,6 @@ def others(count: int, first: int = OTHERS_SEED) -> dict[str, VirtualGreenhouse]
         name = f"greenhouse-{number}"
         greenhouses[name] = VirtualGreenhouse(site_of(name, plant), plant, day, first + 500 + number)
     return greenhouses
-
-
-def neighbours(greenhouse: VirtualGreenhouse, count: int) -> list[VirtualGreenhouse]:
-    """Draw greenhouses beside one: as different as those elsewhere are, under the same sun, lit if it is."""
-    usual = GreenhouseParameters(latitude=greenhouse.plant.latitude, lamp_capacity=greenhouse.plant.lamp_capacity)
-    found = []
-    for number in range(count):
-        seed = greenhouse.seed + 1000 * (1 + number)
-        plant = usual.varied(np.random.default_rng(seed), OTHERS_SPREAD)
-        found.append(
-            VirtualGreenhouse(site_of(f"{greenhouse.site.name}-{number}", plant), plant, greenhouse.start, seed)
-        )
-    return found
 
 
 def site_of(name: str, plant: Plant) -> Site:

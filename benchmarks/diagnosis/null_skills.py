@@ -23,7 +23,7 @@ from igrow.trainer.diagnosis import cross_validation, null_gains, unexplained
 from igrow.trainer.diagnosis.candidates import Pattern
 from igrow.trainer.diagnosis.cross_validation import CrossValidated, cross_validated
 from igrow.trainer.diagnosis.null_gains import NullGains
-from igrow.trainer.diagnosis.rounds import Change, search_of
+from igrow.trainer.diagnosis.rounds import search_of
 from igrow.trainer.diagnosis.rules import DEFAULT
 
 FALSE_CLAIMS = 0.02
@@ -49,9 +49,7 @@ def told(job: Later) -> Told:
     reference, case, _ = job
     site, rng, log = reference.greenhouse.site, np.random.default_rng(0), circumstances(job)
     knowledge, rules = log.knowledge, log.rules
-    search = search_of(log.completed.days, site, knowledge, log.not_asked, rules, None, None)
-    assert isinstance(search, Change)
-    design = search.resolved()
+    design = search_of(log.completed.days, site, knowledge, log.not_asked, rules).design(())
     by_physics = knowledge.by_physics(rules)
     effects = _ranked(cross_validated(design, by_physics, cross_validation.promising(design, rng)))
     patterns: dict[str, float] = {}

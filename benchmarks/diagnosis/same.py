@@ -1,9 +1,8 @@
 """The same greenhouse later: what has changed in it since its calibration.
 
 Every greenhouse is calibrated on eight weeks of its own. Then its crop has grown on, each of its parameters has drifted
-by a little, and in some cases its cover was cleaned or its disturbances are others: nothing of that is a finding. Each
-log is diagnosed twice, by the greenhouse's history and by what greenhouses show in general. Greenhouses stand in
-nurseries, one a season, and have seeds that nothing was learned or tuned on.
+by a little, and in some cases its cover was cleaned or its disturbances are others: nothing of that is a finding.
+Greenhouses stand in nurseries, one a season, and have seeds that nothing was learned or tuned on.
 """
 
 from __future__ import annotations
@@ -13,8 +12,7 @@ import json
 import sys
 from argparse import Namespace
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, replace
-from functools import partial
+from dataclasses import asdict
 
 import numpy as np
 
@@ -27,7 +25,6 @@ from benchmarks.jobs import Jobs
 from igrow.core.effects import EFFECTS
 from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
 from igrow.core.telemetry import Telemetry
-from igrow.trainer.diagnosis import DEFAULT
 from igrow.trainer.diagnosis.null_gains import read_null_gains
 
 CASES, DAYS = 60, 28
@@ -45,7 +42,6 @@ GROUPS = (
 """Group, ENR and share of the cases."""
 MATTERS = 1.1
 """Times the error of a model with the true cause that a recalibrated one makes, from which on the cause matters."""
-RULES = {"history": replace(DEFAULT, history=True), "in general": replace(DEFAULT, history=False)}
 
 
 def draw(kind: str, first: int, count: int, units: Mapping[str, Mapping[str, float]]) -> list[Case]:
@@ -168,47 +164,39 @@ def prepared(job: tuple[str, str, int, int, int, bool]) -> list[tuple[Case, Tele
     ]
 
 
-def _judge(job: tuple[Case, Telemetry, Reference], names: Sequence[str]) -> dict[str, Outcome]:
+def _judge(job: tuple[Case, Telemetry, Reference]) -> Outcome:
     case, log, known = job
-    return {name: judge(case, log, known, later(known.greenhouse, case), RULES[name]) for name in names}
+    return judge(case, log, known, later(known.greenhouse, case))
 
 
 def main(options: Namespace) -> int:
-    """Print both tables side by side."""
+    """Print the table."""
     kind = "tuning" if options.tuning else "scoring"
     seasons = options.season or list(SEASONS)
     greenhouses, count = options.greenhouses or GREENHOUSES, (options.cases or CASES) // len(seasons)
-    names = ["history"] if options.history_only else list(RULES)
-    outcomes: list[dict[str, Outcome]] = []
+    outcomes: list[Outcome] = []
     with Jobs("diagnosis foreign" if options.foreign else "diagnosis same", options.processes) as jobs:
         wanted = [(kind, season, greenhouses, count, options.days, options.foreign) for season in seasons]
         cases = [case for own in jobs.each(prepared, wanted) for case in own]
-        for number, one in enumerate(jobs.each(partial(_judge, names=names), cases), 1):
+        for number, one in enumerate(jobs.each(_judge, cases), 1):
             outcomes.append(one)
-            case = one["history"].case
-            said = "; ".join(f"{name}: {told.verdict} {told.found}" for name, told in one.items())
-            where = f"{case.name} in {case.greenhouse}"
-            print(
-                f"{number} of {len(cases)}: {where} {case.causes} {case.size:g} -> {said}", file=sys.stderr, flush=True
-            )
+            case = one.case
+            said = f"{case.name} in {case.greenhouse} {case.causes} {case.size:g} -> {one.verdict} {one.found}"
+            print(f"{number} of {len(cases)}: {said}", file=sys.stderr, flush=True)
     if options.json:
-        lines = [json.dumps({name: asdict(told) for name, told in one.items()}) + "\n" for one in outcomes]
-        options.json.write_text("".join(lines), encoding="utf-8")
+        options.json.write_text("".join(json.dumps(asdict(one)) + "\n" for one in outcomes), encoding="utf-8")
     print(
         f"{len(outcomes)} logs of {greenhouses * len(seasons)} greenhouses ({', '.join(seasons)}), {options.days} days"
     )
-    tables = [table([one[name] for one in outcomes]) for name in names]
-    print(f"{'':50}" + "".join(f" {name:>11} {'cases':>5}" for name in names) + "  bound of the history")
-    for line in zip(*tables, strict=True):
-        figures = "".join(f" {figure:11.2f} {cases:5}" for _, figure, cases, _ in line)
-        print(f"{line[0][0]:50}{figures}  {line[0][3]}")
+    print(f"{'':64} {'figure':>8} {'cases':>6}  bound")
+    for what, figure, of, bound in table(outcomes):
+        print(f"{what:64} {figure:8.2f} {of:6}  {bound}")
     print()
-    print("by season, of the history: false claims; right first at ENR 1")
+    print("by season: false claims; right first at ENR 1")
     for season in seasons:
-        mine = [one["history"] for one in outcomes if one["history"].case.greenhouse.startswith(season)]
-        rows = table(mine)
+        mine = [one for one in outcomes if one.case.greenhouse.startswith(season)]
         nothing = [one for one in mine if one.case.group in {"nothing", "noise", "clean"}]
         false = sum(one.verdict != "nothing" for one in nothing)
-        right = next((figure, cases) for what, figure, cases, _ in rows if what == "right cause first, ENR 1")
+        right = next((figure, of) for what, figure, of, _ in table(mine) if what == "right cause first, ENR 1")
         print(f"  {season:8} {false} of {len(nothing)}; {right[0]:.2f} of {right[1]}")
     return 0

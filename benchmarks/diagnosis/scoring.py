@@ -22,18 +22,19 @@ from igrow.core.site import Site
 from igrow.core.sun import unix_seconds
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import prepare_log
-from igrow.trainer.diagnosis import DEFAULT, DecisionRules, compare, diagnose, linear, sensitivity
+from igrow.trainer.diagnosis import DEFAULT, change, diagnose, linear, sensitivity
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.evidence import Evidence, errors_with
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
 from igrow.trainer.diagnosis.linear import Term
+from igrow.trainer.diagnosis.null_gains import read_null_gains
 from igrow.trainer.diagnosis.result import Finding
 from igrow.trainer.diagnosis.sensitivity import Linearisation
 
 NOISE = {"air_temperature": 0.5, "air_humidity": 2.0, "air_co2": 35.0}
 """Scales under which errors of different quantities are added."""
 
-GAIN_CLASSES = (0.0, DEFAULT.least_gain, 30.0, 100.0, float("inf"))
+GAIN_CLASSES = (0.0, read_null_gains().least, 30.0, 100.0, float("inf"))
 """Classes of the log-likelihood that is to be expected of a cause; gains below the second are not named."""
 
 PLANT_PARAMETERS = {name: parameter for parameter, (_, names) in CHANGES.items() for name in names}
@@ -70,7 +71,7 @@ class Outcome:
     """Log-likelihood to be expected of a lone true cause on this log, were the model right but for it: what a search
     can see at best. None for nothing, pairs, beginnings and causes outside the catalogue."""
     known_gain: float | None
-    """The same were the parameters and the nuisance subspace known."""
+    """The same were everything else known."""
     seconds: float
 
 
@@ -85,7 +86,6 @@ def judge(
     telemetry: Telemetry,
     reference: Reference,
     plant: Plant,
-    rules: DecisionRules = DEFAULT,
 ) -> Outcome:
     """Diagnose one case and compare with the truth.
 
@@ -94,12 +94,11 @@ def judge(
         telemetry: its log.
         reference: the greenhouse that its model was calibrated on.
         plant: the greenhouse that the log is of.
-        rules: every threshold.
     """
     begun = time.perf_counter()
     site = reference.greenhouse.site
     log = prepare_log(telemetry, site)
-    diagnosis = diagnose(log, reference.model, without=case.without, rules=rules)
+    diagnosis = diagnose(log, reference.model, without=case.without)
     evidence = diagnosis.evidence
     seconds = time.perf_counter() - begun
     causes = [one for one in diagnosis.findings if one.effect in EFFECTS]
@@ -190,7 +189,7 @@ def true_changes(findings: Sequence[Finding], before: Plant, now: Plant) -> tupl
 def expected_gains(design: Design, case: Case, truth: Mapping[str, HiddenEffect]) -> tuple[float | None, float | None]:
     """Return half the squared size of a lone true cause over its standard deviation, under the noise that it leaves.
 
-    First with the parameters and the nuisance subspace integrated out, then as if they were known.
+    First with everything else that may be missing integrated out, then as if it were known.
     """
     if len(case.causes) != 1 or case.causes[0] not in EFFECTS or case.onset_day is not None:
         return None, None
@@ -205,7 +204,7 @@ def expected_gains(design: Design, case: Case, truth: Mapping[str, HiddenEffect]
         return None, None
     term = Term(min(own)[1])
     model = design.null_model().with_term(term)
-    grams = design.whitened(compare.profile(design, model).whitening).grams
+    grams = change.beside(design, model).grams
     size = float(truth[name].size or 0.0)
     free = float(linear.fit(grams, model).deviations[0])
     known = float(grams.products[grams.fit, term.column, term.column].sum())

@@ -117,7 +117,7 @@ def gain(one: Trial, season: Season) -> Gain:
     """Return what a log tells of its cause."""
     site, model = one.known.greenhouse.site, one.known.model
     days = log_days(prepare_log(season.measured, site), model)
-    design = search_of(days, site, knowledge_of(model, site, DEFAULT), frozenset(), DEFAULT, None, None).resolved()
+    design = search_of(days, site, knowledge_of(model, site, DEFAULT), frozenset(), DEFAULT).design(())
     truth = {effect.name: effect for effect in hidden(one.case, one.known.unit, one.known.greenhouse.start)}
     expected, _ = expected_gains(design, one.case, truth)
     null = linear.fit(design.grams, design.null_model())

@@ -128,8 +128,6 @@ class Manifest:
     """Name of the site on whose log they were fitted; empty where it was none."""
     alignment: float | None = None
     """Rows of the site's log by which its actuators are read ahead; None where that was not looked at."""
-    discrepancy: Mapping[str, float] = field(default_factory=dict)
-    """What the calibration could not explain on its own log: amplitude by key of an effect, a pattern, a parameter."""
     errors: tuple[HeldOutError, ...] = ()
     training_range: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """Smallest and largest value of each quantity that the simulator was fitted on."""

@@ -47,12 +47,19 @@ def manifest_from_json(text: str, *, where: str = "manifest.json") -> Manifest:
 
 
 def _upgraded(document: Json) -> Json:
-    """Return a document of format 1, which kept what the trainer knows among the runtime's settings, as format 2."""
-    settings = document.get("simulator") if isinstance(document, dict) and document.get("format_version") == 1 else None
+    """Return a document that an earlier igrow wrote as one of today's.
+
+    Format 1 kept what the trainer knows among the runtime's settings; and what a calibration could not explain was
+    amplitudes without their covariance, which nothing reads any more.
+    """
+    if not isinstance(document, dict):
+        return document
+    document = {name: value for name, value in document.items() if name != "discrepancy"}
+    settings = document.get("simulator") if document.get("format_version") == 1 else None
     if not isinstance(settings, dict):
         return document
     kept = {name: value for name, value in settings.items() if name not in ("known_misfit", "calibrated_on")}
-    known = {"discrepancy": settings.get("known_misfit", {})}
+    known: dict[str, Json] = {}
     if document.get("variant") == "hybrid":
         known["calibrated_on"] = settings.get("calibrated_on", document.get("site"))
     return document | known | {"simulator": kept, "format_version": 2}

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from benchmarks.diagnosis.greenhouses import neighbours, of_seasons, others
+from benchmarks.diagnosis.greenhouses import of_seasons, others
 
 
 def test_greenhouses_elsewhere_are_other_greenhouses_each_time_the_same() -> None:
@@ -21,18 +21,6 @@ def test_greenhouses_elsewhere_are_other_greenhouses_each_time_the_same() -> Non
         False,
         True,
     ]
-
-
-def test_neighbours_differ_under_one_sun_with_or_without_lamps() -> None:
-    for place in others(2).values():
-        some = neighbours(place, 3)
-        assert (
-            len({greenhouse.plant.leakage for greenhouse in some}) == len({greenhouse.seed for greenhouse in some}) == 3
-        )
-        for greenhouse in some:
-            assert (greenhouse.start, greenhouse.site.latitude) == (place.start, place.site.latitude)
-            assert (greenhouse.site.greenhouse.lamps is None) == (place.site.greenhouse.lamps is None)
-            assert greenhouse.site.greenhouse.mean_height == np.mean(greenhouse.plant.air_height)
 
 
 def test_the_seasons_share_one_greenhouse() -> None:

@@ -176,16 +176,19 @@ def test_a_manifest_of_the_first_format_is_read_with_what_it_kept_among_the_sett
     """Such bundles lie in exchanges, and on gateways."""
     bundle = write_tiny_bundle(tmp_path / "bundle")
     document = json.loads((bundle.folder / "manifest.json").read_text())
-    for name in ("calibrated_on", "alignment", "discrepancy"):
+    for name in ("calibrated_on", "alignment"):
         del document[name]
     document["format_version"] = 1
     document["simulator"] = {"latitude": 52.0, "known_misfit": {"heat:night": 1.5}, "calibrated_on": "there"}
     manifest = manifest_from_json(json.dumps(document))
     assert manifest.calibrated_on == "there"
-    assert manifest.discrepancy == {"heat:night": 1.5}
     assert manifest.alignment is None
     assert manifest.simulator == {"latitude": 52.0}
     del document["simulator"]["calibrated_on"]
     assert manifest_from_json(json.dumps(document)).calibrated_on == manifest.site
+    # Amplitudes without their covariance, of before the history: nothing reads them any more.
+    assert manifest_from_json(json.dumps(document | {"discrepancy": {"heat:night": 1.5}})).simulator == {
+        "latitude": 52.0
+    }
     # Written again, it is of the present format.
     assert manifest_from_json(manifest_to_json(manifest)) == manifest

@@ -11,10 +11,13 @@ from igrow.core.arrays import Floats
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.data.splits import DaySplit
 from igrow.trainer.diagnosis import linear, noise
+from igrow.trainer.diagnosis.balances import Balances
 from igrow.trainer.diagnosis.candidates import Candidate, Pattern
-from igrow.trainer.diagnosis.design import Block, Design
+from igrow.trainer.diagnosis.design import Block, Design, History
+from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX
 from igrow.trainer.diagnosis.linear import DailyGrams
 from igrow.trainer.diagnosis.noise import NoiseFilter, Whitening
+from igrow.trainer.diagnosis.null_gains import NullGains
 from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules
 from igrow.trainer.diagnosis.sensitivity import DayRuns, Linearisation
 from igrow.trainer.fit.gaussian import Gaussian
@@ -23,6 +26,8 @@ BALANCES, HOURS = 2, 24
 START = np.datetime64("2020-03-01T00:00:00", "s")
 PLAIN = NoiseFilter(np.ones(1), np.ones(1), (2.0, 4.5, 0.5, 1.75, 3.0))
 """Leaves errors as they are."""
+NEVER, LEAST = 1e-4, 8.0
+"""Prior deviation of what was not there before, and gain of a change."""
 
 
 @dataclass(frozen=True)
@@ -46,32 +51,30 @@ def make_design(
     days: int = 32,
     seed: int = 0,
     rules: DecisionRules = DEFAULT,
-    discrepancy: bool = False,
     sigma: float = 1.0,
 ) -> Design:
     """Return a design whose errors are sigma times white noise less what is hidden.
 
-    Parameters have the prior N(0, 1) and the design stands at 0; every column is white and of unit size.
+    Parameters have the prior N(0, 1) and the design stands at 0, effects and patterns were not there before; every
+    column is white and of unit size.
     """
     truth = truth or Truth({}, {})
     rng = np.random.default_rng(seed)
     keys, whens = [one.key for one in candidates], [one.key for one in patterns]
-    counts = {
-        "residual": 1, "parameter": parameters, "effect": len(keys), "ageing": len(keys), "pattern": len(whens),
-        "discrepancy": int(discrepancy), "nuisance": 0, "drift": 0,
-    }  # fmt: skip
-    values = rng.normal(size=(sum(counts.values()), BALANCES, days, HOURS))
-    names = [f"p{number}" for number in range(parameters)]
-    labels = {"residual": ["residual"], "parameter": names, "effect": keys, "ageing": keys, "pattern": whens}
+    labels = {
+        "residual": ["residual"],
+        "parameter": [f"p{number}" for number in range(parameters)],
+        "effect": keys,
+        "ageing": keys,
+        "pattern": whens,
+    }
+    names = labels["parameter"]
+    values = rng.normal(size=(sum(map(len, labels.values())), BALANCES, days, HOURS))
     blocks: dict[str, Block] = {}
     place = 0
-    for name, count in counts.items():
-        precision = None if name in {"residual", "effect", "ageing", "pattern"} else np.eye(count)
-        mean = np.ones(count) if name == "discrepancy" else np.zeros(count)
-        blocks[name] = Block(
-            tuple(labels.get(name, ["calibration"] * count)), range(place, place + count), mean, precision
-        )
-        place += count
+    for name, own in labels.items():
+        blocks[name] = Block(tuple(own), range(place, place + len(own)))
+        place += len(own)
     values[list(blocks["ageing"].columns)] = 0.0
     begun = (np.arange(days) >= truth.onset)[:, None]
     values[0] *= sigma
@@ -83,6 +86,9 @@ def make_design(
         for label, amplitude in hidden.items():
             column = blocks[name].columns[blocks[name].labels.index(label)]
             values[0] -= amplitude * values[column] * (True if always else begun)
+    before = np.array([1.0] * parameters + [NEVER] * (len(keys) + len(whens)))
+    every = (*(PARAMETER_PREFIX + name for name in names), *keys, *whens)
+    known = Gaussian(every, np.zeros(len(every)), np.diag(before**2))
     observed = np.ones((days, HOURS), dtype=bool)
     fit = np.isin(np.arange(days) % 8, (3, 4), invert=True)
     whitening = Whitening((PLAIN,) * BALANCES, np.eye(BALANCES) / sigma, observed.astype(np.float64))
@@ -92,16 +98,15 @@ def make_design(
         split=DaySplit(np.repeat(np.arange(days), HOURS), fit),
         prior=Gaussian(tuple(names), np.zeros(parameters), np.eye(parameters)),
         rules=rules,
-        interval=3600.0,
+        balances=Balances(tuple(range(BALANCES)), observed),
         blocks=blocks,
         values=values,
-        observed=observed,
         whitening=whitening,
         grams=DailyGrams(products, fit),
         candidates=tuple(candidates),
         patterns=tuple(patterns),
         untestable=(),
-        null_amplitude={},
+        history=History(known, np.zeros_like(values[0]), (), {}, null_gains=NullGains({}, LEAST)),
     )
 
 
@@ -111,7 +116,7 @@ def in_fitted_noise(design: Design) -> Design:
 
 
 def with_column(design: Design, label: str, values: Floats) -> Design:
-    """Return the design with one column, (b, r, intervals), replaced."""
+    """Return the design with one column, (b, r, steps), replaced."""
     (column,) = design.columns(label)
     changed = design.values.copy()
     changed[column] = values

@@ -14,7 +14,7 @@ from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.trainer.data.splits import folds
 from igrow.trainer.diagnosis import DEFAULT, change, cross_validation, linear, rounds, search, unexplained
 from igrow.trainer.diagnosis.candidates import Candidate, Pattern
-from igrow.trainer.diagnosis.compare import Contender, Round
+from igrow.trainer.diagnosis.change import Round
 from igrow.trainer.diagnosis.cross_validation import CrossValidated, cross_validated
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, knowledge_of
@@ -86,7 +86,7 @@ def by_least_squares(design: Design, others: Floats, precision: Floats, column: 
     """Return the falls of the squared error of each day, with a prior as rows of the system."""
     errors = design.values[0]
     scale = np.sqrt(np.mean(errors**2, axis=(1, 2)))[:, None, None]
-    weight = np.sqrt(design.interval / CORRELATION_TIME)
+    weight = np.sqrt(design.line.record.step / CORRELATION_TIME)
     root = np.linalg.cholesky(precision).T
     squares = np.zeros((2, len(errors), design.split.days))
     for fold in folds(design.split):
@@ -137,9 +137,7 @@ def test_an_effect_is_not_fitted_beyond_its_bounds() -> None:
 def test_the_change_that_unseen_days_bear_out_is_found(size: float, named: str) -> None:
     design = with_parameters(Truth({"lamp_heat": size}, {}), 1)
     found = cross_validation.find(design, BY_PHYSICS, rng())
-    assert ("" if found is None or found.cause is None else found.cause.hypothesis.effect) == named
-    if named:
-        assert found is not None and found.cause is not None and found.cause.bootstrap_p == 0.0
+    assert ("" if found is None or found.cause is None else found.cause.effect) == named
 
 
 @pytest.mark.parametrize(("largest", "told"), [(0.5, False), (0.12, False), (0.09, True)])
@@ -178,7 +176,7 @@ def test_beside_a_cause_that_was_found_before_unseen_days_are_asked_with_it(monk
     monkeypatch.setattr(rounds, "changed", lambda *_, **__: Round(design, null, null, None, ()))
     monkeypatch.setattr(cross_validation, "find", lambda design, *_: asked.append(design))
     searched = change_of(design)
-    beside = replace(design, interval=900.0)
+    beside = replace(design, untestable=("co2_offset",))
     found = [cast(Any, SimpleNamespace(term=ActiveTerm("co2_offset", 80.0, {}), gain=50.0))]
     assert searched.judge(design, [], rng(), causes=True).cause is None
     assert searched.judge(beside, found, rng(), causes=True).cause is None
@@ -195,7 +193,7 @@ def test_where_days_unmake_what_steps_tell_another_is_asked_of_them(
     null = linear.fit(design.grams, design.null_model())
     nothing = Round(design, null, null, None, ())
     calls: list[Design] = []
-    told = replace(nothing, cause=contender(hypothesis("first")))
+    told = replace(nothing, cause=hypothesis("first"))
     monkeypatch.setattr(rounds, "changed", lambda *_, **__: told)
     monkeypatch.setattr(cross_validation, "settled", lambda *_: nothing)
     monkeypatch.setattr(cross_validation, "find", lambda design, *_: calls.append(design))
@@ -204,18 +202,17 @@ def test_where_days_unmake_what_steps_tell_another_is_asked_of_them(
     assert len(calls) == asked
     pattern = hypothesis("pattern")
     monkeypatch.setattr(unexplained, "find", lambda *_: (pattern,))
-    monkeypatch.setattr(rounds.Change, "resolved", lambda _: design)
+    monkeypatch.setattr(rounds.Search, "design", lambda *_: design)
     assert searched.unexplained(rng()) == (pattern,) * asked
 
 
-def change_of(design: Design, *, by_days: bool = True) -> rounds.Change:
+def change_of(design: Design, *, by_days: bool = True) -> rounds.Search:
     """Return a search for changes that has been laid out as a design."""
     unasked = cast(Any, None)
     known = knowledge_of(model_in_force(), SITE, DEFAULT)
-    return rounds.Change(
-        unasked, SITE, known, frozenset(), DEFAULT, unasked, unasked, design, np.zeros(0), NullGains({}, 8.0),
-        by_days=by_days,
-    )  # fmt: skip
+    return rounds.Search(
+        unasked, SITE, known, frozenset(), DEFAULT, unasked, design, np.zeros(0), NullGains({}, 8.0), by_days=by_days
+    )
 
 
 @pytest.mark.parametrize(
@@ -284,7 +281,7 @@ def test_a_pattern_may_outdo_a_name_on_unseen_days(
         cross_validation, "cross_validated", lambda _, __, asked: [CrossValidated(one, falls[id(one)]) for one in asked]
     )
     monkeypatch.setattr(change, "proven_gain", lambda *_: proven)
-    judged = Round(design, null, null, contender(first), ())
+    judged = Round(design, null, null, first, ())
     found = cross_validation.with_what_outdoes_it(design, BY_PHYSICS, judged, rng())
     assert found == replace(judged, outdone_by=course if outdone else None)
 
@@ -309,20 +306,14 @@ def settled_as(
     assert plain.history is not None
     design = replace(plain, history=replace(plain.history, null_gains=NullGains({"other": 10.0}, 8.0)))
     null, first = linear.fit(design.grams, design.null_model()), hypothesis("first")
-    judged = Round(design, null, null, contender(first), ())
+    judged = Round(design, null, null, first, ())
     asked = [CrossValidated(one, np.array([own, own])) for one, own in zip((first, other), falls, strict=True)]
     monkeypatch.setattr(cross_validation, "rivals", lambda *_: [other])
     monkeypatch.setattr(cross_validation, "cross_validated", lambda *_: asked)
     monkeypatch.setattr(change, "proven_gain", lambda *_: proven)
-    monkeypatch.setattr(change, "round_of", lambda design, null, one, _: Round(design, null, null, contender(one), ()))
+    monkeypatch.setattr(change, "round_of", lambda design, null, one: Round(design, null, null, one, ()))
     found = cross_validation.settled(design, BY_PHYSICS, judged, rng())
-    if found.cause is not None and proven < 10.0 and found.cause.hypothesis.effect == "other":
-        assert found.cause.bootstrap_p == 0.0
-    return "" if found.cause is None else found.cause.hypothesis.effect
-
-
-def contender(one: Hypothesis) -> Contender:
-    return Contender(one, one.gain, cast(Any, None), 0.3)
+    return "" if found.cause is None else found.cause.effect
 
 
 @pytest.mark.parametrize("known", [read_null_skills(), read_null_pattern_skills()])

@@ -25,8 +25,6 @@ from igrow.trainer.diagnosis.parameter_or_causes import predicts_better
 from igrow.trainer.diagnosis.plots import needed
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.fit import FittedModel
-from igrow.trainer.fit.discrepancy import Discrepancy
-from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.report import render_report, write_diagnosis
 from tests.diagnosis.conftest import DAYS, STEP, greenhouse_log, model_in_force
 from tests.made_once import made_once
@@ -71,7 +69,6 @@ def test_a_parameter_that_unseen_days_do_not_bear_out_takes_no_cause_with_it(
     share = Estimate(-0.4, -0.5, -0.3, "1")
     leading = ParameterChange("transmissivity", share, None, 0.001, ("transmissivity",), leads=True)
     monkeypatch.setattr(rounds.Search, "changed_parameter", lambda *_: leading)
-    monkeypatch.setattr(rounds.Change, "changed_parameter", lambda *_: leading)
     module = sys.modules["igrow.trainer.diagnosis.diagnose"]  # its function has its name
     monkeypatch.setattr(module, "with_parameter", lambda _days, _knowledge, result, *_: result)
     told = diagnose(leaky_log, model_in_force())
@@ -311,19 +308,13 @@ def test_a_correction_that_makes_a_quantity_worse_says_so(leak: Diagnosis) -> No
 
 
 def test_a_long_log_is_asked_in_equal_parts_the_oldest_first(quiet_log: Log) -> None:
-    middle = quiet_log.telemetry.time[0] - np.timedelta64(80, "D")
-    known = Discrepancy({}, Gaussian((), np.zeros(0), np.zeros((0, 0))), {}, STEP, {}, middle)
-    model = model_in_force()
-    remembering = replace(model, history=known)
     hours = quiet_log.telemetry.time[0] + np.arange(84 * 24) * np.timedelta64(1, "h")
     long = replace(quiet_log, telemetry=Telemetry(hours, {}))
-    assert weeks_in_turn(long, model, DEFAULT) == [long]
-    assert weeks_in_turn(long, replace(remembering, calibrated_on="another"), DEFAULT) == [long]
-    assert weeks_in_turn(quiet_log, remembering, DEFAULT) == [quiet_log]
-    parts = weeks_in_turn(long, remembering, DEFAULT)
+    assert weeks_in_turn(quiet_log, DEFAULT) == [quiet_log]
+    parts = weeks_in_turn(long, DEFAULT)
     assert np.array_equal(np.concatenate([one.telemetry.time for one in parts]), hours)
     assert [round(one.days) for one in parts] == [28, 28, 28]
-    assert len(weeks_in_turn(long.select(end=hours[43 * 24]), remembering, DEFAULT)) == 2
+    assert len(weeks_in_turn(long.select(end=hours[43 * 24]), DEFAULT)) == 2
 
 
 @pytest.mark.slow

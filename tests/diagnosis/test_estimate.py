@@ -9,9 +9,9 @@ import pytest
 
 from igrow.core.bundle import Estimate
 from igrow.core.effects import EFFECTS
-from igrow.trainer.diagnosis import compare, linear, search
+from igrow.trainer.diagnosis import linear, search
 from igrow.trainer.diagnosis.candidates import Candidate
-from igrow.trainer.diagnosis.compare import Contender, Profile, Round
+from igrow.trainer.diagnosis.change import Round, changed
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.estimate import Estimated, estimate, normal_quantile, with_refitted, within_bounds
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
@@ -26,14 +26,14 @@ DAY = np.timedelta64(1, "D")
 
 def estimated(design: Design) -> Estimated:
     rng = np.random.default_rng(0)
-    found = estimate(compare.compare(in_fitted_noise(design), 0.0, rng), rng)
+    found = estimate(changed(in_fitted_noise(design), 0.0, rng), rng)
     assert found is not None
     return found
 
 
 def test_where_nothing_is_found_there_is_nothing_to_estimate() -> None:
     rng = np.random.default_rng(0)
-    assert estimate(compare.compare(in_fitted_noise(make_design()), 0.0, rng), rng) is None
+    assert estimate(changed(in_fitted_noise(make_design()), 0.0, rng), rng) is None
 
 
 def test_the_interval_of_a_size_is_that_of_least_squares_inflated() -> None:
@@ -73,8 +73,7 @@ def test_what_gains_next_to_nothing_is_not_as_good_as_a_cause_that_gains_little(
     assert DEFAULT.least_unproven_change < cause.gain < DEFAULT.confounded_gain
     assert [one.effect for one in scored if 0.0 < one.gain < DEFAULT.least_unproven_change]
     named = linear.fit(design.grams, null.model.with_term(cause.term))
-    profiled = Profile(named.model, (), (), design.whitening, -named.day_losses, 0.0)
-    found = estimate(Round(design, null, named, Contender(cause, cause.gain, profiled, 0.0), ()), rng)
+    found = estimate(Round(design, null, named, cause, ()), rng)
     assert found is not None and found.confounded == ("lamp_heat",)
 
 

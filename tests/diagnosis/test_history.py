@@ -173,10 +173,10 @@ def test_a_change_beyond_the_history_is_named_and_its_own_gain_is_taken_off() ->
     # Far beyond what the history leaves open.
     truth = Truth({"lamp_heat": 0.5}, {})
     judged = changed(with_history(make_design(truth, seed=5), 0.01), 0.0, np.random.default_rng(RNG_SEED))
-    assert judged.cause is not None and judged.cause.hypothesis.effect == "lamp_heat"
+    assert judged.cause is not None and judged.cause.effect == "lamp_heat"
     assert not judged.patterns
-    assert abs(judged.cause.profile.amplitudes[0] - 0.5) < 4.0 * judged.cause.profile.deviations[0]
-    found = judged.cause.hypothesis
+    assert abs(judged.named.amplitudes[0] - 0.5) < 4.0 * judged.named.deviations[0]
+    found = judged.cause
     told = estimate(judged, np.random.default_rng(RNG_SEED))
     assert told is not None and told.over_null == pytest.approx(proven_gain(judged.design, found) / BARE.least)
     own = with_history(make_design(truth, seed=5), 0.01, lamp_heat=found.gain - 5.0)

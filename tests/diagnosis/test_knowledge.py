@@ -14,7 +14,6 @@ from igrow.core.site import Greenhouse, Site
 from igrow.trainer.cli import main
 from igrow.trainer.data import Log
 from igrow.trainer.diagnosis.knowledge import (
-    PARAMETER_PREFIX,
     ActiveTerm,
     Knowledge,
     activate,
@@ -49,31 +48,21 @@ def test_of_a_transferred_model_less_is_known_and_its_correlations_stay() -> Non
     model = model_in_force()
     covariance = model.posterior.covariance.copy()
     covariance[0, 1] = covariance[1, 0] = 0.9 * np.sqrt(covariance[0, 0] * covariance[1, 1])
-    transferred = replace(
-        model, posterior=replace(model.posterior, covariance=covariance), calibrated_on="there", discrepancy={"x": 1.0}
-    )
+    transferred = replace(model, posterior=replace(model.posterior, covariance=covariance), calibrated_on="there")
     known = knowledge_of(transferred, SITE, DEFAULT)
     change = drift(model.posterior.values, DEFAULT.transferred_drift, DEFAULT)
     exact = np.sqrt(knowledge_of(model, SITE, DEFAULT).prior.standard_deviation ** 2 + change**2)
     np.testing.assert_allclose(known.prior.standard_deviation, exact)
     assert known.prior.covariance[0, 1] == pytest.approx(covariance[0, 1])
-    # What it missed there says nothing here.
     assert known.transferred
-    assert known.discrepancy == {}
+    # What physics lets change says nothing of a greenhouse that is another one.
+    assert known.by_physics(DEFAULT) is known.prior
 
 
 def test_a_small_parameter_drifts_by_a_share_of_its_usual_value() -> None:
     (moved,) = drift({"leakage_wind": 0.0}, 0.1, DEFAULT)
     (usual,) = drift({"leakage_wind": model_in_force().posterior.values["leakage_wind"]}, 0.1, DEFAULT)
     assert moved == pytest.approx(DEFAULT.least_drift_share * usual, rel=0.05)
-
-
-def test_the_search_begins_where_the_diagnosis_of_the_calibration_log_put_the_parameters() -> None:
-    model = replace(model_in_force(), discrepancy={PARAMETER_PREFIX + "leakage_wind": 0.01, "co2_offset": 3.0})
-    known = knowledge_of(model, SITE, DEFAULT)
-    assert known.short_prior.values["leakage_wind"] == pytest.approx(known.prior.values["leakage_wind"] + 0.01)
-    assert known.short_prior.values["transmissivity"] == known.prior.values["transmissivity"]
-    assert not known.transferred
 
 
 def test_values_beyond_their_bounds_are_brought_back() -> None:

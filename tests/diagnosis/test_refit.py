@@ -9,12 +9,21 @@ from igrow.core.effects import EFFECTS
 from igrow.trainer.data import Log
 from igrow.trainer.diagnosis import linear
 from igrow.trainer.diagnosis.design import Design
-from igrow.trainer.diagnosis.knowledge import ActiveTerm
+from igrow.trainer.diagnosis.freerun import log_days
+from igrow.trainer.diagnosis.knowledge import ActiveTerm, knowledge_of
 from igrow.trainer.diagnosis.linear import Term
 from igrow.trainer.diagnosis.refit import Refitted, refit, twins_held
+from igrow.trainer.diagnosis.rounds import search_of
+from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.fit.gaussian import Gaussian
-from tests.diagnosis.conftest import DAYS, STEP, greenhouse_log
-from tests.diagnosis.test_design import prepared
+from tests.diagnosis.conftest import DAYS, STEP, greenhouse_log, model_in_force
+from tests.virtual_log import SITE
+
+
+def prepared(log: Log) -> Design:
+    """Return the design of a log of which no calibration has told anything."""
+    model = model_in_force()
+    return search_of(log_days(log, model), SITE, knowledge_of(model, SITE, DEFAULT), frozenset(), DEFAULT).design(())
 
 
 def together(design: Design, sizes: dict[str, float]) -> list[Refitted]:

@@ -12,7 +12,7 @@ import pytest
 from igrow.core.bundle import Estimate
 from igrow.trainer.diagnosis import DEFAULT, cross_validation, history, rounds
 from igrow.trainer.diagnosis.candidates import Candidate, Pattern
-from igrow.trainer.diagnosis.compare import Round
+from igrow.trainer.diagnosis.change import Round
 from igrow.trainer.diagnosis.estimate import Estimated
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
 from igrow.trainer.diagnosis.linear import Term
@@ -69,17 +69,16 @@ def test_beside_one_that_adds_nothing_another_is_looked_for(monkeypatch: pytest.
     search, judged = searched([(0.1, 0.01), (0.1, 0.06)], monkeypatch)
     asked: list[frozenset[str]] = []
 
-    def judge(one: rounds.Change, _design: Any, found: Sequence[Estimated], *_rest: Any, **_causes: Any) -> Any:
+    def judge(one: rounds.Search, _design: Any, found: Sequence[Estimated], *_rest: Any, **_causes: Any) -> Any:
         asked.append(one.without)
         rest = [name for name in ("rain_cooling", "lamp_heat", "night_transpiration") if name not in one.without]
         return replace(judged, patterns=cast(Any, tuple(rest[len(found) : len(found) + 1])))
 
-    monkeypatch.setattr(rounds.Change, "judge", judge)
-    for name in ("resolved", "design"):
-        monkeypatch.setattr(rounds.Change, name, lambda *_asked: judged.design)
+    monkeypatch.setattr(rounds.Search, "judge", judge)
+    monkeypatch.setattr(rounds.Search, "design", lambda *_asked: judged.design)
     monkeypatch.setattr(rounds, "estimate", lambda one, _rng: of(*one.patterns) if one.patterns else None)
     monkeypatch.setattr(
-        rounds.Change,
+        rounds.Search,
         "joined_by",
         lambda _one, new, _round, found, _led: [] if new.effect == "lamp_heat" else [*found, new],
     )
@@ -96,18 +95,17 @@ def test_beside_what_no_cause_explains_causes_are_looked_for(monkeypatch: pytest
     )
     rounds_told: list[Round] = []
 
-    def judge(one: rounds.Change, _design: Any, found: Sequence[Estimated], *_rest: Any, **_causes: Any) -> Round:
+    def judge(one: rounds.Search, _design: Any, found: Sequence[Estimated], *_rest: Any, **_causes: Any) -> Round:
         rest = [pattern for pattern in (dawn, dusk) if pattern not in one.unnamed]
         named = replace(judged, cause=cast(Any, "co2_offset" if not (rest or found) else None))
         rounds_told.append(replace(named, patterns=tuple(rest[:1])))
         assert one.is_unlike == bool(one.unnamed)
         return rounds_told[-1]
 
-    monkeypatch.setattr(rounds.Change, "judge", judge)
-    for name in ("resolved", "design"):
-        monkeypatch.setattr(rounds.Change, name, lambda *_asked: judged.design)
+    monkeypatch.setattr(rounds.Search, "judge", judge)
+    monkeypatch.setattr(rounds.Search, "design", lambda *_asked: judged.design)
     monkeypatch.setattr(rounds, "estimate", lambda one, _rng: of(one.cause) if one.cause else None)
-    monkeypatch.setattr(rounds.Change, "joined_by", lambda _one, new, _round, found, _led: [*found, new])
+    monkeypatch.setattr(rounds.Search, "joined_by", lambda _one, new, _round, found, _led: [*found, new])
     first, last, found = search.run(np.random.default_rng(0))
     assert (first, effects(found), last.patterns) == (rounds_told[0], ["co2_offset"], (dawn, dusk))
     assert len(rounds_told) == 4
@@ -125,7 +123,7 @@ def test_where_much_is_unexplained_a_change_must_gain_far_more(monkeypatch: pyte
     dawn = replace(of("").hypothesis, cause=Pattern("co2", "06 to 08 h", ("hour",)))
     beside = search.beside([dawn])
     assert beside is not None and search.beside([]) is None
-    search.design([], 300.0), beside.design([], 300.0)
+    search.design(()), beside.design(())
     assert asked == [(8.0, set()), (8.0 * DEFAULT.far_over_null, {"co2:06 to 08 h"})]
 
 
@@ -147,7 +145,7 @@ def test_beside_the_last_pattern_no_further_is_asked(monkeypatch: pytest.MonkeyP
     assert asked == [True] * DEFAULT.most_patterns + [False]
 
 
-def searched(sizes: Sequence[tuple[float, float]], monkeypatch: pytest.MonkeyPatch) -> tuple[rounds.Change, Round]:
+def searched(sizes: Sequence[tuple[float, float]], monkeypatch: pytest.MonkeyPatch) -> tuple[rounds.Search, Round]:
     """Return a search whose refit gives two causes these sizes and standard errors, and one alone the new one's."""
     design = with_parameters(Truth({}, {}), 1)
 

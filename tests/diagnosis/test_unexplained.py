@@ -17,7 +17,7 @@ from igrow.trainer.diagnosis.correction import correct, with_unexplained
 from igrow.trainer.diagnosis.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import knowledge_of
 from igrow.trainer.diagnosis.null_gains import NullGains
-from igrow.trainer.diagnosis.rounds import Change, search_of
+from igrow.trainer.diagnosis.rounds import Search, search_of
 from igrow.trainer.fit import FittedModel
 from tests.diagnosis.known_greenhouse import DAYS, STEP, later, weeks
 from tests.virtual_log import SITE
@@ -29,11 +29,9 @@ WEEKDAY = (5 + np.floor(HOURS / 24.0)) % 7
 """The log begins on a Saturday."""
 
 
-def search(log: Log, model: FittedModel) -> Change:
+def search(log: Log, model: FittedModel) -> Search:
     known = knowledge_of(model, SITE, DEFAULT)
-    found = search_of(log_days(log, model), SITE, known, frozenset(), DEFAULT, None, None)
-    assert isinstance(found, Change)
-    return found
+    return search_of(log_days(log, model), SITE, known, frozenset(), DEFAULT)
 
 
 def within(first: float, last: float) -> Floats:
@@ -80,7 +78,7 @@ def test_nothing_is_unexplained_where_nothing_is_missing(known_weeks: Telemetry,
 
 
 def test_evaporation_is_vapour_and_the_heat_that_it_takes(known_weeks: Telemetry, known_model: FittedModel) -> None:
-    design = search(later(known_weeks, known_weeks), known_model).resolved()
+    design = search(later(known_weeks, known_weeks), known_model).design(())
     finer, columns = candidates.finer_columns(design.line, SITE.longitude)
     assert {one.channel for one in finer if not one.is_weekly} == {"evaporation"}
     (place,) = (row for row, one in enumerate(finer) if one.key == "evaporation:07 to 16 h")
@@ -136,7 +134,7 @@ def test_what_gained_as_much_in_the_calibrations_own_weeks_is_no_news(
     known_weeks: Telemetry, known_model: FittedModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     change = search(with_a_door(known_weeks), known_model)
-    always = dict.fromkeys((one.key for one in change.resolved().patterns), 1e6)
+    always = dict.fromkeys((one.key for one in change.design(()).patterns), 1e6)
     used_to_it = replace(change, history=replace(change.history, own_gains=always))
     # What is no pattern of a calibration is not asked here.
     finer = {"weekly": 0.9, "evaporation": 0.9}

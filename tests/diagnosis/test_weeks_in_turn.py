@@ -14,7 +14,7 @@ from igrow.trainer.diagnosis import DEFAULT, Diagnosis, Finding, amplitudes, dia
 from igrow.trainer.diagnosis.answers import Answer
 from igrow.trainer.diagnosis.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, knowledge_of
-from igrow.trainer.diagnosis.rounds import Change, search_of
+from igrow.trainer.diagnosis.rounds import search_of
 from igrow.trainer.fit import FittedModel
 from tests.diagnosis.known_greenhouse import KNOWN, later
 from tests.virtual_log import SITE
@@ -61,13 +61,12 @@ def test_weeks_in_which_nothing_is_told_teach_what_to_expect(known_weeks: Teleme
     assert known_model.history is not None
     known = knowledge_of(known_model, SITE, DEFAULT)
     log = later(known_weeks, known_weeks)
-    search = search_of(log_days(log, known_model), SITE, known, frozenset(), DEFAULT, None, None)
-    assert isinstance(search, Change)
+    search = search_of(log_days(log, known_model), SITE, known, frozenset(), DEFAULT)
     seen = search.history_after(())
     assert seen is not None
     before, now = known_model.history.amplitudes, seen.amplitudes
     assert set(before.names) <= set(now.names)
-    design = search.resolved()
+    design = search.design(())
     solution = linear.fit(design.grams, design.null_model()).solution
     name = PARAMETER_PREFIX + "transmissivity"
     moved = now.values[name] - before.values[name]

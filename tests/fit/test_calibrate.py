@@ -16,6 +16,7 @@ from igrow.core.simulator.hybrid.nominal import nominal
 from igrow.core.telemetry import Telemetry, write_csv
 from igrow.trainer import calibrate, calibration, export, prepare_log, read_model
 from igrow.trainer.cli import main
+from igrow.trainer.diagnosis import DEFAULT
 from igrow.trainer.fit import FittedModel
 from igrow.trainer.fit.model import training_envelope, united
 from tests.made_once import made_once
@@ -60,14 +61,6 @@ def clean(short: Telemetry) -> FittedModel:
     return calibrate(prepare_log(short, SITE))
 
 
-@pytest.fixture
-def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The discrepancy takes half of the time, and is the same function for all."""
-    monkeypatch.setattr(
-        calibration, "discrepancy_of", lambda _, model, *__: {"mean": float(model.posterior.mean.sum())}
-    )
-
-
 def site_file(folder: Path) -> Path:
     path = folder / "site.yaml"
     path.write_text("\n".join(PARAMETERS) + "\n")
@@ -78,7 +71,6 @@ def assert_same_posterior(one: FittedModel, other: FittedModel) -> None:
     assert one.posterior.names == other.posterior.names
     np.testing.assert_array_equal(one.posterior.mean, other.posterior.mean)
     np.testing.assert_array_equal(one.posterior.covariance, other.posterior.covariance)
-    assert dict(one.discrepancy) == dict(other.discrepancy)
 
 
 @pytest.mark.slow
@@ -92,14 +84,8 @@ def test_the_command_gives_the_posterior_of_the_function(short: Telemetry, clean
     np.testing.assert_allclose(again.posterior.standard_deviation, clean.posterior.standard_deviation, rtol=1e-3)
     np.testing.assert_allclose(again.posterior.correlation, clean.posterior.correlation, atol=1e-2)
     assert again.alignment == clean.alignment
-    # An amplitude of a parameter is in its unit; a fiftieth of what the parameter is known by is nothing.
-    unit = {f"parameter:{name}": deviation for name, deviation in clean.posterior.deviations.items()}
-    assert set(again.discrepancy) == set(clean.discrepancy)
-    for key, amplitude in clean.discrepancy.items():
-        assert again.discrepancy[key] == pytest.approx(amplitude, rel=1e-2, abs=2e-2 * unit.get(key, 0.5))
 
 
-@pytest.mark.usefixtures("quick")
 def test_the_default_bundle_gives_the_posterior_of_the_function(
     short: Telemetry, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -119,7 +105,6 @@ def test_the_default_bundle_gives_the_posterior_of_the_function(
     assert built.alignment is None
 
 
-@pytest.mark.usefixtures("quick")
 def test_the_benchmark_gives_the_posterior_of_the_function(short: Telemetry, monkeypatch: pytest.MonkeyPatch) -> None:
     from benchmarks.diagnosis import logs
     from benchmarks.diagnosis.greenhouses import VirtualGreenhouse
@@ -138,7 +123,6 @@ def test_the_benchmark_gives_the_posterior_of_the_function(short: Telemetry, mon
     assert found.alignment == wanted.alignment
 
 
-@pytest.mark.usefixtures("quick")
 @pytest.mark.parametrize("rows", [0, 1])
 def test_the_alignment_of_the_actuators_is_recovered(telemetry: Telemetry, rows: int) -> None:
     log = prepare_log(shifted(telemetry, rows), SITE)
@@ -158,7 +142,6 @@ def test_a_model_tells_what_it_is(model: FittedModel) -> None:
     assert day.endswith("  K")
 
 
-@pytest.mark.usefixtures("quick")
 def test_errors_are_of_weeks_that_no_fit_saw(telemetry: Telemetry, model: FittedModel) -> None:
     """Spoiling the weeks that are held out moves the model, and not the fit that the errors are of."""
     week = (np.arange(len(telemetry)) // (7 * 96)) % 4 == 3
@@ -181,7 +164,6 @@ def test_covariance_alignment_and_discrepancy_go_through_the_bundle(model: Fitte
     assert len({draw["parameter:transmissivity"] for draw in draws}) == len(draws) > 1
 
 
-@pytest.mark.usefixtures("quick")
 def test_what_is_known_before_narrows_what_is_known_after(model: FittedModel, short: Telemetry) -> None:
     log = prepare_log(short, SITE)
     alone, after = calibrate(log), calibrate(log, prior_model=model)
@@ -193,7 +175,6 @@ def test_what_is_known_before_narrows_what_is_known_after(model: FittedModel, sh
     assert any("counts no growth" in note for note in after.notes)
 
 
-@pytest.mark.usefixtures("quick")
 def test_plans_are_not_held_to_what_the_weeks_of_a_log_happened_to_hold(short: Telemetry, clean: FittedModel) -> None:
     built_in = read_bundle(default_bundle_folder()).manifest.training_range
     own = training_envelope({name: short[name] for name in ("air_temperature", "air_co2")})
@@ -206,7 +187,6 @@ def test_plans_are_not_held_to_what_the_weeks_of_a_log_happened_to_hold(short: T
     assert united({"a": (0.0, 1.0)}, {}, {"a": (0.5, 2.0), "b": (1.0, 3.0)}) == {"a": (0.0, 2.0), "b": (1.0, 3.0)}
 
 
-@pytest.mark.usefixtures("quick")
 def test_a_log_of_less_than_four_weeks_is_fitted_without_errors_on_unseen_days(short: Telemetry) -> None:
     told: list[str] = []
     model = calibrate(prepare_log(short, SITE), progress=told.append)
@@ -220,11 +200,12 @@ def test_a_model_whose_discrepancy_cannot_be_learned_is_written_with_a_sentence(
     def refuse(*_: object) -> None:
         raise IgrowError("too few days")
 
-    monkeypatch.setattr(calibration, "discrepancy_of", refuse)
+    monkeypatch.setattr(calibration, "history_of", refuse)
+    monkeypatch.setattr(calibration, "DEFAULT", replace(DEFAULT, least_history_days=7.0))
     model = calibrate(prepare_log(short, SITE))
-    assert model.discrepancy == {}
+    assert model.history is None
     assert any("could not be learned" in note and "too few days" in note for note in model.notes)
-    assert export(model, tmp_path / "bundle").manifest.discrepancy == {}
+    assert "discrepancy.npz" not in export(model, tmp_path / "bundle").manifest.files
 
 
 def zeros(log: Telemetry) -> Telemetry:
@@ -243,7 +224,6 @@ def without_co2(log: Telemetry) -> Telemetry:
     return log.with_columns({"air_co2": np.zeros(len(log))})
 
 
-@pytest.mark.usefixtures("quick")
 @pytest.mark.parametrize("spoil", [zeros, jittered, without_co2])
 def test_a_spoiled_log_is_fitted_without_a_warning_or_a_wild_parameter(
     short: Telemetry, clean: FittedModel, spoil
@@ -261,7 +241,6 @@ def test_a_spoiled_log_is_fitted_without_a_warning_or_a_wild_parameter(
     assert away[heat].max() < 2.0
 
 
-@pytest.mark.usefixtures("quick")
 def test_a_stuck_co2_sensor_is_told_and_teaches_nothing(short: Telemetry) -> None:
     log = prepare_log(short.with_columns({"air_co2": np.full(len(short), 640.0)}), SITE)
     assert any("air_co2" in note and "nothing is said of it" in note for note in log.notes)

@@ -8,7 +8,7 @@ structure in pure noise. No pattern reads either.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.resources import files
 from typing import Any
@@ -123,9 +123,9 @@ def nonlinear_grid(effect: Effect) -> list[dict[str, float]]:
     return [dict(zip(names, values, strict=True)) for values in itertools.product(*axes)]
 
 
-def effect_columns(line: Linearisation, without: Collection[str] = ()) -> EffectColumns:
-    """Return the sensitivities to all effects but those in `without` and those already active."""
-    effects = [effect for effect in EFFECTS.values() if effect.name not in without and effect.name not in line.effects]
+def effect_columns(line: Linearisation) -> EffectColumns:
+    """Return the sensitivities to all effects but those already active."""
+    effects = [effect for effect in EFFECTS.values() if effect.name not in line.effects]
     testable = [effect for effect in effects if not _is_blind(line, effect) and is_measured(line.record, effect)]
     found = [Candidate(effect.name, tuple(shape.items())) for effect in testable for shape in nonlinear_grid(effect)]
     columns = _columns(line, found)

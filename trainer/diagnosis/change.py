@@ -9,18 +9,33 @@ scores must bear out a part of what the noise says, or a few odd days would spea
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from igrow.core.effects import EFFECTS
 from igrow.trainer.diagnosis import linear, search
 from igrow.trainer.diagnosis.candidates import Pattern
-from igrow.trainer.diagnosis.compare import Contender, Profile, Round, bootstrap_p
 from igrow.trainer.diagnosis.design import Design
-from igrow.trainer.diagnosis.linear import Fit
+from igrow.trainer.diagnosis.linear import Fit, LinearModel
 from igrow.trainer.diagnosis.null_gains import BEGINNING_PREFIX
 from igrow.trainer.diagnosis.search import Hypothesis
+
+
+@dataclass(frozen=True)
+class Round:
+    """What one round of the search found, under the noise that is left beside it."""
+
+    design: Design
+    null: Fit
+    """The model without a cause."""
+    named: Fit
+    """The model with the cause, or that without where there is none."""
+    cause: Hypothesis | None
+    patterns: tuple[Hypothesis, ...]
+    """What fits in place of a cause, where none explains what is there."""
+    outdone_by: Hypothesis | None = None
+    """A pattern that unseen days tell better than the cause."""
 
 
 def changed(
@@ -51,7 +66,7 @@ def changed(
     left = max(rules.least_left_by_hour, rules.left_by_hour_share * net_gain(design, cause))
     if pattern is not None and left_by_hour(design, null, cause, rng) >= left:
         return replace(nothing, patterns=(pattern,))
-    return round_of(design, null, cause, rng)
+    return round_of(design, null, cause)
 
 
 def scored(design: Design, null: Fit, rng: np.random.Generator) -> list[Hypothesis]:
@@ -142,28 +157,25 @@ def _proven(design: Design, one: Hypothesis, without: float) -> float:
 
     Alone the scatter says too little of what comes on few days: a drizzle, a cold night.
     """
-    price = 0.0 if one.term.onset is None else design.onset_price
+    price = 0.0 if one.term.onset is None else design.rules.onset_price
     by_noise, by_days = one.gain - without, 0.5 * one.statistic**2 - price - without
     if by_days >= by_noise or by_days <= 0.0:
         return min(by_noise, by_days)
     return math.sqrt(by_noise * by_days)
 
 
-def round_of(design: Design, null: Fit, cause: Hypothesis, rng: np.random.Generator) -> Round:
+def round_of(design: Design, null: Fit, cause: Hypothesis) -> Round:
     """Return both models under the noise that is left beside the cause: its scale and weights, not its colour."""
     model = null.model.with_term(cause.term)
-    named = linear.fit(design.grams, model)
-    errors = design.values[0] + np.tensordot(
-        named.solution.coefficients[: len(model.base)], design.values[list(model.base)], axes=1
-    )
-    errors = errors + named.amplitudes[0] * search.column_of(design, cause.term)
-    seen = design.whitened(design.fit_noise(errors))
-    null, named = linear.fit(seen.grams, null.model), linear.fit(seen.grams, model)
-    without, full = (_profile(seen, one) for one in (null, named))
-    contender = Contender(cause, net_gain(design, cause), full, bootstrap_p(seen, full, without, rng))
-    return Round(seen, null, named, contender, ())
+    seen = beside(design, model)
+    return Round(seen, linear.fit(seen.grams, null.model), linear.fit(seen.grams, model), cause, ())
 
 
-def _profile(design: Design, fit: Fit) -> Profile:
-    amplitudes, deviations = tuple(fit.amplitudes.tolist()), tuple(fit.deviations.tolist())
-    return Profile(fit.model, amplitudes, deviations, design.whitening, -fit.day_losses, 0.0)
+def beside(design: Design, model: LinearModel) -> Design:
+    """Return a design under the noise that a model leaves."""
+    fitted = linear.fit(design.grams, model)
+    coefficients = fitted.solution.coefficients[: len(model.base)]
+    errors = design.values[0] + np.tensordot(coefficients, design.values[list(model.base)], axes=1)
+    for amplitude, term in zip(fitted.amplitudes, model.terms, strict=True):
+        errors = errors + amplitude * search.column_of(design, term)
+    return design.whitened(design.fit_noise(errors))

@@ -68,7 +68,7 @@ def correct(
         if len(kept) < place - 1 and one.over_null < 1.0:
             continue
         tried = _tried(log, knowledge, one, current, found[place:], rules)
-        if tried is not None and _is_proven(tried[0], kept, knowledge, rules):
+        if tried is not None and is_proven(tried[0], rules):
             judged, current = tried
             kept.append(judged)
         else:
@@ -141,7 +141,7 @@ def _tried(
     # Where the effect takes over what recalibration had put into the parameters, the fit starts there.
     begin = {name: value + one.shift.get(name, 0.0) for name, value in current.posterior.values.items()}
     try:
-        asked = one if knowledge.history is None else confirmed(log, knowledge, current.terms, (one, *later), rules)
+        asked = confirmed(log, knowledge, current.terms, (one, *later), rules)
         if asked is None:
             return None
         terms = (*current.terms, asked.term)
@@ -151,37 +151,13 @@ def _tried(
         return None
 
 
-def _is_proven(one: Estimated, kept: Sequence[Estimated], knowledge: Knowledge, rules: DecisionRules) -> bool:
-    return stands(one, kept, rules) if knowledge.history is None else is_proven_change(one, rules)
-
-
-def stands(one: Estimated, kept: Sequence[Estimated], rules: DecisionRules) -> bool:
-    """Tell whether a cause is large enough, and holds on unseen days; one beside others must do more."""
-    if not _is_large(one, rules):
-        return False
-    if kept:
-        return one.skill >= rules.clear_skill and _adds_to(one, kept, rules)
-    likelier = one.bootstrap_p <= rules.largest_bootstrap_p
-    return one.skill >= rules.clear_skill or (one.skill >= rules.least_skill and likelier)
-
-
-def is_proven_change(one: Estimated, rules: DecisionRules) -> bool:
-    """Tell whether a change stands, alone or beside others: a day ahead is better, and the shipped model no worse."""
-    if not _is_large(one, rules):
+def is_proven(one: Estimated, rules: DecisionRules) -> bool:
+    """Tell whether a cause stands, alone or beside others: a day ahead is better, and the shipped model no worse."""
+    if one.effect_to_noise < rules.least_effect_to_noise or not same_in_all_regimes(one.regimes, rules):
         return False
     far_beyond_null = one.over_null >= rules.far_over_null
     enough = rules.least_skill if far_beyond_null else rules.clear_skill
     return one.change_skill >= enough and one.skill >= 0.0
-
-
-def _is_large(one: Estimated, rules: DecisionRules) -> bool:
-    return one.effect_to_noise >= rules.least_effect_to_noise and same_in_all_regimes(one.regimes, rules)
-
-
-def _adds_to(one: Estimated, kept: Sequence[Estimated], rules: DecisionRules) -> bool:
-    """Tell whether a further cause makes unseen days likelier, and gains a share of what those before it did."""
-    gained = sum(other.gain for other in kept)
-    return one.bootstrap_p <= rules.further_bootstrap_p and one.gain >= rules.further_gain_share * gained
 
 
 def until_outdone(kept: Sequence[Estimated]) -> tuple[Sequence[Estimated], tuple[Hypothesis, ...]]:
@@ -219,12 +195,8 @@ def _judged(log: LogDays, knowledge: Knowledge, one: Estimated, current: Stage, 
     """
     every = log.all_held_out()
     plain, moved = every.run(replace(trial, terms=current.terms)), every.run(trial)
-    if knowledge.history is not None:
-        prior = knowledge.prior
-        skill = cross_validated_skill(log, Refittable(current, prior), Refittable(trial, prior))
-    else:
-        before, after = log.run(current), log.run(trial)
-        skill = None if before is None or after is None else freerun.skill(before, after)
+    prior = knowledge.prior
+    skill = cross_validated_skill(log, Refittable(current, prior), Refittable(trial, prior))
     if skill is None or plain is None or moved is None:
         return one
     return replace(one, effect_to_noise=freerun.effect_to_noise(plain, moved), skill=skill)
@@ -257,7 +229,6 @@ def corrected_model(
     result: Corrected,
     findings: Sequence[Finding],
     errors: Mapping[str, Mapping[str, Mapping[str, float]]],
-    discrepancy: Mapping[str, float],
     span: tuple[np.datetime64, np.datetime64],
     crop: CropStages,
 ) -> FittedModel:
@@ -268,7 +239,6 @@ def corrected_model(
         result: of the correction.
         findings: of the diagnosis.
         errors: quantity -> horizon -> stage -> mean absolute error.
-        discrepancy: of the calibration, which goes on.
         span: of the log.
         crop: its growth, beside the corrected parameters.
     """
@@ -283,7 +253,6 @@ def corrected_model(
             for quantity, horizons in errors.items()
             for horizon, stages in horizons.items()
         ],
-        discrepancy=discrepancy,
         crop=crop,
     )
 

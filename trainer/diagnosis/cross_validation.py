@@ -19,7 +19,7 @@ from igrow.core.arrays import Floats
 from igrow.trainer.data.splits import folds
 from igrow.trainer.diagnosis import change, linear, search
 from igrow.trainer.diagnosis.candidates import Pattern
-from igrow.trainer.diagnosis.compare import Round
+from igrow.trainer.diagnosis.change import Round
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.linear import DailyGrams, LinearModel
 from igrow.trainer.diagnosis.null_gains import read_null_skills
@@ -62,19 +62,12 @@ def find(design: Design, by_physics: Gaussian, rng: np.random.Generator) -> Roun
     found = best(cross_validated(design, by_physics, promising(design, rng)))
     if found is None or found.skill < read_null_skills().needed(found.hypothesis.effect, design.rules.days_over_null):
         return None
-    return _by_days(design, null, found, rng)
+    return change.round_of(design, null, found.hypothesis)
 
 
 def best(found: Sequence[CrossValidated]) -> CrossValidated | None:
     """Return the hypothesis that takes most off unseen days; None for none."""
     return max(found, key=lambda one: one.skill, default=None)
-
-
-def _by_days(design: Design, null: linear.Fit, found: CrossValidated, rng: np.random.Generator) -> Round:
-    """Return the round of a cause that unseen days tell: single steps say less of it."""
-    told = change.round_of(design, null, found.hypothesis, rng)
-    assert told.cause is not None
-    return replace(told, cause=replace(told.cause, bootstrap_p=found.p_value(design.rules, rng)))
 
 
 def settled(design: Design, by_physics: Gaussian, told: Round, rng: np.random.Generator) -> Round:
@@ -92,7 +85,7 @@ def settled(design: Design, by_physics: Gaussian, told: Round, rng: np.random.Ge
     """
     assert told.cause is not None
     rules, null, known = design.rules, linear.fit(design.grams, design.null_model()), read_null_skills()
-    nothing, first = Round(design, null, null, None, ()), told.cause.hypothesis
+    nothing, first = Round(design, null, null, None, ()), told.cause
     scored = change.scored(design, null, rng)
     own, *others = cross_validated(design, by_physics, [first, *rivals(design, first, scored)])
     rival = best(others)
@@ -103,12 +96,12 @@ def settled(design: Design, by_physics: Gaussian, told: Round, rng: np.random.Ge
     over_null = change.over_null(design, chosen)
     by_days_alone = known.needed(chosen.effect, rules.days_over_null)
     if over_null < 1.0:
-        return nothing if begun or own.skill < by_days_alone else _by_days(design, null, own, rng)
+        return nothing if begun or own.skill < by_days_alone else change.round_of(design, null, chosen)
     # A beginning was searched for among all days.
     least = by_days_alone if begun else known.largest.get(chosen.effect, 0.0)
     if over_null < rules.far_over_null and own.skill < least:
         return nothing
-    return told if chosen is first else change.round_of(design, null, chosen, rng)
+    return told if chosen is first else change.round_of(design, null, chosen)
 
 
 def with_what_outdoes_it(design: Design, by_physics: Gaussian, told: Round, rng: np.random.Generator) -> Round:
@@ -121,7 +114,7 @@ def with_what_outdoes_it(design: Design, by_physics: Gaussian, told: Round, rng:
     Arguments are as of `settled`.
     """
     assert told.cause is not None
-    rules, first = design.rules, told.cause.hypothesis
+    rules, first = design.rules, told.cause
     if change.over_null(design, first) >= rules.far_over_null:
         return told
     scored = search.score_patterns(design, linear.fit(design.grams, design.null_model()), [None], rng)
@@ -179,8 +172,9 @@ def cross_validated(design: Design, by_physics: Gaussian, hypotheses: Sequence[H
     """
     if not hypotheses:
         return []
-    # A design stands where the parameters were expected.
     assert design.history is not None and design.prior.names == by_physics.names
+    # Where the model is linear about: the prior is where the parameters are expected.
+    stand = design.prior.mean - design.history.amplitudes.mean[: len(by_physics.names)]
     columns = np.array([search.column_of(design, one.term) for one in hypotheses])
     limits = np.array([_reach(design, one) for one in hypotheses])
     joint = design.null_model()
@@ -192,7 +186,7 @@ def cross_validated(design: Design, by_physics: Gaussian, hypotheses: Sequence[H
             design,
             errors - design.history.misfit,
             design.values[held.start : held.stop],
-            LinearModel(tuple(held), by_physics.precision, by_physics.mean - design.prior.mean),
+            LinearModel(tuple(held), by_physics.precision, by_physics.mean - stand),
             columns,
             limits,
         ),
@@ -214,17 +208,17 @@ def _falls(
 
     Args:
         design: of the log: its days and runs.
-        errors: (b, r, intervals).
-        others: columns of everything else, (p, b, r, intervals).
+        errors: (b, r, steps).
+        others: columns of everything else, (p, b, r, steps).
         known: of their coefficients.
-        columns: to be judged, each beside `others`, (c, b, r, intervals).
+        columns: to be judged, each beside `others`, (c, b, r, steps).
         limits: least and largest amplitude of each, (c, 2).
     """
     day, count, split = design.line.runs.day, len(others), design.split
     # Every quantity counts by its own error; errors within a correlation time count once.
     scale = np.sqrt(np.mean(errors**2, axis=(1, 2), keepdims=True) + 1e-300)
     everything = np.concatenate([errors[None], others, columns]) / scale
-    weight = design.interval / CORRELATION_TIME
+    weight = design.line.record.step / CORRELATION_TIME
     products = weight * linear.daily_products(everything, day, split.days)
     base = LinearModel(tuple(range(1, count + 1)), known.precision, known.mean)
     before, after = np.zeros((len(errors), split.days)), np.zeros((len(columns), len(errors), split.days))

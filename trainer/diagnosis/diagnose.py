@@ -24,15 +24,14 @@ from igrow.trainer.diagnosis import history, wording
 from igrow.trainer.diagnosis.actuators import Completed, may_hide_in_parameters
 from igrow.trainer.diagnosis.answers import Answer, bears_out, begun, is_same
 from igrow.trainer.diagnosis.candidates import hidden_by_missing_weather
+from igrow.trainer.diagnosis.change import Round
 from igrow.trainer.diagnosis.circumstances import Circumstances, circumstances_of
-from igrow.trainer.diagnosis.compare import Round
 from igrow.trainer.diagnosis.correction import Corrected, correct, corrected_model, until_outdone, with_unexplained
 from igrow.trainer.diagnosis.crop import of_one_crop
 from igrow.trainer.diagnosis.diagnosed_days import since_calibration, weeks_in_turn
 from igrow.trainer.diagnosis.estimate import Estimated, from_before, normal_quantile
 from igrow.trainer.diagnosis.evidence import Evidence
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
-from igrow.trainer.diagnosis.nuisance import NuisanceSubspace
 from igrow.trainer.diagnosis.null_gains import NullGains
 from igrow.trainer.diagnosis.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.parameter_or_causes import may_give_way, stands_in_its_place, with_parameter
@@ -57,7 +56,6 @@ def diagnose(
     without: Collection[str] = (),
     seed: int = 0,
     rules: DecisionRules = DEFAULT,
-    nuisance: NuisanceSubspace | None = None,
     null_gains: NullGains | None = None,
     progress: Progress = silent,
 ) -> Diagnosis:
@@ -70,7 +68,6 @@ def diagnose(
         without: effects that are not to be considered.
         seed: of the random flips and bootstraps.
         rules: every threshold.
-        nuisance: what greenhouses show though nothing is missing (None: what came with the trainer).
         null_gains: what a change gains where there is none (None: what came with the trainer).
         progress: is told what is being done, in lines.
 
@@ -86,7 +83,7 @@ def diagnose(
     if log.faults:
         return _data_fault(log, model)
     log.require("a diagnosis", rules.least_days)
-    return _Question(model, frozenset(without), seed, rules, nuisance, null_gains, progress).in_turn(log)
+    return _Question(model, frozenset(without), seed, rules, null_gains, progress).in_turn(log)
 
 
 @dataclass(frozen=True)
@@ -97,7 +94,6 @@ class _Question:
     without: frozenset[str]
     seed: int
     rules: DecisionRules
-    nuisance: NuisanceSubspace | None
     null_gains: NullGains | None
     progress: Progress
     history: Discrepancy | None = None
@@ -107,7 +103,7 @@ class _Question:
         """Return the diagnosis of a log: of a long one its weeks in turn, each by what those before it have told."""
         since, notes = since_calibration(log, self.model, self.rules)
         since, left_out = of_one_crop(since, self.rules)
-        first, *later = weeks_in_turn(since, self.model, self.rules)
+        first, *later = weeks_in_turn(since, self.rules)
         told = latest = self.answer(first)
         for number, weeks in enumerate(later, 2):
             self.progress(f"part {number} of {len(later) + 1}")
@@ -222,7 +218,7 @@ class _Question:
         is_later = self.history is not None
         return search_of(
             around.completed.days, site, around.knowledge, self.without | around.not_asked, around.rules,
-            self.nuisance, self.null_gains, is_later=is_later, by_days=around.by_days,
+            self.null_gains, is_later=is_later, by_days=around.by_days,
         )  # fmt: skip
 
     def _diagnosis(
@@ -246,8 +242,7 @@ class _Question:
         start, end = log.telemetry.time[0], log.telemetry.time[-1]
         moved = model.posterior.values, result.stages["corrected"].posterior.values
         crop = growth_since(log, days.record, moved, model.crop or built_in_crop())
-        discrepancy = around.knowledge.discrepancy
-        corrected = corrected_model(model, result, findings, errors, discrepancy, (start, end), crop)
+        corrected = corrected_model(model, result, findings, errors, (start, end), crop)
         possible = {name for one in findings for name in one.confounded}
         not_asked = {*first.design.untestable, *around.of_crop}
         return Diagnosis(

@@ -23,13 +23,12 @@ def since_calibration(log: Log, model: FittedModel, rules: DecisionRules) -> tup
     return later, (f"The model was calibrated on the days up to {until:%Y-%m-%d %H:%M} UTC: they are left out.",)
 
 
-def weeks_in_turn(log: Log, model: FittedModel, rules: DecisionRules) -> list[Log]:
-    """Return a long log in equal parts, the oldest first, where its greenhouse's history can be asked, else as it is.
+def weeks_in_turn(log: Log, rules: DecisionRules) -> list[Log]:
+    """Return a long log in equal parts, the oldest first.
 
     Within a long one the crop changes, and the weeks next to the calibration are those of which it says most.
     """
-    asked = model.history is not None and model.calibrated_on == log.known_site.name and rules.history
-    if not asked or log.days <= rules.long_days:
+    if log.days <= rules.long_days:
         return [log]
     # So many local days at most, the first and the last of them cut.
     count = math.ceil(log.days / (rules.long_days - 1.0))

@@ -12,7 +12,7 @@ from igrow.core.bundle import Estimate
 from igrow.core.effects import EFFECTS
 from igrow.trainer.diagnosis import change, linear, search
 from igrow.trainer.diagnosis.candidates import Candidate
-from igrow.trainer.diagnosis.compare import Round
+from igrow.trainer.diagnosis.change import Round
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
 from igrow.trainer.diagnosis.linear import Fit, Term
@@ -47,8 +47,6 @@ class Estimated:
     onset: OnsetInterval | None
     confounded: tuple[str, ...]
     """Effects that would do as well in its place, itself first."""
-    bootstrap_p: float = 0.0
-    """Probability that it does not make unseen days likelier."""
     shift: dict[str, float] = field(default_factory=dict)
     """How the parameters move when it comes in."""
     shapes: dict[str, Estimate] = field(default_factory=dict)
@@ -75,7 +73,7 @@ def estimate(found: Round, rng: np.random.Generator) -> Estimated | None:
     """Return the cause that a round found, if it did."""
     if found.cause is None:
         return None
-    design, null, hypothesis = found.design, found.null, found.cause.hypothesis
+    design, null, hypothesis = found.design, found.null, found.cause
     gain = found.named.solution.gain - null.solution.gain
     (amplitude,) = found.named.amplitudes.tolist()
     wide = reach(design.rules) * linear.deviation_by_day(design.grams, found.named)
@@ -90,7 +88,6 @@ def estimate(found: Round, rng: np.random.Generator) -> Estimated | None:
         hypothesis.gain,
         onset,
         _confounded(design, null, hypothesis, gain, rng),
-        found.cause.bootstrap_p,
         dict(zip(design.prior.names, shift.tolist(), strict=True)),
         over_null=change.over_null(design, hypothesis),
         outdone_by=found.outdone_by,

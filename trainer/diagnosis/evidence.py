@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from igrow.core.arrays import Floats
-from igrow.trainer.diagnosis.compare import Round
+from igrow.trainer.diagnosis.change import Round
 from igrow.trainer.diagnosis.freerun import FreeRuns, LogDays, Stage, mean_absolute_errors
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge
 

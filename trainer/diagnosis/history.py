@@ -3,7 +3,8 @@
 Two questions are told apart. What the model lacks is asked of the calibration log, under physical priors: every
 parameter, every effect and every pattern together, linear about the calibrated parameters (`history_of`). What has
 changed since is asked of a later log: a greenhouse drifts, its crop faster than its walls, and that drift alone stands
-between what was learned and what may be expected now (`expected`).
+between what was learned and what may be expected now (`expected`). Of a greenhouse that no calibration has shown only
+the priors are known (`unknown`).
 """
 
 from __future__ import annotations
@@ -19,15 +20,21 @@ from igrow.core.simulator.hybrid.climate import ActiveEffects
 from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
 from igrow.trainer.data.splits import DaySplit, split_days
-from igrow.trainer.diagnosis import candidates, linear, noise, parameter_change, search, sensitivity
+from igrow.trainer.diagnosis import linear, noise, parameter_change, search
 from igrow.trainer.diagnosis.amplitudes import columns, drift_over, drift_within, hardly_shown, keys, omission
-from igrow.trainer.diagnosis.design import Design, History, of_parts
+from igrow.trainer.diagnosis.design import Design, History, lay_out
 from igrow.trainer.diagnosis.freerun import LogDays
-from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, VENTS, ActiveTerm, activate, knowledge_of
+from igrow.trainer.diagnosis.knowledge import (
+    PARAMETER_PREFIX,
+    VENTS,
+    ActiveTerm,
+    Knowledge,
+    activate,
+    knowledge_of,
+)
 from igrow.trainer.diagnosis.linear import DailyGrams, LinearModel
 from igrow.trainer.diagnosis.noise import Whitening
 from igrow.trainer.diagnosis.null_gains import NullGains, read_null_gains
-from igrow.trainer.diagnosis.recalibration import averaging
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.fit.climate import site_prior
 from igrow.trainer.fit.discrepancy import Discrepancy
@@ -58,11 +65,11 @@ def history_of(
     """
     effects = activate(record, knowledge_of(model, model.site, rules).terms)
     found, design = jointly(record, model.site, model.posterior, rules, population, effects)
-    balances = averaging(design.line, design.interval, rules).balances
+    numbers = design.balances.numbers
     return Discrepancy(
         parameters=model.posterior.values,
         amplitudes=found,
-        filters={balance: one.raw for balance, one in zip(balances, design.whitening.filters, strict=True)},
+        filters={balance: one.raw for balance, one in zip(numbers, design.whitening.filters, strict=True)},
         step=record.step,
         own_gains=own_gains(design),
         middle=_middle(record),
@@ -139,34 +146,6 @@ def held(posterior: Gaussian, described: Gaussian) -> Gaussian:
     return Gaussian(posterior.names, mean, np.diag(deviation**2))
 
 
-def lay_out(
-    record: Record, split: DaySplit, prior: Gaussian, effects: ActiveEffects, longitude: float, rules: DecisionRules
-) -> Design:
-    """Return the design of a log about the prior's mean, at its own step, before any noise.
-
-    Patterns of single weekdays are left out: eight weeks know too little of them.
-    """
-    runs = sensitivity.day_runs(record, split.day)
-    line = sensitivity.linearise(record, runs, prior.values, effects)
-    average = averaging(line, record.step, rules)
-    found = candidates.effect_columns(line)
-    every, courses = candidates.pattern_columns(line, longitude)
-    lasting = [place for place, one in enumerate(every) if not one.is_weekly]
-    patterns = tuple(every[place] for place in lasting)
-    labels = tuple(one.key for one in found.candidates)
-    slopes = sensitivity.parameter_sensitivities(line, prior.names, prior.standard_deviation)
-    none, nothing = np.zeros(0), np.zeros((0, *line.shown.shape))
-    parts = [
-        ("residual", ("residual",), line.errors[None], none, None),
-        ("parameter", prior.names, slopes, none, None),
-        ("effect", labels, found.columns, none, None),
-        ("ageing", labels, found.ageing, none, None),
-        ("pattern", tuple(one.key for one in patterns), courses[lasting], none, None),
-        *((name, (), nothing, none, np.zeros((0, 0))) for name in ("discrepancy", "nuisance", "drift")),
-    ]
-    return of_parts(line, split, prior, rules, average, parts, found, patterns)
-
-
 def laid_out(
     days: LogDays, site: Site, known: Discrepancy, terms: Sequence[ActiveTerm], rules: DecisionRules
 ) -> Design:
@@ -177,28 +156,51 @@ def laid_out(
     return lay_out(days.record, days.split, about, activate(days.record, terms), site.longitude, rules)
 
 
+def unknown(days: LogDays, site: Site, knowledge: Knowledge, rules: DecisionRules) -> Discrepancy:
+    """Return what may be expected of a greenhouse that no calibration has shown: the priors, about its own parameters.
+
+    Args:
+        days: of the log that is asked.
+        site: the greenhouse.
+        knowledge: of the model in force, calibrated elsewhere or on too short a log.
+        rules: how much of everything may be missing.
+
+    Raises:
+        DivergenceError: the model runs out of all bounds on the log.
+    """
+    prior, fitted = knowledge.prior, days.fit(knowledge.prior, knowledge.terms)
+    about = Gaussian(fitted.names, fitted.mean, site_prior(site).marginal(fitted.names).covariance)
+    plain = lay_out(days.record, days.split, about, activate(days.record, knowledge.terms), site.longitude, rules)
+    names = keys(plain)[len(fitted.names) :]
+    mean = np.concatenate([prior.mean - fitted.mean, np.zeros(len(names))])
+    # A null that may be missing as much as a calibration may would hide whatever is; bounds make up for it.
+    missing = np.diag((rules.unknown_share * omission(names, rules)) ** 2)
+    return Discrepancy(
+        parameters=fitted.values,
+        amplitudes=Gaussian(keys(plain), mean, block_diag(prior.covariance, missing)),
+        filters={},
+        step=days.record.step,
+        own_gains={},
+        middle=_middle(days.record),
+    )
+
+
 def expected_misfit(known: Discrepancy, plain: Design) -> Floats:
-    """Return what the model is expected to miss along a log, (b, r, intervals); what is new in the log is 0."""
-    amplitudes = known.amplitudes.values
-    mean = np.array([amplitudes.get(key, 0.0) for key in keys(plain)])
-    misfit: Floats = np.tensordot(mean, plain.values[columns(plain)], axes=1)
+    """Return what the model is expected to miss along a log, (b, r, steps)."""
+    misfit: Floats = np.tensordot(expected_amplitudes(known, plain), plain.values[columns(plain)], axes=1)
     return misfit
 
 
-def applies(known: Discrepancy, plain: Design) -> bool:
-    """Tell whether a log has the step and the balances that the history was learned from, and is not long.
-
-    Within a long one the crop changes, which only the search by what greenhouses show in general allows for.
-    """
-    balances = averaging(plain.line, plain.interval, plain.rules).balances
-    short = plain.split.days <= plain.rules.long_days
-    return short and plain.interval == known.step and set(balances) <= set(known.filters)
+def expected_amplitudes(known: Discrepancy, plain: Design) -> Floats:
+    """Return the expected amplitudes of everything that may be missing, (k,); what is new in the log is 0."""
+    amplitudes = known.amplitudes.values
+    return np.array([amplitudes.get(key, 0.0) for key in keys(plain)])
 
 
 def expected(
     known: Discrepancy,
     plain: Design,
-    misfit: Floats,
+    misfit: Floats | None,
     without: Collection[str] = (),
     null_gains: NullGains | None = None,
     unnamed: Collection[str] = (),
@@ -208,16 +210,21 @@ def expected(
     Args:
         known: of the greenhouse.
         plain: the log, laid out about the calibrated parameters.
-        misfit: (b, r, intervals), from `expected_misfit`, of the log without the causes that have been found in it.
+        misfit: (b, r, steps), from `expected_misfit`, of the log without the causes that have been found in it; None of
+            an `unknown` greenhouse, whose parameters are far from where the model is linear, and come back by its runs.
         without: effects that are no candidates.
         null_gains: of greenhouses in which nothing has changed (None: what came with the trainer).
         unnamed: patterns by key that no cause of this log explains: of them nothing is expected.
     """
     null_gains = null_gains or read_null_gains()
-    balances = averaging(plain.line, plain.interval, plain.rules).balances
-    filters = tuple(noise.filter_of(known.filters[balance]) for balance in balances)
+    numbers = plain.balances.numbers
+    # The colour of other time steps, or of a balance that the calibration log could not tell, is to be learned.
+    known_colour = plain.line.record.step == known.step and set(numbers) <= set(known.filters)
+    filters = tuple(noise.filter_of(known.filters[balance]) for balance in numbers) if known_colour else ()
     found = np.array([key in unnamed for key in keys(plain)])
     now = drifted(known, plain).widened(plain.rules.largest_pattern * found)
+    if misfit is None:
+        now, misfit = now.moved(expected_amplitudes(known, plain)), np.zeros_like(plain.values[0])
     values = plain.values.copy()
     values[0] += misfit
     within = History(now, misfit, filters, known.own_gains, frozenset(without), null_gains, frozenset(unnamed))
@@ -226,7 +233,7 @@ def expected(
     # Parameters as the rest of the history leaves them, for fits that hold it.
     count = len(plain.prior.names)
     covariance: Floats = np.linalg.inv(now.precision[:count, :count]).astype(np.float64)
-    held = Gaussian(plain.prior.names, plain.prior.mean, covariance)
+    held = Gaussian(plain.prior.names, plain.prior.mean + now.mean[:count], covariance)
     return replace(design, prior=held)
 
 

@@ -25,7 +25,7 @@ from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.model import FittedModel
 
 PARAMETER_PREFIX = "parameter:"
-"""Key of a parameter's shift in a discrepancy: what short errors of the calibration log say beside the long ones."""
+"""Key of a parameter's change in a discrepancy."""
 
 CROP = frozenset({
     "transpiration_radiation", "transpiration_moist_air", "transpiration_night_share", "crop_long_wave_loss",
@@ -62,18 +62,17 @@ class Knowledge:
     """Of the parameters in this log, about the calibration itself: for fits to free runs."""
     shipped_prior: Gaussian
     """The same for the model that is shipped."""
-    short_prior: Gaussian
-    """The same about where the diagnosis of the calibration log put them: for the search."""
     terms: tuple[ActiveTerm, ...]
-    discrepancy: Mapping[str, float]
-    """Empty for a transferred model."""
     transferred: bool
-    """What the model misses of this greenhouse when all is well is not known."""
+    """It was calibrated on another greenhouse."""
     history: Discrepancy | None = None
-    """The same with its covariance: causes are then changes since the calibration; None where none is to be asked."""
+    """What the model misses of this very greenhouse, learned at its calibration; None: nobody knows."""
 
     def by_physics(self, rules: DecisionRules) -> Gaussian:
         """Return where the parameters may lie if they have changed since as physics alone lets expect."""
+        if self.history is None:
+            # What physics lets change says little of a greenhouse that no calibration has shown.
+            return self.prior
         return self.posterior.widened(home_drift(self.posterior.values, rules))
 
 
@@ -81,7 +80,6 @@ def knowledge_of(model: FittedModel, site: Site, rules: DecisionRules) -> Knowle
     """Return what a model says of a site."""
     at_home = model.calibrated_on == site.name
     posterior = model.posterior
-    discrepancy = model.discrepancy if at_home else {}
     if not at_home:
         posterior = posterior.widened(drift(posterior.values, rules.transferred_drift, rules))
     # Fits to free runs may move further than a greenhouse changes: a parameter also stands in for what has no name.
@@ -90,12 +88,9 @@ def knowledge_of(model: FittedModel, site: Site, rules: DecisionRules) -> Knowle
         posterior.widened(np.maximum(drift(posterior.values, share, rules), home_drift(posterior.values, rules)))
         for share in (rules.parameter_drift, rules.shipped_drift)
     )
-    history = model.history if at_home and rules.history else None
-    low, high = bounds(prior.names)
-    shift = np.array([discrepancy.get(PARAMETER_PREFIX + name, 0.0) for name in prior.names])
-    centred = prior.moved(np.clip(prior.mean + shift, low, high))
     terms = tuple(active_term(one) for one in model.effects if one.name in EFFECTS)
-    return Knowledge(model.posterior, prior, shipped_prior, centred, terms, discrepancy, not discrepancy, history)
+    history = model.history if at_home else None
+    return Knowledge(model.posterior, prior, shipped_prior, terms, not at_home, history)
 
 
 def active_term(record: EffectRecord) -> ActiveTerm:

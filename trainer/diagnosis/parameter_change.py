@@ -19,7 +19,6 @@ from igrow.trainer.diagnosis import change, linear, search, sensitivity
 from igrow.trainer.diagnosis.design import Block, Design
 from igrow.trainer.diagnosis.estimate import OnsetInterval, onset_interval, reach
 from igrow.trainer.diagnosis.linear import Fit
-from igrow.trainer.diagnosis.recalibration import averaging
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.diagnosis.visible_parameters import TOGETHER, VISIBLE, members
 from igrow.trainer.fit.climate import bounds
@@ -153,23 +152,22 @@ def at_its_size(
     parameter, and explains less along its slope than it does.
     """
     place = design.values.shape[0]
-    average, none = averaging(design.line, design.interval, design.rules), np.zeros(1)
     value, low, high = _range(design, one.parameter)
     told = design, one
     for _ in range(SECANTS):
         column = sensitivity.parameter_secant(
             design.line, members(one.parameter), one.amplitude, one.parameter in TOGETHER
         )
-        block = Block((one.parameter,), range(place, place + 1), none, None)
+        block = Block((one.parameter,), range(place, place + 1))
         wider = replace(
             design,
             blocks={**design.blocks, "changed": block},
-            values=np.concatenate([design.values, average(column[None])]),
+            values=np.concatenate([design.values, design.balances(column[None])]),
         ).whitened(design.whitening)
         null = linear.fit(wider.grams, wider.null_model())
         limits = np.array([[low - value, high - value]])
         scanned = search.scan(wider.grams, null, [place], [None], onsets, limits, rng, design.rules.flips)
-        found = search.best_of_each(scanned, [one.parameter], [None], [one.parameter], design.onset_price)
+        found = search.best_of_each(scanned, [one.parameter], [None], [one.parameter], design.rules.onset_price)
         if not found or found[0].gain < one.gain:
             break
         one = found[0]
@@ -186,7 +184,7 @@ def joined(design: Design) -> Design:
     weights = weights.reshape(len(names), len(block))
     crossed = np.einsum("dqp,gp->dqg", products[:, :, block.columns], weights)
     own = np.einsum("gp,dph->dgh", weights, crossed[:, block.columns, :])
-    together = Block(tuple(names), range(size, size + len(names)), np.zeros(len(names)), None)
+    together = Block(tuple(names), range(size, size + len(names)))
     return replace(
         design,
         blocks={**design.blocks, "together": together},
@@ -211,7 +209,7 @@ def score(design: Design, current: Fit, onsets: Sequence[int | None], rng: np.ra
     none: list[int | None] = [None] * len(labels)
     limits = reaches[:, 1:] - reaches[:, :1]
     scanned = search.scan(design.grams, current, columns, none, onsets, limits, rng, design.rules.flips)
-    return search.best_of_each(scanned, labels, none, labels, design.onset_price)
+    return search.best_of_each(scanned, labels, none, labels, design.rules.onset_price)
 
 
 def _range(design: Design, name: str) -> tuple[float, float, float]:

@@ -1,8 +1,9 @@
 """The found terms refitted where they are: sizes, shapes and parameters together, the noise without the effect in it.
 
 The search linearises at a model without the effect, with the weights that its large innovations got there; a strong
-effect then looks smaller than it is. Here the effect is active: amplitudes, nonlinear parameters, physical parameters
-and the rest of the null are fitted under their priors, by turns with the colour and the weights of the noise.
+effect then looks smaller than it is. Here the effect is active: amplitudes, nonlinear parameters and physical
+parameters are fitted under their priors, by turns with the weights of the noise. What else is known of the greenhouse
+is held at its mean: left free it would take its share of the terms.
 """
 
 from __future__ import annotations
@@ -18,11 +19,11 @@ from igrow.core.arrays import Floats, Mask
 from igrow.core.effects import EFFECTS
 from igrow.core.simulator.hybrid.climate import ActiveEffects
 from igrow.trainer.diagnosis import possible_air, sensitivity
-from igrow.trainer.diagnosis.design import NULL, Design
+from igrow.trainer.diagnosis.balances import Balances
+from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, activate, clipped
 from igrow.trainer.diagnosis.linear import Fit
 from igrow.trainer.diagnosis.noise import Whitening
-from igrow.trainer.diagnosis.recalibration import Averaging, averaged, averaging
 from igrow.trainer.diagnosis.sensitivity import Linearisation
 from igrow.trainer.fit import solver
 from igrow.trainer.fit.climate import bounds
@@ -81,7 +82,7 @@ class Knob:
 
 @dataclass(frozen=True)
 class _Unknowns:
-    """What is refitted together: parameters, coefficients of the rest of the null, and knobs of the terms."""
+    """What is refitted together: parameters, and knobs of the terms."""
 
     design: Design
     before: tuple[ActiveTerm, ...]
@@ -94,7 +95,7 @@ class _Unknowns:
     high: Floats
 
     def terms(self, point: Floats) -> list[ActiveTerm]:
-        """Return the terms at a point, (p + other + k,)."""
+        """Return the terms at a point, (p + k,)."""
         terms = list(self.found)
         for knob, value in zip(self.knobs, point[len(point) - len(self.knobs) :], strict=True):
             terms = knob.set(terms, float(value))
@@ -139,17 +140,14 @@ def refit(design: Design, named: Fit, terms: Sequence[ActiveTerm], before: Seque
     Raises:
         DivergenceError: the model runs out of all bounds with these terms.
     """
-    rules, prior = design.rules, design.prior
+    rules, prior, balances = design.rules, design.prior, design.balances
     unknowns = _unknowns(design, terms, before)
-    average = averaging(design.line, design.interval, rules)
-    background = np.concatenate([design.values[design.block(name).columns] for name in NULL[1:]])
-    size, other = len(prior.names), len(background)
-    # What is known of the greenhouse is held at its mean: left free it would take its share of the terms.
-    misfit = np.zeros_like(design.values[0]) if design.history is None else design.history.misfit
+    size = len(prior.names)
+    assert design.history is not None
+    misfit = design.history.misfit
     # Where the search left off.
     point = unknowns.prior.mean.copy()
-    point[: size + other] = named.solution.coefficients[: size + other]
-    point[:size] += [design.line.parameters[name] for name in prior.names]
+    point[:size] = named.solution.coefficients[:size] + [design.line.parameters[name] for name in prior.names]
     point = np.clip(point, unknowns.low, unknowns.high)
     whitening: Whitening | None = None
     line = solver.remembered(unknowns.line)
@@ -157,18 +155,14 @@ def refit(design: Design, named: Fit, terms: Sequence[ActiveTerm], before: Seque
     sensitivities = solver.remembered(lambda point: unknowns.slopes(point, line(point)))
     for _ in range(rules.refit_rounds):
         # The noise is fitted about the model as it now stands.
-        errors = average(line(point).errors[None])[0]
-        errors = errors + misfit + np.tensordot(point[size : size + other], background, axes=1)
-        whitening = design.fit_noise(errors, whitening)
-        view = _View(whitening, average, design.fitted)
+        whitening = design.fit_noise(balances(line(point).errors[None])[0] + misfit, whitening)
+        view = _View(whitening, balances, design.fitted)
 
         def residuals(point: Floats, view: _View = view) -> Floats:
-            plain = average(line(point).errors[None])
-            return view.flat(plain + np.tensordot(point[size : size + other], background, axes=1) + misfit)[:, 0]
+            return view.flat(balances(line(point).errors[None]) + misfit)[:, 0]
 
         def jacobian(point: Floats, view: _View = view) -> Floats:
-            slopes = average(sensitivities(point))
-            return view.flat(np.concatenate([slopes[:size], background, slopes[size:]]))
+            return view.flat(balances(sensitivities(point)))
 
         solution = solver.solve(
             residuals, jacobian, unknowns.prior,
@@ -176,21 +170,21 @@ def refit(design: Design, named: Fit, terms: Sequence[ActiveTerm], before: Seque
         )  # fmt: skip
         moved = np.abs(solution.posterior.mean - point) / solution.posterior.standard_deviation
         point = solution.posterior.mean
-        if np.all(moved[size + other :] < rules.refit_settled):
+        if np.all(moved[size:] < rules.refit_settled):
             break
     return _refitted(unknowns, solution, view)
 
 
 @dataclass(frozen=True)
 class _View:
-    """How errors are seen: averaged, whitened, on fit days alone."""
+    """How errors are seen: whitened, on fit days alone."""
 
     whitening: Whitening
-    average: Averaging
+    balances: Balances
     fitted: Mask
 
     def flat(self, values: Floats) -> Floats:
-        """Turn means over intervals, (k, b, r, intervals), into white rows of a least-squares problem, (n, k)."""
+        """Turn errors that count, (k, b, r, steps), into white rows of a least-squares problem, (n, k)."""
         return np.asarray(self.whitening(values) * self.fitted).reshape(len(values), -1).T
 
 
@@ -206,33 +200,21 @@ def _unknowns(design: Design, terms: Sequence[ActiveTerm], before: Sequence[Acti
             knobs.append(
                 Knob(index, one.name, one.low, one.high, design.rules.nonlinear_spread * (one.high - one.low), True)
             )
-    prior = design.prior if design.history is None else twins_held(design.prior, terms, design.rules.twin_drift)
+    prior = twins_held(design.prior, terms, design.rules.twin_drift)
     low, high = bounds(prior.names)
-    blocks = [design.block(name) for name in NULL[1:]]
-    parts: list[tuple[Floats, Floats]] = [(prior.mean, prior.covariance)]
-    for block in blocks:
-        if block.precision is not None and len(block):
-            covariance = np.asarray(np.linalg.inv(block.precision), dtype=np.float64)
-            parts.append((block.mean, covariance))
     # An amplitude is free; a nonlinear parameter is held to what the search found.
     spread = np.array([one.scale if one.is_shape else one.high - one.low for one in knobs])
     start = np.array([np.clip(one.of(terms), one.low, one.high) for one in knobs])
-    parts.append((start, np.diag(spread**2)))
-    free = np.full(sum(map(len, blocks)), np.inf)
-    names = (
-        *prior.names,
-        *(f"{name}:{label}" for name in NULL[1:] for label in design.block(name).labels),
-        *(f"{terms[one.index].effect}:{one.name}" for one in knobs),
-    )
-    joint = Gaussian(names, np.concatenate([mean for mean, _ in parts]), block_diag(*(part for _, part in parts)))
+    names = (*prior.names, *(f"{terms[one.index].effect}:{one.name}" for one in knobs))
+    joint = Gaussian(names, np.concatenate([prior.mean, start]), block_diag(prior.covariance, np.diag(spread**2)))
     return _Unknowns(
         design,
         tuple(before),
         tuple(terms),
         tuple(knobs),
         joint,
-        np.concatenate([low, -free, [one.low for one in knobs]]),
-        np.concatenate([high, free, [one.high for one in knobs]]),
+        np.concatenate([low, [one.low for one in knobs]]),
+        np.concatenate([high, [one.high for one in knobs]]),
     )
 
 
@@ -254,7 +236,7 @@ def twins_held(prior: Gaussian, terms: Sequence[ActiveTerm], share: float) -> Ga
 def _refitted(unknowns: _Unknowns, solution: solver.Solution, view: _View) -> list[Refitted]:
     """Return terms, deviations and regimes at the minimum."""
     knobs, design, point = unknowns.knobs, unknowns.design, solution.posterior.mean
-    shape = (-1, len(design.line.runs.day), view.average.observed.shape[1])
+    shape = (-1, len(design.line.runs.day), view.balances.observed.shape[1])
     # The scatter of what each day would move the point by (sandwich estimator).
     daily = np.einsum("brik,bri->rk", solution.jacobian.reshape(*shape, len(point)), solution.residuals.reshape(shape))
     influence = (daily @ solution.posterior.covariance)[design.fitted[:, 0]]
@@ -282,7 +264,7 @@ def _regimes(
 ) -> dict[str, tuple[float, float]]:
     """Return (amplitude, standard deviation) refitted on the samples of each regime, all else held.
 
-    Residual and slope of the amplitude are white, (b, r, intervals).
+    Residual and slope of the amplitude are white, (b, r, steps).
     """
     line, rules = unknowns.design.line, unknowns.design.rules
     samples, inputs = line.runs.samples - 1, line.record.inputs
@@ -294,10 +276,9 @@ def _regimes(
     whole = float(np.sum(slope**2))
     found = {}
     for name, mask in masks.items():
-        inside = averaged(mask.astype(np.float64), view.average.step, view.average.interval) > 0.5
-        curvature = float(np.sum((slope * inside) ** 2))
+        curvature = float(np.sum((slope * mask) ** 2))
         # A regime in which the effect hardly shows tells nothing of it.
         if curvature > rules.regime_information * whole:
-            change = -float(np.sum(slope * residual * inside)) / curvature
+            change = -float(np.sum(slope * residual * mask)) / curvature
             found[name] = (amplitude + change, curvature**-0.5)
     return found

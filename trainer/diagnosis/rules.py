@@ -12,7 +12,6 @@ from importlib.resources import files
 from typing import Any
 
 FILE = "learned/rules.json"
-HOUR = 3600.0
 
 
 def came_with_the_trainer(file: str) -> dict[str, Any]:
@@ -47,13 +46,8 @@ class DecisionRules:
     shipped_drift: float = _tuned(0.25, "the same in the model that is shipped, which follows whatever has no name")
     transferred_drift: float = _chosen(0.25, "the same between the greenhouse of the calibration and another one")
     least_drift_share: float = _chosen(0.3, "share of a parameter's usual value that the drift is at least taken of")
-    drift_days: float = _chosen(84.0, "days in which a parameter may drift so far to either side of its mean")
-    discrepancy_spread: float = _chosen(0.3, "relative change of the model discrepancy from the calibration to a log")
-    discrepancy_effect_ridge: float = _chosen(0.7, "prior deviation of an effect in it, in typical amplitudes")
-    discrepancy_pattern_ridge: float = _chosen(0.15, "prior deviation of a pattern in it, in its units")
 
     # What has changed since the calibration, where what the model misses of this greenhouse was learned then.
-    history: bool = _chosen(True, "ask what has changed since, and not what greenhouses with nothing missing show")
     least_history_days: float = _chosen(21.0, "days of a calibration log from which on a history is learned")
     omission_effect: float = _tuned(0.3, "prior deviation of an effect in the discrepancy, in typical amplitudes")
     unseen_effect: float = _chosen(1.0, "the same of one that the calibration log hardly shows, or not at all")
@@ -61,6 +55,9 @@ class DecisionRules:
         0.1, "size of an effect at its typical amplitude, over the errors, from which on it shows"
     )
     omission_pattern: float = _tuned(0.05, "the same of a pattern, in its units")
+    unknown_share: float = _tuned(
+        0.25, "share of these prior deviations in a greenhouse that no calibration has shown: what is there stands out"
+    )
     least_omission_gain: float = _chosen(4.0, "gain in the linear model from which on an omitted term is fitted")
     most_omission_fits: int = _chosen(4, "terms that are fitted beside the parameters, those that gain most")
     least_omission_fall: float = _fitted(
@@ -81,8 +78,7 @@ class DecisionRules:
     co2_source_drift: float = _tuned(0.1, "the same of a source of CO2, which a growing crop looks like")
     pattern_drift: float = _tuned(0.005, "the same of a pattern, in its units")
     later_days: float = _chosen(42.0, "days from a calibration to a later log up to which these hold; then as a walk")
-    change_onset_price: float = _tuned(12.0, "gain that a beginning of a change must add")
-    change_last_days: int = _tuned(5, "days at the end of a log in which no beginning of a change is looked for")
+    onset_price: float = _tuned(12.0, "gain that a beginning within the log must add")
     far_over_null: float = _tuned(
         2.5, "times what a change must gain from which on `least_skill` is enough of it, and no null skill is asked"
     )
@@ -120,42 +116,17 @@ class DecisionRules:
         2.5, "times what was found beside it that a parameter may gain, where that is to stand in its place"
     )
 
-    # Time steps or hours.
-    largest_disagreement: float = _fitted(
-        "mean squared difference of parameters fitted to hours and to time steps, over what chance makes, up to which "
-        "the model's structure counts as the greenhouse's own"
-    )
-    least_gained_variance: float = _chosen(0.02, "share of the prior that time steps must tell more than hours")
-    noise_rounds: int = _chosen(3, "alternations between coefficients and the colour of the noise")
-
     # The search.
+    noise_rounds: int = _chosen(3, "alternations between coefficients and the colour of the noise")
     flips: int = _chosen(999, "draws of day signs in the max-T test")
-    largest_p_value: float = _chosen(0.005, "of that test, the price of searching paid")
-    contenders: int = _chosen(8, "best causes of a scan that are compared, each beside its own noise")
-    first_onset_days: int = _chosen(3, "days at either end of a log in which no beginning is looked for")
+    first_onset_days: int = _chosen(3, "days at the beginning of a log in which no beginning is looked for")
+    last_onset_days: int = _tuned(5, "the same at its end")
     most_onsets: int = _chosen(30, "beginnings tried in a log; then day by day around the best")
     pattern_onset_stride: int = _chosen(4, "of the beginnings, every which one is tried for patterns")
-    onset_price: float = _chosen(9.0, "gain that a beginning within the log must add")
     beyond_bound: float = _chosen(1.5, "how far a linear fit may go beyond a bound, as a multiple")
 
-    # What a cause must gain.
-    least_gain_steps: float = _fitted("gain of a cause where time steps count: more than chance and searching bring")
-    least_gain: float = _fitted("the same where hours count: more than a wrong structure brings in four weeks")
-    least_gain_transferred: float = _fitted("the same of a model that was calibrated on another greenhouse")
-    least_gain_beyond_null: float = _chosen(9.0, "what must be left of it when an effect's usual size is allowed for")
     bootstrap_draws: int = _chosen(2000, "of unseen days")
-
-    # What a pattern must gain to stand for an unexplained discrepancy.
-    pattern_gain: float = _fitted("gain below which a pattern is none in a log of `fitted_days`")
-    pattern_gain_transferred: float = _fitted("the same of a model that was calibrated on another greenhouse")
-    clock_factor: float = _chosen(2.0, "times as much is asked of a pattern of the clock alone")
-    pattern_over_cause: float = _chosen(2.2, "times a cause's gain at which a pattern replaces it")
-    pattern_over_found: float = _chosen(1.0, "share of the gain of causes found before that a pattern must add")
-    pattern_further_gain: float = _chosen(8.0, "gain that each further pattern must add in a log of `fitted_days`")
-    further_clock_factor: float = _chosen(4.0, "times as much is asked of a further pattern of the clock alone")
     most_patterns: int = _chosen(3, "patterns of one unexplained discrepancy")
-    fitted_days: float = _chosen(28.0, "length of the logs that gains were fitted on")
-    largest_bootstrap_p: float = _chosen(0.5, "bootstrap p-value of unseen days being no likelier")
 
     # Sizes and confounded causes.
     confidence: float = _chosen(0.90, "of every interval")
@@ -184,8 +155,6 @@ class DecisionRules:
     clear_skill: float = _tuned(
         0.03, "share that a change, or a further cause, must remove, and that needs no other proof"
     )
-    further_bootstrap_p: float = _chosen(0.2, "largest bootstrap p-value of a second or third cause")
-    further_gain_share: float = _chosen(0.2, "gain of a second or third cause over that of those before it")
     least_actuator_odds: float = _chosen(
         3.0, "log odds that an actuator did what the rules say and did not stand still"
     )
@@ -196,14 +165,9 @@ class DecisionRules:
     open_vents_offset: float = _chosen(80.0, "ppm off the outdoor air that no crop makes under them")
     largest_pattern: float = _chosen(5.0, "bound of a pattern's amplitude in the corrected model, in its units")
 
-    # What is learned of greenhouses in which nothing is missing.
-    nuisance_directions: int = _chosen(8, "directions for models calibrated on the greenhouse itself")
-    nuisance_directions_transferred: int = _chosen(16, "directions for those calibrated on another one")
-    least_fitted_gain: float = _chosen(1.0, "gain in a scan from which on an effect's usual size is fitted")
-
     def learns_history(self, days: float) -> bool:
         """Tell whether a calibration log of so many days is to teach what is missing in this greenhouse."""
-        return self.history and days >= self.least_history_days
+        return days >= self.least_history_days
 
     def confounded_within(self, gain: float) -> float:
         """Return how much less than a cause of this gain another may gain that fits as well."""
@@ -212,16 +176,6 @@ class DecisionRules:
     def least_parameter_change(self, *, leads: bool) -> float:
         """Return the share of its value by which a parameter must have changed to be named."""
         return self.least_leading_change if leads else self.least_other_change
-
-    def gain_of_cause(self, *, time_steps: bool, transferred: bool) -> float:
-        """Return what a cause must gain."""
-        if time_steps:
-            return self.least_gain_steps
-        return self.least_gain_transferred if transferred else self.least_gain
-
-    def gain_of_pattern(self, *, transferred: bool) -> float:
-        """Return what a pattern must gain in a log of `fitted_days`."""
-        return self.pattern_gain_transferred if transferred else self.pattern_gain
 
 
 def read_rules() -> DecisionRules:

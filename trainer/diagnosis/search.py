@@ -184,8 +184,7 @@ class Hypothesis:
 def onset_days(design: Design) -> list[int | None]:
     """Return the days of beginning to be tried; None is always."""
     rules = design.rules
-    first = rules.first_onset_days
-    last = design.split.days - (first if design.history is None else rules.change_last_days)
+    first, last = rules.first_onset_days, design.split.days - rules.last_onset_days
     step = max(1, -(-(last - first) // rules.most_onsets))
     return [None, *range(first, last + 1, step)]
 
@@ -209,7 +208,7 @@ def score_candidates(
     columns, rules = design.block("effect").columns, design.rules
     scanned = scan(design.grams, current, columns, ageing, onsets, bounds, rng, rules.flips)
     return best_of_each(
-        scanned, design.candidates, ageing, [one.effect for one in design.candidates], design.onset_price
+        scanned, design.candidates, ageing, [one.effect for one in design.candidates], design.rules.onset_price
     )
 
 
@@ -230,7 +229,7 @@ def score_patterns(
     bounds = np.tile([-_UNBOUNDED, _UNBOUNDED], (count, 1))
     none: list[int | None] = [None] * count
     scanned = scan(design.grams, current, design.block("pattern").columns, none, onsets, bounds, rng, rules.flips)
-    return best_of_each(scanned, design.patterns, none, list(range(count)), design.onset_price)
+    return best_of_each(scanned, design.patterns, none, list(range(count)), design.rules.onset_price)
 
 
 def best_of_each(
@@ -262,7 +261,7 @@ def best_of_each(
 
 
 def column_of(design: Design, term: Term) -> Floats:
-    """Return the column of a term from its beginning on, (b, r, intervals)."""
+    """Return the column of a term from its beginning on, (b, r, steps)."""
     column: Floats = design.values[term.column]
     if term.onset is None:
         return column

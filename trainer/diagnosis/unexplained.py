@@ -20,7 +20,6 @@ from igrow.trainer.diagnosis.cross_validation import CrossValidated, cross_valid
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.linear import Term
 from igrow.trainer.diagnosis.null_gains import read_null_pattern_skills
-from igrow.trainer.diagnosis.recalibration import averaging
 from igrow.trainer.diagnosis.search import Hypothesis
 from igrow.trainer.fit.gaussian import Gaussian
 
@@ -43,7 +42,7 @@ def judged(design: Design, longitude: float, by_physics: Gaussian) -> Unexplaine
         by_physics: where the parameters may lie if they have changed as physics alone lets expect.
     """
     finer, courses = candidates.finer_columns(design.line, longitude)
-    columns = averaging(design.line, design.interval, design.rules)(courses)
+    columns = design.balances(courses)
     laid_out = replace(design, values=np.concatenate([design.values, columns]))
     places = [*design.block("pattern").columns, *range(len(design.values), len(laid_out.values))]
     every = zip((*design.patterns, *finer), places, strict=True)

@@ -93,7 +93,6 @@ def export(model: FittedModel, folder: Path | str, *, created: datetime | None =
         covariance=tuple(tuple(float(value) for value in row) for row in model.posterior.covariance),
         calibrated_on=model.calibrated_on,
         alignment=model.alignment,
-        discrepancy=dict(model.discrepancy),
         errors=model.errors,
         training_range=model.training_range,
         simulator={
@@ -139,7 +138,6 @@ def read_model(bundle: Bundle | Path | str, site: Site) -> FittedModel:
         posterior=_posterior(bundle, site),
         calibrated_on=manifest.calibrated_on if of_these else "",
         alignment=manifest.alignment,
-        discrepancy=manifest.discrepancy if of_these else {},
         history=_history_of(bundle) if of_these else None,
         effects=manifest.effects,
         actuation={name: float(given.get(f"actuation:{name}", rule.value)) for name, rule in actuation.RULES.items()},

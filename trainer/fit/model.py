@@ -39,10 +39,8 @@ class FittedModel:
     """Name of the site on whose log they were fitted; empty where it was none."""
     alignment: float | None = None
     """Rows of its log by which the actuators are read ahead; None: each log is asked."""
-    discrepancy: Mapping[str, float] = field(default_factory=dict)
-    """What the calibration could not explain on its own log, which is no finding later: amplitude by key."""
     history: Discrepancy | None = None
-    """The same with covariance and the colour of its noise, at the log's own step; None where it was not learned."""
+    """What the calibration could not explain on its own log, which is no finding later; None where it is not known."""
     effects: tuple[EffectRecord, ...] = ()
     omission: Omission | None = None
     """Terms that its calibration log says it lacks: among the effects only once the model is `completed`."""
@@ -89,7 +87,6 @@ class FittedModel:
         *,
         span: Span,
         errors: Sequence[HeldOutError],
-        discrepancy: Mapping[str, float] | None = None,
         crop: CropStages | None = None,
     ) -> FittedModel:
         """Return the model with what a later log of its greenhouse taught.
@@ -99,7 +96,6 @@ class FittedModel:
             effects: all that are active now.
             span: of the log.
             errors: of the corrected model, on days that no fit saw.
-            discrepancy: None where it stays as it is.
             crop: its growth as the log counts it; None where it stays as it is.
         """
         return replace(
@@ -110,7 +106,6 @@ class FittedModel:
             omission=None,
             training_span=span,
             errors=tuple(errors),
-            discrepancy=self.discrepancy if discrepancy is None else discrepancy,
             crop=crop or self.crop,
             # The history of another greenhouse is none of this one's.
             history=self.history if self.calibrated_on == self.site.name else None,
