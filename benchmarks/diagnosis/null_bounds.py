@@ -8,10 +8,10 @@ from importlib.resources import files
 from pathlib import Path
 
 from benchmarks.diagnosis import null_gains, null_skills
-from benchmarks.diagnosis.null_logs import SEEDS, unchanged
+from benchmarks.diagnosis.null_logs import SEEDS, by_the_built_in_bundle, unchanged
 from benchmarks.jobs import Jobs
 from benchmarks.provenance import provenance
-from igrow.trainer.diagnosis.null_gains import FILE, NullGains
+from igrow.trainer.diagnosis.null_gains import FILE, UNKNOWN_FILE, NullGains
 
 COMMAND = "python -m benchmarks.diagnosis null-bounds"
 
@@ -24,6 +24,7 @@ def main(processes: int) -> int:
         for file, bounds in null_skills.learn(jobs, logs, made).items():
             _write(file, bounds)
         _write(FILE, null_gains.learn(jobs, logs, made))
+        _write(UNKNOWN_FILE, null_gains.learn(jobs, by_the_built_in_bundle(logs), made))
     return 0
 
 

@@ -6,6 +6,7 @@ least with which none of these logs gets a name, each greenhouse judged by the g
 
 from __future__ import annotations
 
+import bisect
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,13 +17,14 @@ import numpy as np
 from benchmarks.diagnosis.null_logs import Later, circumstances
 from benchmarks.jobs import Jobs
 from igrow.trainer.data import prepare_log
-from igrow.trainer.diagnosis import change, diagnose, history, linear, parameter_change, search
+from igrow.trainer.diagnosis import change, diagnose, linear, parameter_change, search
 from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX
 from igrow.trainer.diagnosis.null_gains import BEGINNING_PREFIX, NullGains
+from igrow.trainer.diagnosis.rounds import search_of
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.diagnosis.visible_parameters import members
 
-LEAST, MOST = 8, 30
+LEAST, MOST = 8, 60
 """Bounds that are tried."""
 
 
@@ -47,15 +49,15 @@ class Gained:
 def gained(job: Later) -> Gained:
     """Return the gains of every effect and parameter in a log."""
     reference, case, _ = job
-    known, site, log = reference.model.history, reference.greenhouse.site, circumstances(job)
-    assert known is not None
-    days, rules = log.completed.days, log.rules
-    plain = history.laid_out(days, site, known, (), rules)
-    design = history.expected(known, plain, history.expected_misfit(known, plain))
+    site, log = reference.greenhouse.site, circumstances(job)
+    design = search_of(log.completed.days, site, log.knowledge, frozenset(), log.rules).design(())
     fitted, rng = linear.fit(design.grams, design.null_model()), np.random.default_rng(0)
     ranked = sorted(change.scored(design, fitted, rng), key=lambda one: -change.net_gain(design, one))
     effects = {one.effect: change.proven_gain(design, one) for one in ranked}
     beginnings = {one.effect: change.proven_begun_gain(design, one) for one in ranked if one.always is not None}
+    if log.knowledge.history is None:
+        # Nobody knows what a parameter was.
+        return Gained(site.name, case.group, effects, beginnings, {})
     joined = parameter_change.joined(design)
     scored = parameter_change.score(
         joined, linear.fit(joined.grams, joined.null_model()), search.onset_days(joined), np.random.default_rng(0)
@@ -107,15 +109,20 @@ def false_parameters(found: Sequence[Gained]) -> list[str]:
 
 def least_gain(jobs: Jobs, logs: Sequence[Later], found: Sequence[Gained]) -> float:
     """Return the least that every change must gain, so that none of these logs is given a name."""
-    for least in range(LEAST, MOST + 1):
+
+    def names_nothing(least: int) -> bool:
         known = [of_others(found, one.greenhouse, float(least)) for one in found]
         asked = [place for place, (one, mine) in enumerate(zip(found, known, strict=True)) if is_asked(one, mine)]
         told = list(jobs.each(named, [(logs[place], known[place]) for place in asked]))
         claims = [(found[place].greenhouse, names) for place, names in zip(asked, told, strict=True) if names]
         print(f"  least gain {least}: {len(asked)} gain what they must; named: {len(claims)} {claims}", flush=True)
-        if not claims:
-            return float(least)
-    return float(MOST)
+        return not claims
+
+    tried = range(LEAST, MOST + 1)
+    place = bisect.bisect_left(tried, True, key=names_nothing)
+    if place == len(tried):
+        raise SystemExit(f"with {MOST} nats some of these logs are given a name still: look at what they show")
+    return float(tried[place])
 
 
 def learn(jobs: Jobs, logs: Sequence[Later], made: Mapping[str, Any]) -> NullGains:

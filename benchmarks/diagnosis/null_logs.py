@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 
 from benchmarks.diagnosis.cases import Case
-from benchmarks.diagnosis.logs import Reference
+from benchmarks.diagnosis.logs import Reference, built_in
 from benchmarks.diagnosis.nurseries import calibrated, calibration_logs, later_logs, nursery
 from benchmarks.jobs import Jobs
 from igrow.core.telemetry import Telemetry
@@ -44,6 +45,11 @@ def circumstances(job: Later) -> Circumstances:
     reference, _, telemetry = job
     model = reference.model
     return circumstances_of(prepare_log(telemetry, reference.greenhouse.site), model, model.history, DEFAULT)
+
+
+def by_the_built_in_bundle(logs: Sequence[Later]) -> list[Later]:
+    """Return logs of greenhouses of which their site's description alone is known."""
+    return [(replace(one, model=built_in(one.greenhouse.site)), case, log) for one, case, log in logs]
 
 
 def unchanged(jobs: Jobs) -> list[Later]:

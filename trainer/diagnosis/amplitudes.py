@@ -79,7 +79,7 @@ def hardly_shown(design: Design) -> frozenset[str]:
 
 
 def _root_mean_square(columns: Floats) -> Floats:
-    """Return that of every balance, (..., b, r, intervals) -> (..., b)."""
+    """Return that of every balance, (..., b, r, steps) -> (..., b)."""
     found: Floats = np.sqrt(np.mean(columns**2, axis=(-2, -1)))
     return found
 

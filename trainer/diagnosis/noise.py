@@ -115,8 +115,8 @@ def fit_noise(errors: Floats, observed: Mask, fitted: Mask, start: Whitening | N
     """Fit colour and scale of the disturbances to errors on the fit days.
 
     Args:
-        errors: of the balances at hand, (b, r, intervals).
-        observed: intervals that count, (r, intervals).
+        errors: of the balances at hand, (b, r, steps).
+        observed: time steps that count, (r, steps).
         fitted: runs on days for fitting, (r, 1).
         start: where to begin.
     """

@@ -16,7 +16,7 @@ from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.estimate import Estimated, estimate, with_refitted, within_bounds
 from igrow.trainer.diagnosis.freerun import LogDays
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge
-from igrow.trainer.diagnosis.null_gains import NullGains, read_null_gains
+from igrow.trainer.diagnosis.null_gains import NullGains, read_null_gains, read_unknown_gains
 from igrow.trainer.diagnosis.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.refit import refit
 from igrow.trainer.diagnosis.rules import DecisionRules
@@ -215,14 +215,15 @@ def search_of(
 
     What a change must gain was learned from the weeks next to a calibration. In later ones a season makes more of what
     a calibration misses, so that only what gains far more is told (`is_later`), and nothing that unseen days alone tell
-    (`by_days`). So it is in a greenhouse that no calibration has shown.
+    (`by_days`). In a greenhouse that no calibration has shown a cause has bounds of its own, and unseen days alone tell
+    nothing either.
     """
-    gains = null_gains or read_null_gains()
-    if knowledge.history is None:
-        known = history.unknown(days, site, knowledge, rules)
-        plain = history.laid_out(days, site, known, (), rules)
-        return Search(days, site, knowledge, without, rules, known, plain, None, gains, True, False)
     known = knowledge.history
+    if known is None:
+        known, gains = history.unknown(days, site, knowledge, rules), null_gains or read_unknown_gains()
+        plain = history.laid_out(days, site, known, (), rules)
+        return Search(days, site, knowledge, without, rules, known, plain, None, gains, by_days=False)
+    gains = null_gains or read_null_gains()
     plain = history.laid_out(days, site, known, (), rules)
     misfit = history.expected_misfit(known, plain)
     return Search(days, site, knowledge, without, rules, known, plain, misfit, gains, is_later, by_days)
