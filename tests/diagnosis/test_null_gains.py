@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
 from benchmarks.diagnosis import null_gains as learning
 from benchmarks.diagnosis import null_skills as skills
 from benchmarks.diagnosis.null_gains import Gained
@@ -16,6 +21,7 @@ from igrow.trainer.diagnosis.null_gains import (
     read_null_gains,
     read_null_pattern_skills,
     read_null_skills,
+    read_unknown_gains,
 )
 
 
@@ -62,6 +68,28 @@ def test_what_came_with_the_trainer_knows_effects_and_parameters() -> None:
     assert set(effects) <= set(EFFECTS)
     assert "parameter:transmissivity" in known.largest
     assert any(name.startswith(BEGINNING_PREFIX) for name in known.largest)
+
+
+def test_of_an_unknown_greenhouse_more_is_asked_and_of_effects_alone() -> None:
+    unknown = read_unknown_gains()
+    assert unknown.least > read_null_gains().least
+    assert {name.removeprefix(BEGINNING_PREFIX) for name in unknown.largest} <= set(EFFECTS)
+
+
+@pytest.mark.parametrize("largest", [9, 23, 60, 61])
+def test_every_change_must_gain_the_least_with_which_no_such_log_is_named(
+    largest: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where even the most that is tried names something, the logs are to be looked at: no bound is made up."""
+    found = [Gained("one", "nothing", {"lamp_heat": float(largest) - 0.5}, {}, {})]
+    monkeypatch.setattr(learning, "named", lambda _job: ("lamp_heat",))
+    jobs, logs = cast(Any, SimpleNamespace(each=map)), cast(Any, [None])
+    if largest > learning.MOST:
+        with pytest.raises(SystemExit, match="are given a name still"):
+            learning.least_gain(jobs, logs, found, may=0)
+    else:
+        assert learning.least_gain(jobs, logs, found, may=0) == largest
+        assert learning.least_gain(jobs, logs, found, may=1) == learning.LEAST
 
 
 def test_a_greenhouse_is_judged_by_the_gains_of_the_others() -> None:
