@@ -62,12 +62,11 @@ def test_it_has_bounds_of_its_own_and_neither_days_nor_parameters_are_asked(dark
 
 
 @pytest.mark.slow
-def test_by_the_built_in_bundle_a_large_fault_of_a_sensor_is_told_and_nothing_without_it(quiet_log: Log) -> None:
+def test_by_the_built_in_bundle_a_large_cause_is_told_and_nothing_without_it(quiet_log: Log) -> None:
     model = read_model(read_bundle(default_bundle_folder()), SITE)
     assert not diagnose(quiet_log, model).findings
-    humid = quiet_log.with_columns({"air_humidity": np.clip(quiet_log.telemetry["air_humidity"] + 15.0, 0.0, 100.0)})
-    told = diagnose(humid, model)
-    assert [one.effect for one in told.findings] == ["humidity_offset"]
+    told = diagnose(quiet_log.with_columns({"air_co2": quiet_log.telemetry["air_co2"] + 150.0}), model)
+    assert [one.effect for one in told.findings] == ["co2_offset"]
     assert wording.NOT_CALIBRATED in told.notes
 
 
