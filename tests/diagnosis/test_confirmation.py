@@ -15,7 +15,8 @@ from igrow.trainer.diagnosis import DEFAULT, confirmation
 from igrow.trainer.diagnosis.confirmation import confirmed
 from igrow.trainer.diagnosis.estimate import Estimated
 from igrow.trainer.diagnosis.freerun import log_days
-from igrow.trainer.diagnosis.knowledge import ActiveTerm, knowledge_of
+from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, knowledge_of
+from igrow.trainer.fit import FittedModel
 from tests.diagnosis.conftest import model_in_force
 from tests.virtual_log import SITE, virtual_log
 
@@ -27,13 +28,18 @@ def change(size: float, onset: np.datetime64 | None = None) -> Estimated:
     return Estimated(hypothesis, term, Estimate(size, 0.5 * size, 1.5 * size, "K"), 30.0, None, (term.effect,))
 
 
+def known(model: FittedModel) -> Knowledge:
+    """Return what is known of a greenhouse whose calibration taught what is missing even then."""
+    return replace(knowledge_of(model, SITE, DEFAULT), history=cast(Any, object()))
+
+
 @pytest.mark.parametrize("size", [0.4, 2.5])
 def test_the_size_is_that_of_free_runs(size: float) -> None:
     telemetry = virtual_log(16, seed=3, step=900.0)
     columns = dict(telemetry.columns) | {"air_temperature": telemetry.columns["air_temperature"] + 1.0}
     model = model_in_force()
     log = log_days(prepare_log(replace(telemetry, columns=columns), SITE), model)
-    found = confirmed(log, knowledge_of(model, SITE, DEFAULT), (), [change(size)], DEFAULT)
+    found = confirmed(log, known(model), (), [change(size)], DEFAULT)
     assert found is not None
     assert found.term.amplitude == pytest.approx(1.0, abs=0.3)
     assert found.change_skill > DEFAULT.clear_skill
@@ -50,8 +56,11 @@ def test_where_steps_and_runs_tell_another_size_nothing_is_told(
     monkeypatch.setattr(confirmation, "_by_runs", lambda *_: [by_runs])
     monkeypatch.setattr(confirmation, "cross_validated_skill", lambda *_: 0.1)
     log = cast(Any, SimpleNamespace(fit=lambda *_: None))
-    found = confirmed(log, knowledge_of(model_in_force(), SITE, DEFAULT), (), [change(1.0)], DEFAULT)
+    found = confirmed(log, known(model_in_force()), (), [change(1.0)], DEFAULT)
     assert (found is not None) is told
+    # Of a greenhouse that no calibration has shown runs tell no size: its parameters may be anything.
+    unknown = confirmed(log, knowledge_of(model_in_force(), SITE, DEFAULT), (), [change(1.0)], DEFAULT)
+    assert unknown is not None and unknown.term.amplitude == 1.0
 
 
 def test_of_what_began_within_the_log_the_days_since_then_tell_the_size() -> None:

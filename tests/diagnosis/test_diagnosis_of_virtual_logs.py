@@ -162,20 +162,20 @@ def test_the_report_is_one_page_that_fetches_nothing(leak: Diagnosis, tmp_path: 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "drier",
+    "colder",
     [
-        6.0,
+        3.0,
         pytest.param(
             0.0,
             marks=pytest.mark.xfail(strict=True, reason="since stomata close a leak alone is not told without wind"),
         ),
     ],
 )
-def test_without_wind_a_leak_is_among_what_it_could_be_whatever_is_named(leaky_log: Log, drier: float) -> None:
+def test_without_wind_a_leak_is_among_what_it_could_be_whatever_is_named(leaky_log: Log, colder: float) -> None:
     """Vents that do not close were named alone, in other such logs sensors of humidity and temperature."""
     lacking = {"wind_speed", "outdoor_humidity", "co2_dosing"}
     kept = [name for name in leaky_log.telemetry.columns if name not in lacking]
-    shown = leaky_log.with_columns({"air_humidity": np.array(leaky_log.telemetry["air_humidity"]) - drier})
+    shown = leaky_log.with_columns({"air_temperature": np.array(leaky_log.telemetry["air_temperature"]) - colder})
     result = diagnose(prepare_log(shown.telemetry.only(kept), SITE), model_in_force())
     assert result.verdict == "ambiguous"
     assert set(result.errors) == {"air_temperature", "air_humidity"}, "of CO2 the dose is not known"
@@ -200,7 +200,7 @@ def test_a_sensor_that_is_off_from_a_day_on_is_named_with_its_size_and_day(seed:
     result = diagnose(log.with_columns({"air_temperature": off}), model_in_force())
     (found,) = result.findings
     assert (found.effect, found.kind) == ("air_temperature_offset", "sensor")
-    assert found.parameters["offset"].value == pytest.approx(1.5, rel=0.06)
+    assert found.parameters["offset"].value == pytest.approx(1.5, rel=0.1)
     assert found.parameters["offset"].low < 1.5 < found.parameters["offset"].high
     began = log.telemetry.time[0] + np.timedelta64(round(9.4 * 24), "h")
     assert found.onset is not None

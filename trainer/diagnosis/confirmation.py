@@ -36,7 +36,10 @@ def confirmed(
     """
     prior = knowledge.by_physics(rules)
     one, *later = asked
-    sizes = _by_runs(log, prior, standing, [change.term for change in asked], rules)
+    # Where parameters may be anything, free runs leave a cause what belongs to them, or take it from it.
+    sizes = None
+    if knowledge.history is not None:
+        sizes = _by_runs(log, prior, standing, [change.term for change in asked], rules)
     if sizes is not None:
         share = sizes[0] / one.term.amplitude
         if share <= 0.0 or min(share, 1.0 / share) < rules.regime_share:
