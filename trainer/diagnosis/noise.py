@@ -140,18 +140,6 @@ def filter_of(raw: tuple[float, ...]) -> NoiseFilter:
     return NoiseFilter(*_coefficients(np.asarray(raw)), raw)
 
 
-def log_likelihood(whitening: Whitening, errors: Floats) -> Floats:
-    """Return the log-likelihood of every sample under Student's t but for a constant, (r, steps).
-
-    Args:
-        whitening: fitted to these errors, or to others.
-        errors: of runs, (b, r, steps), 0 where not observed.
-    """
-    distance = _distance(whitening, errors)
-    scale = float(np.log(np.diag(whitening.root)).sum())
-    return np.asarray(scale - 0.5 * (FREEDOM + len(errors)) * np.log1p(distance / FREEDOM))
-
-
 def extend(whitening: Whitening, errors: Floats, counted: Mask) -> Whitening:
     """Return the whitening with weights for other samples than it was fitted on."""
     distance = _distance(whitening, errors)
