@@ -14,7 +14,7 @@ from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import Log
 from igrow.trainer.diagnosis import circumstances, diagnose, rounds, wording
 from igrow.trainer.diagnosis.crop import LEAVES_AND_LIGHT, has_new_crop, new_leaves, of_one_crop, with_its_drift
-from igrow.trainer.diagnosis.knowledge import knowledge_of
+from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, knowledge_of
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.fit import FittedModel
 from igrow.trainer.fit.discrepancy import Discrepancy
@@ -35,8 +35,10 @@ def log_of(log: Log, first: int, last: int) -> Log:
 def calibrated(middle: np.datetime64) -> FittedModel:
     """A model whose history was learned from weeks about a time, at other steps than these logs have."""
     model = model_in_force()
-    learned = Discrepancy(model.posterior.values, Gaussian((), np.zeros(0), np.zeros((0, 0))), {}, STEP, {}, middle)
-    return replace(model, history=learned)
+    posterior = model.posterior
+    keys = tuple(PARAMETER_PREFIX + name for name in posterior.names)
+    known = Gaussian(keys, np.zeros(len(keys)), posterior.covariance)
+    return replace(model, history=Discrepancy(posterior.values, known, {}, STEP, {}, middle))
 
 
 @pytest.mark.parametrize(
