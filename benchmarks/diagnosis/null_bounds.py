@@ -13,8 +13,6 @@ from benchmarks.jobs import Jobs
 from benchmarks.provenance import provenance
 from igrow.trainer.diagnosis.null_gains import FILE, UNKNOWN_FILE, NullGains
 
-FALSE_CLAIMS = 0.02
-"""Share of logs of greenhouses that no calibration has shown, with nothing missing, that may be given a name."""
 COMMAND = "python -m benchmarks.diagnosis null-bounds"
 
 
@@ -26,7 +24,7 @@ def main(processes: int) -> int:
         for file, bounds in null_skills.learn(jobs, logs, made).items():
             _write(file, bounds)
         _write(FILE, null_gains.learn(jobs, logs, made))
-        _write(UNKNOWN_FILE, null_gains.learn(jobs, by_the_built_in_bundle(logs), made, FALSE_CLAIMS))
+        _write(UNKNOWN_FILE, null_gains.learn(jobs, by_the_built_in_bundle(logs), made, null_skills.FALSE_CLAIMS))
     return 0
 
 

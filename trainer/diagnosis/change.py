@@ -18,7 +18,7 @@ from igrow.trainer.diagnosis import linear, search
 from igrow.trainer.diagnosis.candidates import Pattern
 from igrow.trainer.diagnosis.design import Design
 from igrow.trainer.diagnosis.linear import Fit, LinearModel
-from igrow.trainer.diagnosis.null_gains import BEGINNING_PREFIX
+from igrow.trainer.diagnosis.null_gains import BEGINNING_PREFIX, NullGains
 from igrow.trainer.diagnosis.search import Hypothesis
 
 
@@ -77,7 +77,7 @@ def scored(design: Design, null: Fit, rng: np.random.Generator) -> list[Hypothes
     found = search.score_candidates(design, null, search.onset_days(design), rng)
     always = {one.effect: one.gain for one in search.score_candidates(design, null, [None], rng)}
     found = [one if one.term.onset is None else replace(one, always=always.get(one.effect, 0.0)) for one in found]
-    alone = design.history is None or not design.history.unnamed
+    alone = not design.known.unnamed
     return [one for one in found if alone or one.always is not None or EFFECTS[one.effect].kind == "sensor"]
 
 
@@ -110,7 +110,7 @@ def left_by_hour(design: Design, null: Fit, cause: Hypothesis, rng: np.random.Ge
 
 def best(design: Design, scored: list[Hypothesis]) -> Hypothesis | None:
     """Return the hypothesis with the largest net gain, None for none."""
-    known = design.history.without if design.history is not None else frozenset()
+    known = design.known.without
     return max((one for one in scored if one.effect not in known), key=lambda one: net_gain(design, one), default=None)
 
 
@@ -134,22 +134,23 @@ def proven_begun_gain(design: Design, one: Hypothesis) -> float:
 
 
 def over_null(design: Design, one: Hypothesis) -> float:
-    """Return what an effect surely gains, over what it must; 0 where no history tells what that is."""
-    if design.history is None or design.history.null_gains is None:
-        return 0.0
-    return max(proven_gain(design, one) / design.history.null_gains.needed(one.effect), begun_over_null(design, one))
+    """Return what an effect surely gains, over what it must."""
+    return max(proven_gain(design, one) / _null_gains(design).needed(one.effect), begun_over_null(design, one))
 
 
 def begun_over_null(design: Design, one: Hypothesis) -> float:
     """Return the same of its beginning within the log."""
-    if design.history is None or design.history.null_gains is None:
-        return 0.0
-    return proven_begun_gain(design, one) / design.history.null_gains.needed(BEGINNING_PREFIX + one.effect)
+    return proven_begun_gain(design, one) / _null_gains(design).needed(BEGINNING_PREFIX + one.effect)
+
+
+def _null_gains(design: Design) -> NullGains:
+    known = design.known.null_gains
+    assert known is not None
+    return known
 
 
 def _own_gain(design: Design, one: Hypothesis) -> float:
-    assert design.history is not None
-    return design.history.own_gains.get(one.key, 0.0)
+    return design.known.own_gains.get(one.key, 0.0)
 
 
 def _proven(design: Design, one: Hypothesis, without: float) -> float:

@@ -146,19 +146,17 @@ def rivals(design: Design, first: Hypothesis, scored: Sequence[Hypothesis]) -> l
         first: an effect or a pattern.
         scored: effects or patterns, each with its beginning.
     """
-    assert design.history is not None
     gain = change.net_gain(design, first)
     least = gain - design.rules.confounded_within(gain)
-    asked = (one for one in scored if one.key != first.key and one.effect not in design.history.without)
+    asked = (one for one in scored if one.key != first.key and one.effect not in design.known.without)
     return [one for one in asked if change.net_gain(design, one) >= least]
 
 
 def promising(design: Design, rng: np.random.Generator) -> list[Hypothesis]:
     """Return the effects that gain enough to be asked of unseen days, as if they had been there all the time."""
-    assert design.history is not None
     null = linear.fit(design.grams, design.null_model())
     scored = search.score_candidates(design, null, [None], rng)
-    asked = (one for one in scored if one.effect not in design.history.without)
+    asked = (one for one in scored if one.effect not in design.known.without)
     return [one for one in asked if change.net_gain(design, one) >= design.rules.least_unproven_change]
 
 
@@ -172,9 +170,9 @@ def cross_validated(design: Design, by_physics: Gaussian, hypotheses: Sequence[H
     """
     if not hypotheses:
         return []
-    assert design.history is not None and design.prior.names == by_physics.names
+    assert design.prior.names == by_physics.names
     # Where the model is linear about: the prior is where the parameters are expected.
-    stand = design.prior.mean - design.history.amplitudes.mean[: len(by_physics.names)]
+    stand = design.prior.mean - design.known.amplitudes.mean[: len(by_physics.names)]
     columns = np.array([search.column_of(design, one.term) for one in hypotheses])
     limits = np.array([_reach(design, one) for one in hypotheses])
     joint = design.null_model()
@@ -184,7 +182,7 @@ def cross_validated(design: Design, by_physics: Gaussian, hypotheses: Sequence[H
         _falls(design, errors, design.values[list(joint.base)], joint, columns, limits),
         _falls(
             design,
-            errors - design.history.misfit,
+            errors - design.known.misfit,
             design.values[held.start : held.stop],
             LinearModel(tuple(held), by_physics.precision, by_physics.mean - stand),
             columns,

@@ -93,7 +93,7 @@ class Design:
     """Of the block of patterns."""
     untestable: tuple[str, ...]
     history: History | None = None
-    """What is known of the greenhouse before the log; None: not yet asked."""
+    """What is known of the greenhouse before the log; None as long as the log is only laid out."""
 
     def block(self, name: str) -> Block:
         """Return a block by name.
@@ -114,14 +114,19 @@ class Design:
         ]
 
     @property
+    def known(self) -> History:
+        """What is known of the greenhouse before the log: no design is searched without."""
+        assert self.history is not None
+        return self.history
+
+    @property
     def observed(self) -> Mask:
         """Time steps that count, (r, steps)."""
         return self.balances.observed
 
     def null_model(self) -> LinearModel:
         """Return the model under which nothing is missing."""
-        assert self.history is not None
-        joint = self.history.amplitudes
+        joint = self.known.amplitudes
         columns = tuple(column for name in JOINT for column in self.blocks[name].columns)
         return LinearModel(columns, joint.precision, joint.mean)
 

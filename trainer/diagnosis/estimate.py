@@ -152,7 +152,7 @@ def _confounded(
     least = max(gain - design.rules.confounded_within(gain), design.rules.least_unproven_change)
     onsets = search.onset_days(design) if hypothesis.term.onset is not None else [None]
     scored = search.score_candidates(design, null, onsets, rng)
-    hidden = frozenset[str]() if design.history is None else design.history.without
+    hidden = design.known.without
     as_good = [one.effect for one in scored if one.gain >= least and one.effect not in hidden]
     return (hypothesis.effect, *(name for name in as_good if name != hypothesis.effect))
 

@@ -309,14 +309,13 @@ def own_gains(design: Design) -> dict[str, float]:
     """
     design = parameter_change.joined(design)
     null, days = design.null_model(), design.split.days
-    assert design.history is not None
     change, largest = drift_within(design), dict[str, float]()
     for parts in PARTS:
         part = np.arange(days) * parts // days
         for number in range(parts):
             inside = part == number
             rest = linear.fit(DailyGrams(design.grams.products, ~inside), null).solution
-            after = Gaussian(design.history.amplitudes.names, rest.coefficients, rest.inverse).widened(change)
+            after = Gaussian(design.known.amplitudes.names, rest.coefficients, rest.inverse).widened(change)
             window = replace(design, grams=DailyGrams(design.grams.products, inside))
             current = linear.fit(window.grams, LinearModel(null.base, after.precision, after.mean))
             rng = np.random.default_rng(0)

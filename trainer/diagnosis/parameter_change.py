@@ -51,8 +51,7 @@ def find(design: Design, rng: np.random.Generator) -> ParameterChange | None:
         design: of the log.
         rng: for the flips.
     """
-    assert design.history is not None
-    rules, unasked, design = design.rules, design.history.without, joined(design)
+    rules, unasked, design = design.rules, design.known.without, joined(design)
     null, onsets = linear.fit(design.grams, design.null_model()), search.onset_days(design)
     scored = score(design, null, onsets, rng)
     net = {one.parameter: change.proven_gain(design, one) - _needed_gain(design, one) for one in scored}
@@ -225,6 +224,7 @@ def _range(design: Design, name: str) -> tuple[float, float, float]:
 
 def _needed_gain(design: Design, one: Hypothesis) -> float:
     """Return what a parameter must gain: much more than it did in any greenhouse in which nothing had changed."""
-    assert design.history is not None and design.history.null_gains is not None
-    usual = design.history.null_gains.largest.get(one.key, 0.0)
+    known = design.known.null_gains
+    assert known is not None
+    usual = known.largest.get(one.key, 0.0)
     return max(design.rules.least_parameter_gain, design.rules.parameter_over_null * usual)

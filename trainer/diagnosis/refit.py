@@ -143,8 +143,7 @@ def refit(design: Design, named: Fit, terms: Sequence[ActiveTerm], before: Seque
     rules, prior, balances = design.rules, design.prior, design.balances
     unknowns = _unknowns(design, terms, before)
     size = len(prior.names)
-    assert design.history is not None
-    misfit = design.history.misfit
+    misfit = design.known.misfit
     # Where the search left off.
     point = unknowns.prior.mean.copy()
     point[:size] = named.solution.coefficients[:size] + [design.line.parameters[name] for name in prior.names]
