@@ -1,17 +1,21 @@
-"""Logs of greenhouses in which nothing has changed since their calibration: what a change must exceed comes of these.
+"""Logs of greenhouses in which nothing is missing: what a change must exceed comes of these.
 
 In every nursery (one a season) each greenhouse is calibrated on eight weeks, and then logged three times more, with
-nothing missing but a little drift, once with wrong noise or a cleaned cover. No case of a benchmark has these seeds.
+nothing missing but a little drift, once with wrong noise or a cleaned cover. Of greenhouses of which the site's
+description alone is known these logs tell something too, beside logs of other places and at any time of the year. No
+case of a benchmark has these seeds.
 """
 
 from __future__ import annotations
 
+import itertools
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
 
 from benchmarks.diagnosis.cases import Case
-from benchmarks.diagnosis.logs import Reference, built_in
+from benchmarks.diagnosis.greenhouses import VirtualGreenhouse, others
+from benchmarks.diagnosis.logs import Reference, built_in, simulate_cases
 from benchmarks.diagnosis.nurseries import calibrated, calibration_logs, later_logs, nursery
 from benchmarks.jobs import Jobs
 from igrow.core.telemetry import Telemetry
@@ -21,8 +25,10 @@ from igrow.trainer.diagnosis.circumstances import Circumstances, circumstances_o
 
 SEEDS = {"spring": 110_000, "autumn": 120_000, "winter": 130_000}
 GREENHOUSES, DAYS = 16, 28
+UNKNOWN_SEED, UNKNOWN = 140_000, 72
+"""Of greenhouses anywhere, and how many."""
 Later = tuple[Reference, Case, Telemetry]
-"""A log in which nothing is missing, of a greenhouse that was calibrated before."""
+"""A log in which nothing is missing, of a greenhouse, and the model that it is asked by."""
 
 
 def null_cases(season: str, known: Sequence[Reference]) -> list[list[Case]]:
@@ -50,6 +56,30 @@ def circumstances(job: Later) -> Circumstances:
 def by_the_built_in_bundle(logs: Sequence[Later]) -> list[Later]:
     """Return logs of greenhouses of which their site's description alone is known."""
     return [(replace(one, model=built_in(one.greenhouse.site)), case, log) for one, case, log in logs]
+
+
+def unknown(jobs: Jobs) -> list[Later]:
+    """Simulate greenhouses anywhere, at any time of the year, each with the built-in bundle; every third is noisy."""
+    greenhouses = others(UNKNOWN, UNKNOWN_SEED)
+    cases = [
+        Case(
+            name=name, group=group, greenhouse=name, seed=UNKNOWN_SEED + 500 + place, heavy_tails=bool(place % 2),
+            wrong_noise=group == "noise",
+        )
+        for place, (name, group) in enumerate(zip(greenhouses, itertools.cycle(("nothing", "nothing", "noise"))))
+    ]  # fmt: skip
+    found: list[Later] = []
+    for one in jobs.each(_unknown, list(zip(greenhouses.values(), cases, strict=True))):
+        found.append(one)
+        print(f"{len(found)} of {len(cases)} unknown greenhouses", file=sys.stderr, flush=True)
+    return found
+
+
+def _unknown(job: tuple[VirtualGreenhouse, Case]) -> Later:
+    greenhouse, case = job
+    described = Reference(greenhouse, built_in(greenhouse.site), {}, None)
+    (log,) = simulate_cases(described, [case], DAYS)
+    return described, case, log
 
 
 def unchanged(jobs: Jobs) -> list[Later]:
