@@ -21,7 +21,7 @@ from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.data import Log
 from igrow.trainer.data.splits import held_out_weeks
 from igrow.trainer.diagnosis import DEFAULT, examine, history_of
-from igrow.trainer.diagnosis.wording import thin_air
+from igrow.trainer.diagnosis.answer.wording import thin_air
 from igrow.trainer.fit.actuation import by_its_own_rules, fit_actuation, setpoint_columns, unanswered
 from igrow.trainer.fit.climate import fit_climate
 from igrow.trainer.fit.evaluation import held_out_errors

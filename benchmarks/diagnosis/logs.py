@@ -21,7 +21,8 @@ from igrow.core.telemetry import Telemetry
 from igrow.trainer.calibration import calibrate
 from igrow.trainer.data import prepare_log
 from igrow.trainer.data.splits import split_days
-from igrow.trainer.diagnosis import DEFAULT, freerun, history_of, sensitivity
+from igrow.trainer.diagnosis import DEFAULT, history_of
+from igrow.trainer.diagnosis.design import freerun, sensitivity
 from igrow.trainer.exporting import read_model
 from igrow.trainer.fit import FittedModel
 

@@ -8,24 +8,23 @@ from importlib.resources import files
 from pathlib import Path
 
 from benchmarks.diagnosis import null_gains, null_skills
-from benchmarks.diagnosis.null_logs import SEEDS, UNKNOWN_SEED, by_the_built_in_bundle, unchanged, unknown
+from benchmarks.diagnosis.null_logs import SEEDS, UNKNOWN_SEEDS, by_the_built_in_bundle, unchanged, unknown
 from benchmarks.jobs import Jobs
 from benchmarks.provenance import provenance
-from igrow.trainer.diagnosis.null_gains import FILE, UNKNOWN_FILE, NullGains
+from igrow.trainer.diagnosis.learned.null_gains import FILE, UNKNOWN_FILE, NullGains
 
 COMMAND = "python -m benchmarks.diagnosis null-bounds"
 
 
 def main(processes: int) -> int:
     """Write the bounds into the package: skills first, since diagnoses go by them when the least gain is learned."""
-    made = provenance(COMMAND, dict(SEEDS, unknown=UNKNOWN_SEED))
     with Jobs("diagnosis null-bounds", processes) as jobs:
-        logs = unchanged(jobs)
+        logs, made = unchanged(jobs), provenance(COMMAND, dict(SEEDS))
         for file, bounds in null_skills.learn(jobs, logs, made).items():
             _write(file, bounds)
         _write(FILE, null_gains.learn(jobs, logs, made))
-        described = by_the_built_in_bundle(logs) + unknown(jobs)
-        _write(UNKNOWN_FILE, null_gains.learn(jobs, described, made, null_skills.FALSE_CLAIMS))
+        logs, made = by_the_built_in_bundle(logs) + unknown(jobs), provenance(COMMAND, SEEDS | UNKNOWN_SEEDS)
+        _write(UNKNOWN_FILE, null_gains.learn(jobs, logs, made, null_skills.FALSE_CLAIMS))
     return 0
 
 

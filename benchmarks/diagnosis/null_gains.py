@@ -18,11 +18,13 @@ import numpy as np
 from benchmarks.diagnosis.null_logs import Later, circumstances
 from benchmarks.jobs import Jobs
 from igrow.trainer.data import prepare_log
-from igrow.trainer.diagnosis import change, diagnose, linear, parameter_change, search
+from igrow.trainer.diagnosis import diagnose
+from igrow.trainer.diagnosis.design import linear
 from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX
-from igrow.trainer.diagnosis.null_gains import BEGINNING_PREFIX, NullGains
-from igrow.trainer.diagnosis.rounds import search_of
+from igrow.trainer.diagnosis.learned.null_gains import BEGINNING_PREFIX, NullGains
 from igrow.trainer.diagnosis.rules import DEFAULT
+from igrow.trainer.diagnosis.search import change, parameter_change, scan
+from igrow.trainer.diagnosis.search.rounds import search_of
 from igrow.trainer.diagnosis.visible_parameters import members
 
 LEAST, MOST = 8, 60
@@ -61,7 +63,7 @@ def gained(job: Later) -> Gained:
         return Gained(site.name, case.group, effects, beginnings, {})
     joined = parameter_change.joined(design)
     scored = parameter_change.score(
-        joined, linear.fit(joined.grams, joined.null_model()), search.onset_days(joined), np.random.default_rng(0)
+        joined, linear.fit(joined.grams, joined.null_model()), scan.onset_days(joined), np.random.default_rng(0)
     )
     parameters = {one.key: change.proven_gain(joined, one) for one in scored}
     asked = {

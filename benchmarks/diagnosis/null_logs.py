@@ -25,7 +25,7 @@ from igrow.trainer.diagnosis.circumstances import Circumstances, circumstances_o
 
 SEEDS = {"spring": 110_000, "autumn": 120_000, "winter": 130_000}
 GREENHOUSES, DAYS = 16, 28
-UNKNOWN_SEED, UNKNOWN = 140_000, 72
+UNKNOWN_SEEDS, UNKNOWN = {"anywhere": 140_000}, 72
 """Of greenhouses anywhere, and how many."""
 Later = tuple[Reference, Case, Telemetry]
 """A log in which nothing is missing, of a greenhouse, and the model that it is asked by."""
@@ -60,10 +60,11 @@ def by_the_built_in_bundle(logs: Sequence[Later]) -> list[Later]:
 
 def unknown(jobs: Jobs) -> list[Later]:
     """Simulate greenhouses anywhere, at any time of the year, each with the built-in bundle; every third is noisy."""
-    greenhouses = others(UNKNOWN, UNKNOWN_SEED)
+    (first,) = UNKNOWN_SEEDS.values()
+    greenhouses = others(UNKNOWN, first)
     cases = [
         Case(
-            name=name, group=group, greenhouse=name, seed=UNKNOWN_SEED + 500 + place, heavy_tails=bool(place % 2),
+            name=name, group=group, greenhouse=name, seed=first + 500 + place, heavy_tails=bool(place % 2),
             wrong_noise=group == "noise",
         )
         for place, (name, group) in enumerate(zip(greenhouses, itertools.cycle(("nothing", "nothing", "noise"))))

@@ -19,12 +19,13 @@ import numpy as np
 from benchmarks.diagnosis.null_gains import largest
 from benchmarks.diagnosis.null_logs import Later, circumstances
 from benchmarks.jobs import Jobs
-from igrow.trainer.diagnosis import cross_validation, null_gains, unexplained
-from igrow.trainer.diagnosis.candidates import Pattern
-from igrow.trainer.diagnosis.cross_validation import CrossValidated, cross_validated
-from igrow.trainer.diagnosis.null_gains import NullGains
-from igrow.trainer.diagnosis.rounds import search_of
+from igrow.trainer.diagnosis.design.candidates import Pattern
+from igrow.trainer.diagnosis.learned import null_gains
+from igrow.trainer.diagnosis.learned.null_gains import NullGains
 from igrow.trainer.diagnosis.rules import DEFAULT
+from igrow.trainer.diagnosis.search import cross_validation, unexplained
+from igrow.trainer.diagnosis.search.cross_validation import CrossValidated, cross_validated
+from igrow.trainer.diagnosis.search.rounds import search_of
 
 FALSE_CLAIMS = 0.02
 """Share of logs with nothing missing that may be told a change, each greenhouse judged by the skills of the others."""

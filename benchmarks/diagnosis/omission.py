@@ -30,8 +30,9 @@ from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
 from igrow.trainer.data import prepare_log
 from igrow.trainer.data.splits import held_out_weeks
-from igrow.trainer.diagnosis import DEFAULT, omission
+from igrow.trainer.diagnosis import DEFAULT
 from igrow.trainer.diagnosis.rules import DecisionRules
+from igrow.trainer.diagnosis.search import omission
 from igrow.trainer.fit.climate import fit_climate, site_prior
 from igrow.trainer.fit.evaluation import evaluate
 from igrow.trainer.fit.gaussian import Gaussian

@@ -25,7 +25,7 @@ from benchmarks.jobs import Jobs
 from igrow.core.effects import EFFECTS
 from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
 from igrow.core.telemetry import Telemetry
-from igrow.trainer.diagnosis.null_gains import read_null_gains
+from igrow.trainer.diagnosis.learned.null_gains import read_null_gains
 
 CASES, DAYS = 60, 28
 SEEDS = {"tuning": 200_000, "scoring": 900_000}

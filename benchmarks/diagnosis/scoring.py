@@ -22,14 +22,16 @@ from igrow.core.site import Site
 from igrow.core.sun import unix_seconds
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import prepare_log
-from igrow.trainer.diagnosis import DEFAULT, change, diagnose, linear, sensitivity
-from igrow.trainer.diagnosis.design import Design
-from igrow.trainer.diagnosis.evidence import Evidence, errors_with
+from igrow.trainer.diagnosis import DEFAULT, diagnose
+from igrow.trainer.diagnosis.answer.evidence import Evidence, errors_with
+from igrow.trainer.diagnosis.answer.result import Finding
+from igrow.trainer.diagnosis.design import linear, sensitivity
+from igrow.trainer.diagnosis.design.design import Design
+from igrow.trainer.diagnosis.design.linear import Term
+from igrow.trainer.diagnosis.design.sensitivity import Linearisation
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
-from igrow.trainer.diagnosis.linear import Term
-from igrow.trainer.diagnosis.null_gains import read_null_gains
-from igrow.trainer.diagnosis.result import Finding
-from igrow.trainer.diagnosis.sensitivity import Linearisation
+from igrow.trainer.diagnosis.learned.null_gains import read_null_gains
+from igrow.trainer.diagnosis.search import change
 
 NOISE = {"air_temperature": 0.5, "air_humidity": 2.0, "air_co2": 35.0}
 """Scales under which errors of different quantities are added."""

@@ -23,11 +23,13 @@ from igrow.core.greenhouse.tomato import Crop
 from igrow.core.separating_tests import SEPARATING_TESTS, SeparatingTest
 from igrow.core.sun import solar_hour
 from igrow.trainer.data import prepare_log
-from igrow.trainer.diagnosis import DEFAULT, linear, search
-from igrow.trainer.diagnosis.change import net_gain
-from igrow.trainer.diagnosis.freerun import log_days
+from igrow.trainer.diagnosis import DEFAULT
+from igrow.trainer.diagnosis.design import linear
+from igrow.trainer.diagnosis.design.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import knowledge_of
-from igrow.trainer.diagnosis.rounds import search_of
+from igrow.trainer.diagnosis.search import scan
+from igrow.trainer.diagnosis.search.change import net_gain
+from igrow.trainer.diagnosis.search.rounds import search_of
 
 SEED = 410_000
 GREENHOUSES = 2
@@ -121,7 +123,7 @@ def gain(one: Trial, season: Season) -> Gain:
     truth = {effect.name: effect for effect in hidden(one.case, one.known.unit, one.known.greenhouse.start)}
     expected, _ = expected_gains(design, one.case, truth)
     null = linear.fit(design.grams, design.null_model())
-    scored = search.score_candidates(design, null, [None], np.random.default_rng(1))
+    scored = scan.score_candidates(design, null, [None], np.random.default_rng(1))
     gains = {True: 0.0, False: 0.0}
     for candidate in scored:
         own = candidate.effect == one.cause

@@ -9,9 +9,9 @@ import pytest
 from benchmarks.diagnosis.scoring import true_changes
 from igrow.core.bundle import Estimate
 from igrow.core.greenhouse import GreenhouseParameters
-from igrow.trainer.diagnosis import wording
-from igrow.trainer.diagnosis.parameter_change import ParameterChange
-from igrow.trainer.diagnosis.result import Finding
+from igrow.trainer.diagnosis.answer import wording
+from igrow.trainer.diagnosis.answer.result import Finding
+from igrow.trainer.diagnosis.search.parameter_change import ParameterChange
 
 BEFORE = GreenhouseParameters()
 

@@ -11,7 +11,8 @@ from igrow.core.arrays import Floats
 from igrow.core.telemetry import Telemetry, concatenate
 from igrow.trainer.calibration import calibrate
 from igrow.trainer.data import Log, prepare_log
-from igrow.trainer.diagnosis import DEFAULT, history
+from igrow.trainer.diagnosis import DEFAULT
+from igrow.trainer.diagnosis.search import history
 from igrow.trainer.fit import FittedModel
 from tests.made_once import made_once
 from tests.virtual_log import SITE, disturbances, virtual_log

@@ -10,16 +10,16 @@ import numpy as np
 from igrow.core.arrays import Floats
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.data.splits import DaySplit
-from igrow.trainer.diagnosis import linear, noise
-from igrow.trainer.diagnosis.balances import Balances
-from igrow.trainer.diagnosis.candidates import Candidate, Pattern
-from igrow.trainer.diagnosis.design import Block, Design, History
+from igrow.trainer.diagnosis.design import linear, noise
+from igrow.trainer.diagnosis.design.balances import Balances
+from igrow.trainer.diagnosis.design.candidates import Candidate, Pattern
+from igrow.trainer.diagnosis.design.design import Block, Design, History
+from igrow.trainer.diagnosis.design.linear import DailyGrams
+from igrow.trainer.diagnosis.design.noise import NoiseFilter, Whitening
+from igrow.trainer.diagnosis.design.sensitivity import DayRuns, Linearisation
 from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX
-from igrow.trainer.diagnosis.linear import DailyGrams
-from igrow.trainer.diagnosis.noise import NoiseFilter, Whitening
-from igrow.trainer.diagnosis.null_gains import NullGains
+from igrow.trainer.diagnosis.learned.null_gains import NullGains
 from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules
-from igrow.trainer.diagnosis.sensitivity import DayRuns, Linearisation
 from igrow.trainer.fit.gaussian import Gaussian
 
 BALANCES, HOURS = 2, 24

@@ -9,9 +9,10 @@ import pytest
 
 from igrow.core.simulator.hybrid.nominal import site_record
 from igrow.trainer.data import Log
-from igrow.trainer.diagnosis import DEFAULT, Diagnosis, actuators, diagnose
-from igrow.trainer.diagnosis.freerun import log_days
+from igrow.trainer.diagnosis import DEFAULT, Diagnosis, diagnose
+from igrow.trainer.diagnosis.design.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import knowledge_of
+from igrow.trainer.diagnosis.search import actuators
 from tests.diagnosis.conftest import DAYS, STEP, greenhouse_log, model_in_force
 from tests.made_once import made_once
 from tests.virtual_log import SITE

@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from igrow.trainer.diagnosis import change, linear
-from igrow.trainer.diagnosis.design import Design
-from igrow.trainer.diagnosis.null_gains import NullGains
-from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.diagnosis.design import linear
+from igrow.trainer.diagnosis.design.design import Design
+from igrow.trainer.diagnosis.learned.null_gains import NullGains
+from igrow.trainer.diagnosis.search import change
+from igrow.trainer.diagnosis.search.scan import Hypothesis
 from tests.diagnosis.synthetic_design import Truth
 from tests.diagnosis.test_parameter_change import with_parameters
 

@@ -13,10 +13,10 @@ from igrow.core.simulator.hybrid.nominal import nominal
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.data import Log
 from igrow.trainer.data.splits import split_days
-from igrow.trainer.diagnosis import candidates, sensitivity
-from igrow.trainer.diagnosis.candidates import UNIT_FLUX, Candidate, Pattern
+from igrow.trainer.diagnosis.design import candidates, sensitivity
+from igrow.trainer.diagnosis.design.candidates import UNIT_FLUX, Candidate, Pattern
+from igrow.trainer.diagnosis.design.sensitivity import Linearisation
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, activate
-from igrow.trainer.diagnosis.sensitivity import Linearisation
 from igrow.trainer.fit.solver import DivergenceError
 from tests.virtual_log import SITE
 

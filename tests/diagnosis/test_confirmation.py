@@ -11,11 +11,12 @@ import pytest
 
 from igrow.core.bundle import Estimate
 from igrow.trainer.data import prepare_log
-from igrow.trainer.diagnosis import DEFAULT, confirmation
-from igrow.trainer.diagnosis.confirmation import confirmed
-from igrow.trainer.diagnosis.estimate import Estimated
-from igrow.trainer.diagnosis.freerun import log_days
+from igrow.trainer.diagnosis import DEFAULT
+from igrow.trainer.diagnosis.design.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, knowledge_of
+from igrow.trainer.diagnosis.search.estimate import Estimated
+from igrow.trainer.diagnosis.validation import confirmation
+from igrow.trainer.diagnosis.validation.confirmation import confirmed
 from igrow.trainer.fit import FittedModel
 from tests.diagnosis.conftest import model_in_force
 from tests.virtual_log import SITE, virtual_log

@@ -11,22 +11,22 @@ import numpy as np
 import pytest
 
 from igrow.core.bundle import EffectRecord, Estimate
-from igrow.trainer.diagnosis import correction
-from igrow.trainer.diagnosis.candidates import Candidate, Pattern
-from igrow.trainer.diagnosis.correction import (
+from igrow.trainer.diagnosis.answer.wording import discrepancy, finding
+from igrow.trainer.diagnosis.design.candidates import Candidate, Pattern
+from igrow.trainer.diagnosis.design.freerun import Stage
+from igrow.trainer.diagnosis.design.linear import Term
+from igrow.trainer.diagnosis.knowledge import ActiveTerm
+from igrow.trainer.diagnosis.rules import DEFAULT
+from igrow.trainer.diagnosis.search.estimate import Estimated, OnsetInterval
+from igrow.trainer.diagnosis.search.scan import Hypothesis
+from igrow.trainer.diagnosis.validation import correction
+from igrow.trainer.diagnosis.validation.correction import (
     Corrected,
     corrected_model,
     is_proven,
     same_in_all_regimes,
     until_outdone,
 )
-from igrow.trainer.diagnosis.estimate import Estimated, OnsetInterval
-from igrow.trainer.diagnosis.freerun import Stage
-from igrow.trainer.diagnosis.knowledge import ActiveTerm
-from igrow.trainer.diagnosis.linear import Term
-from igrow.trainer.diagnosis.rules import DEFAULT
-from igrow.trainer.diagnosis.search import Hypothesis
-from igrow.trainer.diagnosis.wording import discrepancy, finding
 from igrow.trainer.fit import Gaussian
 from igrow.trainer.fit.growth import built_in_crop
 from tests.diagnosis.conftest import model_in_force

@@ -12,19 +12,21 @@ import pytest
 from igrow.core.arrays import Floats
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.trainer.data.splits import folds
-from igrow.trainer.diagnosis import DEFAULT, change, cross_validation, linear, rounds, search, unexplained
-from igrow.trainer.diagnosis.candidates import Candidate, Pattern
-from igrow.trainer.diagnosis.change import Round
-from igrow.trainer.diagnosis.cross_validation import CrossValidated, cross_validated
-from igrow.trainer.diagnosis.design import Design
+from igrow.trainer.diagnosis import DEFAULT
+from igrow.trainer.diagnosis.design import linear
+from igrow.trainer.diagnosis.design.candidates import Candidate, Pattern
+from igrow.trainer.diagnosis.design.design import Design
+from igrow.trainer.diagnosis.design.linear import Term
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, knowledge_of
-from igrow.trainer.diagnosis.linear import Term
-from igrow.trainer.diagnosis.null_gains import (
+from igrow.trainer.diagnosis.learned.null_gains import (
     NullGains,
     read_null_pattern_skills,
     read_null_skills,
 )
-from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.diagnosis.search import change, cross_validation, rounds, scan, unexplained
+from igrow.trainer.diagnosis.search.change import Round
+from igrow.trainer.diagnosis.search.cross_validation import CrossValidated, cross_validated
+from igrow.trainer.diagnosis.search.scan import Hypothesis
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.scales import CORRELATION_TIME
 from tests.diagnosis.conftest import model_in_force
@@ -73,7 +75,7 @@ def test_falls_are_those_of_fits_to_other_days() -> None:
     design = with_parameters(Truth({"lamp_heat": 0.3}, {}, (0.01, 0.0, 0.02)), 3)
     one = of(design, "lamp_heat", 5)
     (found,) = cross_validated(design, BY_PHYSICS, [one])
-    joint, column = design.null_model(), search.column_of(design, one.term)
+    joint, column = design.null_model(), scan.column_of(design, one.term)
     held = list(design.block("parameter").columns)
     for fall, base, precision in (
         (found.falls[0], list(joint.base), joint.precision),
@@ -159,7 +161,7 @@ def test_what_gains_little_is_not_asked_of_unseen_days(size: float, told: list[s
 def test_a_rival_may_have_begun_within_the_log() -> None:
     design = with_parameters(Truth({"lamp_heat": 1.0}, {}, onset=16), 1)
     null = linear.fit(design.grams, design.null_model())
-    scored = search.score_candidates(design, null, search.onset_days(design), rng())
+    scored = scan.score_candidates(design, null, scan.onset_days(design), rng())
     (rival,) = cross_validation.rivals(design, hypothesis("rain_cooling"), scored)
     assert (rival.effect, rival.term.onset) == ("lamp_heat", 16)
     assert cross_validation.rivals(design, of(design, "lamp_heat"), scored) == []
@@ -276,7 +278,7 @@ def test_a_pattern_may_outdo_a_name_on_unseen_days(
     null, first = linear.fit(design.grams, design.null_model()), hypothesis("first")
     course = replace(first, cause=Pattern("heat", "05 to 09 h", ("hour",)), gain=gain)
     falls = {id(first): np.full((2, 4), 0.04), id(course): np.array([pattern, pattern])}
-    monkeypatch.setattr(search, "score_patterns", lambda *_: [course])
+    monkeypatch.setattr(scan, "score_patterns", lambda *_: [course])
     monkeypatch.setattr(
         cross_validation, "cross_validated", lambda _, __, asked: [CrossValidated(one, falls[id(one)]) for one in asked]
     )

@@ -9,9 +9,9 @@ import pytest
 
 from igrow.trainer.data import Log
 from igrow.trainer.data.splits import split_days
-from igrow.trainer.diagnosis.balances import balances_of
-from igrow.trainer.diagnosis.candidates import Candidate
-from igrow.trainer.diagnosis.design import Design, lay_out
+from igrow.trainer.diagnosis.design.balances import balances_of
+from igrow.trainer.diagnosis.design.candidates import Candidate
+from igrow.trainer.diagnosis.design.design import Design, lay_out
 from igrow.trainer.diagnosis.knowledge import knowledge_of
 from igrow.trainer.diagnosis.rules import DEFAULT
 from tests.diagnosis.conftest import model_in_force

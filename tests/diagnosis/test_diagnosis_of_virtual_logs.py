@@ -16,14 +16,16 @@ from igrow.core.errors import IgrowError
 from igrow.core.local_time import utc_datetime
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import Log, prepare_log
-from igrow.trainer.diagnosis import Diagnosis, diagnose, history, rounds, wording
+from igrow.trainer.diagnosis import Diagnosis, diagnose
+from igrow.trainer.diagnosis.answer import wording
+from igrow.trainer.diagnosis.answer.evidence import errors_with
+from igrow.trainer.diagnosis.answer.plots import needed
 from igrow.trainer.diagnosis.diagnosed_days import since_calibration, weeks_in_turn
-from igrow.trainer.diagnosis.evidence import errors_with
 from igrow.trainer.diagnosis.knowledge import VENTS, ActiveTerm
-from igrow.trainer.diagnosis.parameter_change import ParameterChange
-from igrow.trainer.diagnosis.parameter_or_causes import predicts_better
-from igrow.trainer.diagnosis.plots import needed
 from igrow.trainer.diagnosis.rules import DEFAULT
+from igrow.trainer.diagnosis.search import history, rounds
+from igrow.trainer.diagnosis.search.parameter_change import ParameterChange
+from igrow.trainer.diagnosis.validation.parameter_or_causes import predicts_better
 from igrow.trainer.fit import FittedModel
 from igrow.trainer.report import render_report, write_diagnosis
 from tests.diagnosis.conftest import DAYS, STEP, greenhouse_log, model_in_force

@@ -9,16 +9,17 @@ import pytest
 
 from igrow.core.bundle import Estimate
 from igrow.core.effects import EFFECTS
-from igrow.trainer.diagnosis import linear, search
-from igrow.trainer.diagnosis.candidates import Candidate
-from igrow.trainer.diagnosis.change import Round, changed
-from igrow.trainer.diagnosis.design import Design
-from igrow.trainer.diagnosis.estimate import Estimated, estimate, normal_quantile, with_refitted, within_bounds
+from igrow.trainer.diagnosis.design import linear
+from igrow.trainer.diagnosis.design.candidates import Candidate
+from igrow.trainer.diagnosis.design.design import Design
+from igrow.trainer.diagnosis.design.linear import Term
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
-from igrow.trainer.diagnosis.linear import Term
-from igrow.trainer.diagnosis.refit import Refitted
 from igrow.trainer.diagnosis.rules import DEFAULT
-from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.diagnosis.search import scan
+from igrow.trainer.diagnosis.search.change import Round, changed
+from igrow.trainer.diagnosis.search.estimate import Estimated, estimate, normal_quantile, with_refitted, within_bounds
+from igrow.trainer.diagnosis.search.refit import Refitted
+from igrow.trainer.diagnosis.search.scan import Hypothesis
 from tests.diagnosis.synthetic_design import Truth, in_fitted_noise, make_design, with_column
 
 DAY = np.timedelta64(1, "D")
@@ -68,7 +69,7 @@ def test_what_gains_next_to_nothing_is_not_as_good_as_a_cause_that_gains_little(
     # A gain of some five nats, and a tenth of one: these lie within six.
     design, rng = in_fitted_noise(make_design(Truth({"lamp_heat": 0.11}, {}), seed=3)), np.random.default_rng(0)
     null = linear.fit(design.grams, design.null_model())
-    scored = search.score_candidates(design, null, [None], rng)
+    scored = scan.score_candidates(design, null, [None], rng)
     (cause,) = (one for one in scored if one.effect == "lamp_heat")
     assert DEFAULT.least_unproven_change < cause.gain < DEFAULT.confounded_gain
     assert [one.effect for one in scored if 0.0 < one.gain < DEFAULT.least_unproven_change]

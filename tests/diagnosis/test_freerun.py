@@ -12,10 +12,10 @@ import pytest
 from igrow.core.simulator.hybrid.nominal import nominal
 from igrow.trainer.data import prepare_log
 from igrow.trainer.data.splits import split_days
-from igrow.trainer.diagnosis import freerun, sensitivity
-from igrow.trainer.diagnosis.freerun import FreeRuns, LogDays, Refittable, Stage
+from igrow.trainer.diagnosis.design import freerun, sensitivity
+from igrow.trainer.diagnosis.design.freerun import FreeRuns, LogDays, Refittable, Stage
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
-from igrow.trainer.diagnosis.omission import fit_together
+from igrow.trainer.diagnosis.search.omission import fit_together
 from igrow.trainer.fit import Gaussian
 from tests.virtual_log import SITE, virtual_log
 

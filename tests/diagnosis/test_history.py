@@ -9,13 +9,14 @@ import pytest
 
 from igrow.core.effects import EFFECTS
 from igrow.core.simulator.hybrid.nominal import site_record
-from igrow.trainer.diagnosis import amplitudes, history, linear, search
-from igrow.trainer.diagnosis.candidates import Pattern
-from igrow.trainer.diagnosis.change import changed, net_gain, proven_gain
-from igrow.trainer.diagnosis.design import Design, History
-from igrow.trainer.diagnosis.estimate import estimate
-from igrow.trainer.diagnosis.null_gains import NullGains
+from igrow.trainer.diagnosis.design import amplitudes, linear
+from igrow.trainer.diagnosis.design.candidates import Pattern
+from igrow.trainer.diagnosis.design.design import Design, History
+from igrow.trainer.diagnosis.learned.null_gains import NullGains
 from igrow.trainer.diagnosis.rules import DEFAULT
+from igrow.trainer.diagnosis.search import history, scan
+from igrow.trainer.diagnosis.search.change import changed, net_gain, proven_gain
+from igrow.trainer.diagnosis.search.estimate import estimate
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.model import FittedModel
@@ -228,7 +229,7 @@ def test_a_change_that_comes_and_goes_from_day_to_day_is_not_proven() -> None:
     values[0] -= of_day[:, None] * values[column]
     fickle = with_history(replace(design, values=values).whitened(design.whitening), 0.01)
     null = linear.fit(fickle.grams, fickle.null_model())
-    scored = search.score_candidates(fickle, null, [None], np.random.default_rng(0))
+    scored = scan.score_candidates(fickle, null, [None], np.random.default_rng(0))
     (found,) = [one for one in scored if one.effect == "lamp_heat"]
     assert net_gain(fickle, found) > BARE.least > proven_gain(fickle, found)
     assert changed(fickle, 0.0, np.random.default_rng(RNG_SEED)).cause is None

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from igrow.trainer.diagnosis import linear
-from igrow.trainer.diagnosis.linear import DailyGrams, LinearModel, Term
+from igrow.trainer.diagnosis.design import linear
+from igrow.trainer.diagnosis.design.linear import DailyGrams, LinearModel, Term
 
 DAYS, ROWS = 10, 30
 RNG = np.random.default_rng(4)

@@ -12,10 +12,12 @@ import pytest
 
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import Log
-from igrow.trainer.diagnosis import circumstances, diagnose, rounds, wording
+from igrow.trainer.diagnosis import circumstances, diagnose
+from igrow.trainer.diagnosis.answer import wording
 from igrow.trainer.diagnosis.crop import LEAVES_AND_LIGHT, has_new_crop, new_leaves, of_one_crop, with_its_drift
 from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, knowledge_of
 from igrow.trainer.diagnosis.rules import DEFAULT
+from igrow.trainer.diagnosis.search import rounds
 from igrow.trainer.fit import FittedModel
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian

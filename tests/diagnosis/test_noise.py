@@ -8,8 +8,8 @@ from scipy.signal import lfilter
 from scipy.stats import t as student
 
 from igrow.core.arrays import Floats
-from igrow.trainer.diagnosis import noise
-from igrow.trainer.diagnosis.noise import FREEDOM
+from igrow.trainer.diagnosis.design import noise
+from igrow.trainer.diagnosis.design.noise import FREEDOM
 
 RUNS, STEPS = 60, 96
 COUNTED = np.ones((RUNS, STEPS), dtype=bool)

@@ -12,8 +12,8 @@ from benchmarks.diagnosis import null_skills as skills
 from benchmarks.diagnosis.null_gains import Gained
 from benchmarks.diagnosis.null_skills import Told
 from igrow.core.effects import EFFECTS
-from igrow.trainer.diagnosis.candidates import CHANNELS
-from igrow.trainer.diagnosis.null_gains import (
+from igrow.trainer.diagnosis.design.candidates import CHANNELS
+from igrow.trainer.diagnosis.learned.null_gains import (
     BEGINNING_PREFIX,
     PATTERN_SKILLS_FILE,
     SKILLS_FILE,

@@ -13,8 +13,9 @@ from igrow.core.language import speak
 from igrow.core.simulator.hybrid.nominal import site_record
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.core.simulator.hybrid.record import Record
-from igrow.trainer.diagnosis import DEFAULT, history, omission
-from igrow.trainer.diagnosis.omission import TERMS
+from igrow.trainer.diagnosis import DEFAULT
+from igrow.trainer.diagnosis.search import history, omission
+from igrow.trainer.diagnosis.search.omission import TERMS
 from igrow.trainer.fit import FittedModel
 from igrow.trainer.fit.climate import bounds, fit_climate, site_prior
 from igrow.trainer.fit.gaussian import Gaussian

@@ -13,18 +13,13 @@ from igrow.core.simulator.hybrid import climate
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.core.simulator.hybrid.record import observe
 from igrow.core.telemetry import Telemetry
-from igrow.trainer.diagnosis import (
-    Diagnosis,
-    Finding,
-    amplitudes,
-    diagnose,
-    history,
-    parameter_change,
-    wording,
-)
-from igrow.trainer.diagnosis.design import Design, History
-from igrow.trainer.diagnosis.null_gains import NullGains
-from igrow.trainer.diagnosis.parameter_change import find
+from igrow.trainer.diagnosis import Diagnosis, Finding, diagnose
+from igrow.trainer.diagnosis.answer import wording
+from igrow.trainer.diagnosis.design import amplitudes
+from igrow.trainer.diagnosis.design.design import Design, History
+from igrow.trainer.diagnosis.learned.null_gains import NullGains
+from igrow.trainer.diagnosis.search import history, parameter_change
+from igrow.trainer.diagnosis.search.parameter_change import find
 from igrow.trainer.diagnosis.visible_parameters import VISIBLE, members
 from igrow.trainer.fit import FittedModel
 from igrow.trainer.fit.gaussian import Gaussian

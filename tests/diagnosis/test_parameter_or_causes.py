@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 
 from igrow.core.bundle import Estimate
-from igrow.trainer.diagnosis.correction import Corrected
-from igrow.trainer.diagnosis.freerun import FreeRuns, Refittable, Stage
+from igrow.trainer.diagnosis.design.freerun import FreeRuns, Refittable, Stage
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, knowledge_of
-from igrow.trainer.diagnosis.parameter_change import ParameterChange
-from igrow.trainer.diagnosis.parameter_or_causes import (
+from igrow.trainer.diagnosis.rules import DEFAULT
+from igrow.trainer.diagnosis.search.parameter_change import ParameterChange
+from igrow.trainer.diagnosis.validation.correction import Corrected
+from igrow.trainer.diagnosis.validation.parameter_or_causes import (
     explains_as_well,
     may_give_way,
     stands_in_its_place,
     with_parameter,
 )
-from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.fit import Gaussian
 from tests.diagnosis.conftest import model_in_force
 from tests.diagnosis.test_correction import cause, of

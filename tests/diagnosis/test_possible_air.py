@@ -10,7 +10,7 @@ import pytest
 from igrow.core.effects import EFFECTS
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.data import Log
-from igrow.trainer.diagnosis.possible_air import amplitude_bounds, is_constant
+from igrow.trainer.diagnosis.design.possible_air import amplitude_bounds, is_constant
 from tests.diagnosis.conftest import DAYS, STEP
 
 

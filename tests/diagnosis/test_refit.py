@@ -7,14 +7,14 @@ import pytest
 
 from igrow.core.effects import EFFECTS
 from igrow.trainer.data import Log
-from igrow.trainer.diagnosis import linear
-from igrow.trainer.diagnosis.design import Design
-from igrow.trainer.diagnosis.freerun import log_days
+from igrow.trainer.diagnosis.design import linear
+from igrow.trainer.diagnosis.design.design import Design
+from igrow.trainer.diagnosis.design.freerun import log_days
+from igrow.trainer.diagnosis.design.linear import Term
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, knowledge_of
-from igrow.trainer.diagnosis.linear import Term
-from igrow.trainer.diagnosis.refit import Refitted, refit, twins_held
-from igrow.trainer.diagnosis.rounds import search_of
 from igrow.trainer.diagnosis.rules import DEFAULT
+from igrow.trainer.diagnosis.search.refit import Refitted, refit, twins_held
+from igrow.trainer.diagnosis.search.rounds import search_of
 from igrow.trainer.fit.gaussian import Gaussian
 from tests.diagnosis.conftest import DAYS, STEP, greenhouse_log, model_in_force
 from tests.virtual_log import SITE

@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 from igrow.core.bundle import Estimate
-from igrow.trainer.diagnosis import DEFAULT, cross_validation, history, rounds
-from igrow.trainer.diagnosis.candidates import Candidate, Pattern
-from igrow.trainer.diagnosis.change import Round
-from igrow.trainer.diagnosis.estimate import Estimated
+from igrow.trainer.diagnosis import DEFAULT
+from igrow.trainer.diagnosis.design.candidates import Candidate, Pattern
+from igrow.trainer.diagnosis.design.linear import Term
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
-from igrow.trainer.diagnosis.linear import Term
-from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.diagnosis.search import cross_validation, history, rounds
+from igrow.trainer.diagnosis.search.change import Round
+from igrow.trainer.diagnosis.search.estimate import Estimated
+from igrow.trainer.diagnosis.search.scan import Hypothesis
 from tests.diagnosis.synthetic_design import Truth
 from tests.diagnosis.test_cross_validation import change_of
 from tests.diagnosis.test_parameter_change import with_parameters

@@ -17,7 +17,7 @@ FOLDER = Path(igrow.trainer.diagnosis.__file__).parent
 
 
 def test_every_rule_has_a_meaning_and_is_used() -> None:
-    sources = "".join(path.read_text() for path in FOLDER.glob("*.py") if path.name != "rules.py")
+    sources = "".join(path.read_text() for path in FOLDER.rglob("*.py") if path.name != "rules.py")
     own = (FOLDER / "rules.py").read_text()
     for name, _, how, meaning in table(DEFAULT):
         assert len(meaning) > 5

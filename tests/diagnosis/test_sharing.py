@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from igrow.trainer.diagnosis import DEFAULT, learned_from
-from igrow.trainer.diagnosis.amplitudes import omission
+from igrow.trainer.diagnosis.design.amplitudes import omission
 from igrow.trainer.fit import FittedModel
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian

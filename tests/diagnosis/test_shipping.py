@@ -8,12 +8,13 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from igrow.trainer.diagnosis import DEFAULT, shipping
-from igrow.trainer.diagnosis.actuators import Completed
-from igrow.trainer.diagnosis.correction import Corrected
-from igrow.trainer.diagnosis.freerun import LogDays, Refittable, Stage
+from igrow.trainer.diagnosis import DEFAULT
+from igrow.trainer.diagnosis.design.freerun import LogDays, Refittable, Stage
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, knowledge_of
-from igrow.trainer.diagnosis.shipping import refitted, shipped
+from igrow.trainer.diagnosis.search.actuators import Completed
+from igrow.trainer.diagnosis.validation import shipping
+from igrow.trainer.diagnosis.validation.correction import Corrected
+from igrow.trainer.diagnosis.validation.shipping import refitted, shipped
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.solver import DivergenceError
 from tests.diagnosis.conftest import model_in_force

@@ -11,13 +11,15 @@ from igrow.core.air import LATENT_HEAT
 from igrow.core.arrays import Floats
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import Log
-from igrow.trainer.diagnosis import DEFAULT, candidates, diagnose, sensitivity, unexplained
-from igrow.trainer.diagnosis.candidates import UNIT_FLUX, Pattern
-from igrow.trainer.diagnosis.correction import correct, with_unexplained
-from igrow.trainer.diagnosis.freerun import log_days
+from igrow.trainer.diagnosis import DEFAULT, diagnose
+from igrow.trainer.diagnosis.design import candidates, sensitivity
+from igrow.trainer.diagnosis.design.candidates import UNIT_FLUX, Pattern
+from igrow.trainer.diagnosis.design.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import knowledge_of
-from igrow.trainer.diagnosis.null_gains import NullGains
-from igrow.trainer.diagnosis.rounds import Search, search_of
+from igrow.trainer.diagnosis.learned.null_gains import NullGains
+from igrow.trainer.diagnosis.search import unexplained
+from igrow.trainer.diagnosis.search.rounds import Search, search_of
+from igrow.trainer.diagnosis.validation.correction import correct, with_unexplained
 from igrow.trainer.fit import FittedModel
 from tests.diagnosis.known_greenhouse import DAYS, STEP, later, weeks
 from tests.virtual_log import SITE

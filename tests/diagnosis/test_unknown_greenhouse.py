@@ -9,11 +9,14 @@ import pytest
 
 from igrow.core.bundle import default_bundle_folder, read_bundle
 from igrow.trainer.data import Log, prepare_log
-from igrow.trainer.diagnosis import DEFAULT, amplitudes, diagnose, history, wording
-from igrow.trainer.diagnosis.freerun import log_days
+from igrow.trainer.diagnosis import DEFAULT, diagnose
+from igrow.trainer.diagnosis.answer import wording
+from igrow.trainer.diagnosis.design import amplitudes
+from igrow.trainer.diagnosis.design.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import knowledge_of
-from igrow.trainer.diagnosis.null_gains import read_unknown_gains
-from igrow.trainer.diagnosis.rounds import Search, search_of
+from igrow.trainer.diagnosis.learned.null_gains import read_unknown_gains
+from igrow.trainer.diagnosis.search import history
+from igrow.trainer.diagnosis.search.rounds import Search, search_of
 from igrow.trainer.exporting import read_model
 from igrow.trainer.fit import FittedModel
 from tests.diagnosis.conftest import model_in_force

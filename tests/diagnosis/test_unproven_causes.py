@@ -11,9 +11,10 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from igrow.trainer.diagnosis import DEFAULT, correction
-from igrow.trainer.diagnosis.correction import Corrected, correct
-from igrow.trainer.diagnosis.estimate import Estimated
+from igrow.trainer.diagnosis import DEFAULT
+from igrow.trainer.diagnosis.search.estimate import Estimated
+from igrow.trainer.diagnosis.validation import correction
+from igrow.trainer.diagnosis.validation.correction import Corrected, correct
 from tests.diagnosis.test_rounds import effects, of
 
 MODULE = sys.modules["igrow.trainer.diagnosis.diagnose"]  # its function has its name

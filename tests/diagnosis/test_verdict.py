@@ -9,7 +9,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from igrow.trainer.diagnosis import DEFAULT, diagnose, wording
+from igrow.trainer.diagnosis import DEFAULT, diagnose
+from igrow.trainer.diagnosis.answer import wording
 
 MODULE = cast(Any, sys.modules[diagnose.__module__])
 SINCE = cast(Any, SimpleNamespace(time=np.datetime64("2020-03-08")))

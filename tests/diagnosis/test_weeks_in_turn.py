@@ -10,11 +10,14 @@ import pytest
 
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import Log, prepare_log
-from igrow.trainer.diagnosis import DEFAULT, Diagnosis, Finding, amplitudes, diagnose, history, linear, wording
-from igrow.trainer.diagnosis.answers import Answer
-from igrow.trainer.diagnosis.freerun import log_days
+from igrow.trainer.diagnosis import DEFAULT, Diagnosis, Finding, diagnose
+from igrow.trainer.diagnosis.answer import wording
+from igrow.trainer.diagnosis.answer.answers import Answer
+from igrow.trainer.diagnosis.design import amplitudes, linear
+from igrow.trainer.diagnosis.design.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, knowledge_of
-from igrow.trainer.diagnosis.rounds import search_of
+from igrow.trainer.diagnosis.search import history
+from igrow.trainer.diagnosis.search.rounds import search_of
 from igrow.trainer.fit import FittedModel
 from tests.diagnosis.known_greenhouse import KNOWN, later
 from tests.virtual_log import SITE

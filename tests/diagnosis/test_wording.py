@@ -11,14 +11,14 @@ from igrow.core.bundle import Estimate
 from igrow.core.effects import EFFECTS
 from igrow.core.language import speak
 from igrow.core.site import Site
-from igrow.trainer.diagnosis import wording
-from igrow.trainer.diagnosis.candidates import Candidate, Pattern
-from igrow.trainer.diagnosis.estimate import Estimated, OnsetInterval
+from igrow.trainer.diagnosis.answer import wording
+from igrow.trainer.diagnosis.answer.result import plain
+from igrow.trainer.diagnosis.design.candidates import Candidate, Pattern
+from igrow.trainer.diagnosis.design.linear import Term
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
-from igrow.trainer.diagnosis.linear import Term
-from igrow.trainer.diagnosis.result import plain
 from igrow.trainer.diagnosis.rules import DEFAULT
-from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.diagnosis.search.estimate import Estimated, OnsetInterval
+from igrow.trainer.diagnosis.search.scan import Hypothesis
 from igrow.trainer.report import sentences
 
 BEGAN = np.datetime64("2020-03-14T06:00:00", "s")

@@ -12,7 +12,7 @@ from igrow.core.language import LANGUAGES, speak
 from igrow.core.language.names import NAMES
 from igrow.core.language.sentences import PLACE
 from igrow.core.quantities import QUANTITIES
-from igrow.trainer.diagnosis.candidates import patterns
+from igrow.trainer.diagnosis.design.candidates import patterns
 from igrow.trainer.report import sentences
 from tests.diagnosis.conftest import greenhouse_log
 from tests.language.catalogues import catalogue, compiled, locales, messages, numbered

@@ -22,7 +22,8 @@ from igrow.core.quantities import QUANTITIES
 from igrow.trainer.data import Log
 from igrow.trainer.data.plausibility import find_faults
 from igrow.trainer.data.plot import plot_log
-from igrow.trainer.diagnosis import Diagnosis, plots
+from igrow.trainer.diagnosis import Diagnosis
+from igrow.trainer.diagnosis.answer import plots
 from igrow.trainer.diagnosis.open_vents import OpenVents
 from igrow.trainer.report import render_report, sentences, verdicts, write_diagnosis
 from igrow.trainer.report.page import error_rows

@@ -11,7 +11,7 @@ from igrow.core.effects import EFFECTS
 from igrow.core.language import LANGUAGES, speak
 from igrow.trainer.cli import main
 from igrow.trainer.diagnosis import Diagnosis
-from igrow.trainer.diagnosis.uncalibrated import FIRST, NO_NAME, how_to_calibrate
+from igrow.trainer.diagnosis.answer.uncalibrated import FIRST, NO_NAME, how_to_calibrate
 from igrow.trainer.report import render_report
 from igrow.trainer.report.page import priced
 

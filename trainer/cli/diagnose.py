@@ -15,7 +15,7 @@ from igrow.trainer.cli.common import replace_bundle
 from igrow.trainer.cli.log_arguments import add_log_arguments, log_of, typed
 from igrow.trainer.cli.progress import progress
 from igrow.trainer.diagnosis import diagnose
-from igrow.trainer.diagnosis.evidence import errors_with
+from igrow.trainer.diagnosis.answer.evidence import errors_with
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
 from igrow.trainer.exporting import read_model
 from igrow.trainer.report import write_diagnosis

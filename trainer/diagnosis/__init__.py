@@ -3,25 +3,24 @@
     result = diagnose(log, model)
     print(result.summary())
 
-In the order in which they are read: `knowledge` (what is known before the log), `diagnosed_days`, `freerun` (the days
-of a log, and models that are fitted to some and judged on others), `circumstances` (what a log lets be asked: its
-`crop`, its `actuators`, what `open_vents` show), `sensitivity` (day runs of the model, and how they depend on
-everything), `candidates`, `noise`, `balances`, `design` (errors and candidates in named blocks), `linear` and `search`
-(a scan of all candidates), `amplitudes`, `history`, `null_gains` and `change` (what has changed since the calibration,
-or was never known; `cross_validation` asks unseen days where time steps tell nothing or not which, `unexplained` what
-has no name, `parameter_change` the parameters, `omission` what the model lacked from the first day), `rounds` (one
-cause after the other), `estimate`, `refit` (size, beginning, confounded causes), `confirmation` (the same by free
-runs), `correction` (what stands on unseen days; `parameter_or_causes` where both explain the log), `shipping` (the
-model that is shipped), `unseen_errors`, `evidence`, `wording`, `result`, `answers` (what parts of a log tell beside
-each other). `rules` holds every threshold, `sharing` what one greenhouse tells others.
+In the order in which they are read:
+
+    knowledge, circumstances    what is known before the log, and what it lets be asked: its crop, what open vents show
+    design/                     the log's errors along free runs, and how they depend on all that may be missing
+    search/                     what has changed, or was never known: one cause after the other, its size and beginning
+    validation/                 causes kept where they stand on days that no fit has seen, and the model to be shipped
+    answer/                     findings and errors, in words, figures and JSON
+
+`diagnose` is the road through them, `rules` holds every threshold, `learned/` what greenhouses in which nothing is
+missing have taught, `sharing` what one greenhouse tells others of its owner.
 docs/method.md tells why.
 """
 
+from igrow.trainer.diagnosis.answer.result import EXIT_CODES, Diagnosis, Finding
 from igrow.trainer.diagnosis.diagnose import diagnose
-from igrow.trainer.diagnosis.history import history_of
-from igrow.trainer.diagnosis.omission import examine
-from igrow.trainer.diagnosis.result import EXIT_CODES, Diagnosis, Finding
 from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules
+from igrow.trainer.diagnosis.search.history import history_of
+from igrow.trainer.diagnosis.search.omission import examine
 from igrow.trainer.diagnosis.sharing import learned_from
 
 __all__ = [

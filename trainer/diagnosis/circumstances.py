@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from igrow.trainer.data.log import Log
-from igrow.trainer.diagnosis import history, wording
-from igrow.trainer.diagnosis.actuators import Completed, complete
+from igrow.trainer.diagnosis.answer import wording
 from igrow.trainer.diagnosis.crop import LEAVES_AND_LIGHT, has_new_crop, new_leaves, with_its_drift
-from igrow.trainer.diagnosis.freerun import LogDays, log_days
+from igrow.trainer.diagnosis.design.freerun import LogDays, log_days
 from igrow.trainer.diagnosis.knowledge import Knowledge, knowledge_of
 from igrow.trainer.diagnosis.open_vents import under_open_vents
 from igrow.trainer.diagnosis.rules import DecisionRules
+from igrow.trainer.diagnosis.search import history
+from igrow.trainer.diagnosis.search.actuators import Completed, complete
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.model import FittedModel
 

@@ -20,27 +20,34 @@ from igrow.core.effects import EFFECTS
 from igrow.core.errors import IgrowError
 from igrow.core.site import Site
 from igrow.trainer.data.log import Log
-from igrow.trainer.diagnosis import history, wording
-from igrow.trainer.diagnosis.actuators import Completed, may_hide_in_parameters
-from igrow.trainer.diagnosis.answers import Answer, bears_out, begun, is_same
-from igrow.trainer.diagnosis.candidates import hidden_by_missing_weather
-from igrow.trainer.diagnosis.change import Round
+from igrow.trainer.diagnosis.answer import wording
+from igrow.trainer.diagnosis.answer.answers import Answer, bears_out, begun, is_same
+from igrow.trainer.diagnosis.answer.evidence import Evidence
+from igrow.trainer.diagnosis.answer.result import Diagnosis, Finding, Verdict
 from igrow.trainer.diagnosis.circumstances import Circumstances, circumstances_of
-from igrow.trainer.diagnosis.correction import Corrected, correct, corrected_model, until_outdone, with_unexplained
 from igrow.trainer.diagnosis.crop import of_one_crop
+from igrow.trainer.diagnosis.design.candidates import hidden_by_missing_weather
 from igrow.trainer.diagnosis.diagnosed_days import since_calibration, weeks_in_turn
-from igrow.trainer.diagnosis.estimate import Estimated, from_before, normal_quantile
-from igrow.trainer.diagnosis.evidence import Evidence
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
-from igrow.trainer.diagnosis.null_gains import NullGains
-from igrow.trainer.diagnosis.parameter_change import ParameterChange
-from igrow.trainer.diagnosis.parameter_or_causes import may_give_way, stands_in_its_place, with_parameter
-from igrow.trainer.diagnosis.result import Diagnosis, Finding, Verdict
-from igrow.trainer.diagnosis.rounds import Search, search_of
+from igrow.trainer.diagnosis.learned.null_gains import NullGains
 from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules
-from igrow.trainer.diagnosis.search import Hypothesis
-from igrow.trainer.diagnosis.shipping import shipped
-from igrow.trainer.diagnosis.unseen_errors import errors_of, runs_of, stages_of
+from igrow.trainer.diagnosis.search import history
+from igrow.trainer.diagnosis.search.actuators import Completed, may_hide_in_parameters
+from igrow.trainer.diagnosis.search.change import Round
+from igrow.trainer.diagnosis.search.estimate import Estimated, from_before, normal_quantile
+from igrow.trainer.diagnosis.search.parameter_change import ParameterChange
+from igrow.trainer.diagnosis.search.rounds import Search, search_of
+from igrow.trainer.diagnosis.search.scan import Hypothesis
+from igrow.trainer.diagnosis.validation.correction import (
+    Corrected,
+    correct,
+    corrected_model,
+    until_outdone,
+    with_unexplained,
+)
+from igrow.trainer.diagnosis.validation.parameter_or_causes import may_give_way, stands_in_its_place, with_parameter
+from igrow.trainer.diagnosis.validation.shipping import shipped
+from igrow.trainer.diagnosis.validation.unseen_errors import errors_of, runs_of, stages_of
 from igrow.trainer.diagnosis.visible_parameters import members
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.growth import built_in_crop, growth_since

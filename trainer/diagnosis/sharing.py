@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from igrow.trainer.diagnosis import amplitudes
+from igrow.trainer.diagnosis.design import amplitudes
 from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.fit.climate import site_prior

@@ -4,7 +4,7 @@ A calibration settles on the parameters that serve it best, and what it cannot e
 greenhouse (Kennedy and O'Hagan 2001, J. R. Stat. Soc. B 63, 425-464). It is held as a normal distribution of
 amplitudes of everything that may be missing, together with the parameters, since one can stand for the other; beside it
 the colour of the greenhouse's disturbances, and what every candidate gained in windows of the calibration log, in which
-nothing had changed. `igrow.trainer.diagnosis.history` learns it; a later diagnosis asks what has changed since.
+nothing had changed. `igrow.trainer.diagnosis.search.history` learns it; a later diagnosis asks what has changed since.
 """
 
 from __future__ import annotations

@@ -12,8 +12,8 @@ from igrow.core.effects import EFFECTS
 from igrow.core.errors import IgrowError
 from igrow.core.language import Language
 from igrow.trainer.data.plot import plot_log
-from igrow.trainer.diagnosis import plots
-from igrow.trainer.diagnosis.result import Diagnosis, Finding
+from igrow.trainer.diagnosis.answer import plots
+from igrow.trainer.diagnosis.answer.result import Diagnosis, Finding
 from igrow.trainer.figure_style import WIDTH, svg, with_signs_of
 
 OVERVIEW = ("air_temperature", "air_humidity", "air_co2", "outdoor_temperature", "global_radiation")

@@ -14,8 +14,8 @@ from igrow.core.effects import EFFECTS
 from igrow.core.errors import IgrowError
 from igrow.core.language import Language, speak
 from igrow.core.quantities import QUANTITIES
-from igrow.trainer.diagnosis.freerun import HORIZONS
-from igrow.trainer.diagnosis.result import STAGES, Diagnosis, Finding
+from igrow.trainer.diagnosis.answer.result import STAGES, Diagnosis, Finding
+from igrow.trainer.diagnosis.design.freerun import HORIZONS
 from igrow.trainer.figure_style import COLOURS, DARK
 from igrow.trainer.report import figures, sentences, verdicts
 from igrow.trainer.report.worth import Worth, worth

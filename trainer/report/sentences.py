@@ -14,8 +14,8 @@ from igrow.core.language import N_, Language
 from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator.hybrid.measurement import PREDICTED
 from igrow.trainer.data.fault import DataFault
-from igrow.trainer.diagnosis.candidates import WEEKDAYS
-from igrow.trainer.diagnosis.result import DISCREPANCY, WORSE, Diagnosis, Finding
+from igrow.trainer.diagnosis.answer.result import DISCREPANCY, WORSE, Diagnosis, Finding
+from igrow.trainer.diagnosis.design.candidates import WEEKDAYS
 from igrow.trainer.diagnosis.visible_parameters import VISIBLE
 from igrow.trainer.fit.omission import Omission
 from igrow.trainer.report.worth import Worth

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from igrow.core.language import Language
-from igrow.trainer.diagnosis.result import Diagnosis
-from igrow.trainer.diagnosis.uncalibrated import FIRST, NO_NAME, how_to_calibrate
+from igrow.trainer.diagnosis.answer.result import Diagnosis
+from igrow.trainer.diagnosis.answer.uncalibrated import FIRST, NO_NAME, how_to_calibrate
 from igrow.trainer.report.sentences import TEXTS
 
 

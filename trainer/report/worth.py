@@ -18,9 +18,9 @@ from igrow.core.economics import co2_cost, electricity_price
 from igrow.core.simulator.hybrid import climate
 from igrow.core.simulator.hybrid.balances import balances
 from igrow.core.simulator.hybrid.record import Record, observe
-from igrow.trainer.diagnosis.freerun import Stage
+from igrow.trainer.diagnosis.answer.result import DISCREPANCY, Diagnosis, Finding
+from igrow.trainer.diagnosis.design.freerun import Stage
 from igrow.trainer.diagnosis.knowledge import CROP, activate
-from igrow.trainer.diagnosis.result import DISCREPANCY, Diagnosis, Finding
 from igrow.trainer.diagnosis.visible_parameters import VISIBLE, members
 
 _WEEK = 604_800.0

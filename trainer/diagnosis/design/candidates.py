@@ -25,7 +25,7 @@ from igrow.core.effects.definition import Parameter
 from igrow.core.quantities import WEATHER
 from igrow.core.simulator.hybrid.log_record import SWITCHES
 from igrow.core.simulator.hybrid.record import Record
-from igrow.trainer.diagnosis.sensitivity import (
+from igrow.trainer.diagnosis.design.sensitivity import (
     Linearisation,
     flux_sensitivities,
     is_measured,
@@ -33,7 +33,7 @@ from igrow.trainer.diagnosis.sensitivity import (
     unit_fluxes,
 )
 
-_TABLE = yaml.safe_load(files("igrow.trainer.diagnosis").joinpath("candidates.yaml").read_text(encoding="utf-8"))
+_TABLE = yaml.safe_load(files("igrow.trainer.diagnosis").joinpath("design/candidates.yaml").read_text(encoding="utf-8"))
 SHAPES: Mapping[str, Mapping[str, Sequence[float]]] = _TABLE["shapes"]
 """Values of nonlinear parameters tried first, by effect."""
 CHANNELS: Mapping[str, Mapping[str, Any]] = _TABLE["channels"]

@@ -9,14 +9,14 @@ import numpy as np
 
 from igrow.core.bundle import Estimate
 from igrow.core.effects import EFFECTS
-from igrow.trainer.diagnosis import freerun
-from igrow.trainer.diagnosis.correction import Corrected
-from igrow.trainer.diagnosis.estimate import Estimated, normal_quantile
-from igrow.trainer.diagnosis.freerun import LogDays, Refittable, Stage, cross_validated_skill
+from igrow.trainer.diagnosis.design import freerun
+from igrow.trainer.diagnosis.design.freerun import LogDays, Refittable, Stage, cross_validated_skill
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge
-from igrow.trainer.diagnosis.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.rules import DecisionRules
-from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.diagnosis.search.estimate import Estimated, normal_quantile
+from igrow.trainer.diagnosis.search.parameter_change import ParameterChange
+from igrow.trainer.diagnosis.search.scan import Hypothesis
+from igrow.trainer.diagnosis.validation.correction import Corrected
 from igrow.trainer.diagnosis.visible_parameters import members
 from igrow.trainer.fit.climate import bounds
 from igrow.trainer.fit.gaussian import Gaussian

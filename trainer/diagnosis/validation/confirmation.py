@@ -10,11 +10,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from igrow.core.effects import EFFECTS
-from igrow.trainer.diagnosis.estimate import Estimated
-from igrow.trainer.diagnosis.freerun import LogDays, Refittable, Stage, cross_validated_skill
+from igrow.trainer.diagnosis.design.freerun import LogDays, Refittable, Stage, cross_validated_skill
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge, activate
-from igrow.trainer.diagnosis.omission import fit_together
 from igrow.trainer.diagnosis.rules import DecisionRules
+from igrow.trainer.diagnosis.search.estimate import Estimated
+from igrow.trainer.diagnosis.search.omission import fit_together
 from igrow.trainer.fit.climate import has_runs
 from igrow.trainer.fit.gaussian import Gaussian
 

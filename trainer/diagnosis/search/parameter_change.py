@@ -15,11 +15,12 @@ import numpy as np
 
 from igrow.core.bundle import Estimate
 from igrow.core.effects import EFFECTS
-from igrow.trainer.diagnosis import change, linear, search, sensitivity
-from igrow.trainer.diagnosis.design import Block, Design
-from igrow.trainer.diagnosis.estimate import OnsetInterval, onset_interval, reach
-from igrow.trainer.diagnosis.linear import Fit
-from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.diagnosis.design import linear, sensitivity
+from igrow.trainer.diagnosis.design.design import Block, Design
+from igrow.trainer.diagnosis.design.linear import Fit
+from igrow.trainer.diagnosis.search import change, scan
+from igrow.trainer.diagnosis.search.estimate import OnsetInterval, onset_interval, reach
+from igrow.trainer.diagnosis.search.scan import Hypothesis
 from igrow.trainer.diagnosis.visible_parameters import TOGETHER, VISIBLE, members
 from igrow.trainer.fit.climate import bounds
 
@@ -52,7 +53,7 @@ def find(design: Design, rng: np.random.Generator) -> ParameterChange | None:
         rng: for the flips.
     """
     rules, unasked, design = design.rules, design.known.without, joined(design)
-    null, onsets = linear.fit(design.grams, design.null_model()), search.onset_days(design)
+    null, onsets = linear.fit(design.grams, design.null_model()), scan.onset_days(design)
     scored = score(design, null, onsets, rng)
     net = {one.parameter: change.proven_gain(design, one) - _needed_gain(design, one) for one in scored}
     # Of what is none at the calibration there is no share.
@@ -165,8 +166,8 @@ def at_its_size(
         ).whitened(design.whitening)
         null = linear.fit(wider.grams, wider.null_model())
         limits = np.array([[low - value, high - value]])
-        scanned = search.scan(wider.grams, null, [place], [None], onsets, limits, rng, design.rules.flips)
-        found = search.best_of_each(scanned, [one.parameter], [None], [one.parameter], design.rules.onset_price)
+        scanned = scan.scan(wider.grams, null, [place], [None], onsets, limits, rng, design.rules.flips)
+        found = scan.best_of_each(scanned, [one.parameter], [None], [one.parameter], design.rules.onset_price)
         if not found or found[0].gain < one.gain:
             break
         one = found[0]
@@ -207,8 +208,8 @@ def score(design: Design, current: Fit, onsets: Sequence[int | None], rng: np.ra
     reaches = np.array([_range(design, name) for name in labels])
     none: list[int | None] = [None] * len(labels)
     limits = reaches[:, 1:] - reaches[:, :1]
-    scanned = search.scan(design.grams, current, columns, none, onsets, limits, rng, design.rules.flips)
-    return search.best_of_each(scanned, labels, none, labels, design.rules.onset_price)
+    scanned = scan.scan(design.grams, current, columns, none, onsets, limits, rng, design.rules.flips)
+    return scan.best_of_each(scanned, labels, none, labels, design.rules.onset_price)
 
 
 def _range(design: Design, name: str) -> tuple[float, float, float]:

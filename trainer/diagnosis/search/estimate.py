@@ -10,15 +10,16 @@ from scipy.stats import chi2, norm
 
 from igrow.core.bundle import Estimate
 from igrow.core.effects import EFFECTS
-from igrow.trainer.diagnosis import change, linear, search
-from igrow.trainer.diagnosis.candidates import Candidate
-from igrow.trainer.diagnosis.change import Round
-from igrow.trainer.diagnosis.design import Design
+from igrow.trainer.diagnosis.design import linear
+from igrow.trainer.diagnosis.design.candidates import Candidate
+from igrow.trainer.diagnosis.design.design import Design
+from igrow.trainer.diagnosis.design.linear import Fit, Term
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
-from igrow.trainer.diagnosis.linear import Fit, Term
-from igrow.trainer.diagnosis.refit import Refitted
 from igrow.trainer.diagnosis.rules import DecisionRules
-from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.diagnosis.search import change, scan
+from igrow.trainer.diagnosis.search.change import Round
+from igrow.trainer.diagnosis.search.refit import Refitted
+from igrow.trainer.diagnosis.search.scan import Hypothesis
 
 
 @dataclass(frozen=True)
@@ -150,8 +151,8 @@ def _confounded(
     Of a cause that only unseen days tell, what gains too little to be asked of them is as good by nothing.
     """
     least = max(gain - design.rules.confounded_within(gain), design.rules.least_unproven_change)
-    onsets = search.onset_days(design) if hypothesis.term.onset is not None else [None]
-    scored = search.score_candidates(design, null, onsets, rng)
+    onsets = scan.onset_days(design) if hypothesis.term.onset is not None else [None]
+    scored = scan.score_candidates(design, null, onsets, rng)
     hidden = design.known.without
     as_good = [one.effect for one in scored if one.gain >= least and one.effect not in hidden]
     return (hypothesis.effect, *(name for name in as_good if name != hypothesis.effect))
@@ -185,7 +186,7 @@ def onset_interval(design: Design, null: Fit, term: Term) -> OnsetInterval | Non
         return None
     days = list(range(1, design.split.days - 1))
     gains = np.array([_gain(design, null, Term(term.column, day, term.ageing)) for day in days])
-    best = search.middle_of_best(gains)
+    best = scan.middle_of_best(gains)
     inside = np.flatnonzero(gains >= gains[best] - 0.5 * float(chi2.ppf(design.rules.confidence, 1)))
     return OnsetInterval(
         _day_start(design, days[best]),

@@ -13,14 +13,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from igrow.core.arrays import Floats
-from igrow.trainer.diagnosis import candidates, linear, search
-from igrow.trainer.diagnosis.candidates import Pattern
-from igrow.trainer.diagnosis.change import net_gain
-from igrow.trainer.diagnosis.cross_validation import CrossValidated, cross_validated
-from igrow.trainer.diagnosis.design import Design
-from igrow.trainer.diagnosis.linear import Term
-from igrow.trainer.diagnosis.null_gains import read_null_pattern_skills
-from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.diagnosis.design import candidates, linear
+from igrow.trainer.diagnosis.design.candidates import Pattern
+from igrow.trainer.diagnosis.design.design import Design
+from igrow.trainer.diagnosis.design.linear import Term
+from igrow.trainer.diagnosis.learned.null_gains import read_null_pattern_skills
+from igrow.trainer.diagnosis.search import scan
+from igrow.trainer.diagnosis.search.change import net_gain
+from igrow.trainer.diagnosis.search.cross_validation import CrossValidated, cross_validated
+from igrow.trainer.diagnosis.search.scan import Hypothesis
 from igrow.trainer.fit.gaussian import Gaussian
 
 
@@ -68,7 +69,7 @@ def find(design: Design, longitude: float, by_physics: Gaussian, rng: np.random.
         kind = _pattern(one).kind
         if kind in told or one.skill < known.needed(kind, design.rules.days_over_null):
             continue
-        column = search.column_of(asked.design, one.hypothesis.term)
+        column = scan.column_of(asked.design, one.hypothesis.term)
         sized = _sized(design, one.hypothesis, column, one.p_value(design.rules, rng))
         if net_gain(design, sized) > 0.0:
             told[kind] = sized

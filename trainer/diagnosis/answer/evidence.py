@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from igrow.core.arrays import Floats
-from igrow.trainer.diagnosis.change import Round
-from igrow.trainer.diagnosis.freerun import FreeRuns, LogDays, Stage, mean_absolute_errors
+from igrow.trainer.diagnosis.design.freerun import FreeRuns, LogDays, Stage, mean_absolute_errors
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge
+from igrow.trainer.diagnosis.search.change import Round
 
 
 @dataclass(frozen=True)

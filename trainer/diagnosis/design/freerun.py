@@ -17,10 +17,10 @@ from igrow.core.simulator.hybrid import measurement
 from igrow.core.simulator.hybrid.record import Record, complete_starts, free_run, observe
 from igrow.trainer.data.log import Log
 from igrow.trainer.data.splits import DaySplit, folds, split_days
-from igrow.trainer.diagnosis import sensitivity
-from igrow.trainer.diagnosis.candidates import Pattern
+from igrow.trainer.diagnosis.design import sensitivity
+from igrow.trainer.diagnosis.design.candidates import Pattern
+from igrow.trainer.diagnosis.design.sensitivity import DayRuns, Linearisation
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, activate, clipped
-from igrow.trainer.diagnosis.sensitivity import DayRuns, Linearisation
 from igrow.trainer.fit import solver
 from igrow.trainer.fit.climate import bounds
 from igrow.trainer.fit.evaluation import horizon_steps, starts_within

@@ -18,13 +18,13 @@ from scipy.linalg import block_diag
 from igrow.core.arrays import Floats, Mask
 from igrow.core.effects import EFFECTS
 from igrow.core.simulator.hybrid.climate import ActiveEffects
-from igrow.trainer.diagnosis import possible_air, sensitivity
-from igrow.trainer.diagnosis.balances import Balances
-from igrow.trainer.diagnosis.design import Design
+from igrow.trainer.diagnosis.design import possible_air, sensitivity
+from igrow.trainer.diagnosis.design.balances import Balances
+from igrow.trainer.diagnosis.design.design import Design
+from igrow.trainer.diagnosis.design.linear import Fit
+from igrow.trainer.diagnosis.design.noise import Whitening
+from igrow.trainer.diagnosis.design.sensitivity import Linearisation
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, activate, clipped
-from igrow.trainer.diagnosis.linear import Fit
-from igrow.trainer.diagnosis.noise import Whitening
-from igrow.trainer.diagnosis.sensitivity import Linearisation
 from igrow.trainer.fit import solver
 from igrow.trainer.fit.climate import bounds
 from igrow.trainer.fit.gaussian import Gaussian

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from igrow.trainer.diagnosis.actuators import Completed
-from igrow.trainer.diagnosis.correction import Corrected
-from igrow.trainer.diagnosis.freerun import HORIZONS, FreeRuns, LogDays, Stage, mean_absolute_errors
+from igrow.trainer.diagnosis.design.freerun import HORIZONS, FreeRuns, LogDays, Stage, mean_absolute_errors
+from igrow.trainer.diagnosis.search.actuators import Completed
+from igrow.trainer.diagnosis.validation.correction import Corrected
 
 
 def stages_of(result: Corrected, completed: Completed, logged: LogDays) -> dict[str, tuple[Stage, LogDays]]:

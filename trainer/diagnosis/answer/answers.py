@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from igrow.trainer.diagnosis import wording
-from igrow.trainer.diagnosis.estimate import Estimated
-from igrow.trainer.diagnosis.parameter_change import ParameterChange
-from igrow.trainer.diagnosis.result import DISCREPANCY, Diagnosis, Finding
+from igrow.trainer.diagnosis.answer import wording
+from igrow.trainer.diagnosis.answer.result import DISCREPANCY, Diagnosis, Finding
 from igrow.trainer.diagnosis.rules import DecisionRules
+from igrow.trainer.diagnosis.search.estimate import Estimated
+from igrow.trainer.diagnosis.search.parameter_change import ParameterChange
 from igrow.trainer.fit.discrepancy import Discrepancy
 
 

@@ -9,13 +9,13 @@ from igrow.core.effects import EFFECTS
 from igrow.core.language import N_
 from igrow.core.language.units import written
 from igrow.core.site import Site
-from igrow.trainer.diagnosis.actuators import Replaced
-from igrow.trainer.diagnosis.candidates import CHANNELS, Pattern
-from igrow.trainer.diagnosis.estimate import Estimated, OnsetInterval, normal_quantile
-from igrow.trainer.diagnosis.parameter_change import ParameterChange
-from igrow.trainer.diagnosis.result import DISCREPANCY, Finding, plain
+from igrow.trainer.diagnosis.answer.result import DISCREPANCY, Finding, plain
+from igrow.trainer.diagnosis.design.candidates import CHANNELS, Pattern
 from igrow.trainer.diagnosis.rules import DecisionRules
-from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.diagnosis.search.actuators import Replaced
+from igrow.trainer.diagnosis.search.estimate import Estimated, OnsetInterval, normal_quantile
+from igrow.trainer.diagnosis.search.parameter_change import ParameterChange
+from igrow.trainer.diagnosis.search.scan import Hypothesis
 from igrow.trainer.diagnosis.visible_parameters import VISIBLE
 
 NOT_CALIBRATED = N_(

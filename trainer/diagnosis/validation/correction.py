@@ -13,17 +13,17 @@ from igrow.core.effects import EFFECTS
 from igrow.core.local_time import utc_datetime
 from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator.crop import CropStages
-from igrow.trainer.diagnosis import freerun
-from igrow.trainer.diagnosis.candidates import Pattern, pattern_fluxes
-from igrow.trainer.diagnosis.confirmation import confirmed
-from igrow.trainer.diagnosis.estimate import Estimated
-from igrow.trainer.diagnosis.freerun import LogDays, Refittable, Stage, cross_validated_skill
+from igrow.trainer.diagnosis.answer.result import Finding
+from igrow.trainer.diagnosis.design import freerun
+from igrow.trainer.diagnosis.design.candidates import Pattern, pattern_fluxes
+from igrow.trainer.diagnosis.design.freerun import LogDays, Refittable, Stage, cross_validated_skill
 from igrow.trainer.diagnosis.knowledge import Knowledge
-from igrow.trainer.diagnosis.parameter_change import ParameterChange
-from igrow.trainer.diagnosis.refit import REGIMES
-from igrow.trainer.diagnosis.result import Finding
 from igrow.trainer.diagnosis.rules import DecisionRules
-from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.diagnosis.search.estimate import Estimated
+from igrow.trainer.diagnosis.search.parameter_change import ParameterChange
+from igrow.trainer.diagnosis.search.refit import REGIMES
+from igrow.trainer.diagnosis.search.scan import Hypothesis
+from igrow.trainer.diagnosis.validation.confirmation import confirmed
 from igrow.trainer.fit.model import FittedModel
 from igrow.trainer.fit.solver import DivergenceError
 

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from igrow.core.arrays import Floats, Integers, Mask
-from igrow.trainer.diagnosis.candidates import Candidate, Pattern
-from igrow.trainer.diagnosis.design import Design
+from igrow.trainer.diagnosis.design.candidates import Candidate, Pattern
+from igrow.trainer.diagnosis.design.design import Design
+from igrow.trainer.diagnosis.design.linear import RESIDUAL, DailyGrams, Fit, Term
 from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX
-from igrow.trainer.diagnosis.linear import RESIDUAL, DailyGrams, Fit, Term
 
 _EXPLAINED = 1e-6
 """Share of a column's curvature below which the null explains it altogether."""

@@ -10,10 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from igrow.trainer.diagnosis.actuators import Completed
-from igrow.trainer.diagnosis.correction import Corrected
-from igrow.trainer.diagnosis.freerun import LogDays, Refittable, Stage, cross_validated_skill
+from igrow.trainer.diagnosis.design.freerun import LogDays, Refittable, Stage, cross_validated_skill
 from igrow.trainer.diagnosis.knowledge import Knowledge
+from igrow.trainer.diagnosis.search.actuators import Completed
+from igrow.trainer.diagnosis.validation.correction import Corrected
 from igrow.trainer.diagnosis.visible_parameters import members
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.solver import DivergenceError

@@ -23,12 +23,13 @@ from igrow.core.simulator.hybrid.climate import ActiveEffects
 from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
 from igrow.trainer.data.splits import held_out_weeks
-from igrow.trainer.diagnosis import history, linear, search
-from igrow.trainer.diagnosis.candidates import Candidate
-from igrow.trainer.diagnosis.design import Design
-from igrow.trainer.diagnosis.estimate import normal_quantile
-from igrow.trainer.diagnosis.linear import LinearModel, Term
+from igrow.trainer.diagnosis.design import linear
+from igrow.trainer.diagnosis.design.candidates import Candidate
+from igrow.trainer.diagnosis.design.design import Design
+from igrow.trainer.diagnosis.design.linear import LinearModel, Term
 from igrow.trainer.diagnosis.rules import DecisionRules
+from igrow.trainer.diagnosis.search import history, scan
+from igrow.trainer.diagnosis.search.estimate import normal_quantile
 from igrow.trainer.fit.climate import fit_climate
 from igrow.trainer.fit.evaluation import Model, held_out_errors
 from igrow.trainer.fit.gaussian import Gaussian
@@ -74,7 +75,7 @@ def gains_of(
     limits = np.array([(max(one.amplitude.low, 0.0), one.amplitude.high) for _, one in asked]).reshape(-1, 2)
     chosen, rng = [column for column, _ in asked], np.random.default_rng(0)
     current = linear.fit(design.grams, null)
-    scanned = search.scan(design.grams, current, chosen, [None] * len(asked), [None], limits, rng, 0)
+    scanned = scan.scan(design.grams, current, chosen, [None] * len(asked), [None], limits, rng, 0)
     gains = np.minimum(scanned.gain[0], 0.5 * scanned.statistic[0] ** 2)
     return {effect.name: float(gain) for (_, effect), gain in zip(asked, gains, strict=True)}
 

@@ -21,11 +21,11 @@ from igrow.core.simulator import actuation
 from igrow.core.simulator.hybrid import climate, measurement, record
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.data.log import Log
-from igrow.trainer.diagnosis import freerun, linear, sensitivity
-from igrow.trainer.diagnosis.estimate import normal_quantile
-from igrow.trainer.diagnosis.freerun import SCALES, LogDays, Stage
+from igrow.trainer.diagnosis.design import freerun, linear, sensitivity
+from igrow.trainer.diagnosis.design.freerun import SCALES, LogDays, Stage
 from igrow.trainer.diagnosis.knowledge import Knowledge, activate
 from igrow.trainer.diagnosis.rules import DecisionRules
+from igrow.trainer.diagnosis.search.estimate import normal_quantile
 from igrow.trainer.fit.actuation import setpoint_columns
 from igrow.trainer.fit.model import FittedModel
 from igrow.trainer.fit.scales import CORRELATION_TIME

@@ -10,17 +10,17 @@ import numpy as np
 from igrow.core.arrays import Floats
 from igrow.core.effects import EFFECTS
 from igrow.core.site import Site
-from igrow.trainer.diagnosis import cross_validation, history, parameter_change, unexplained
-from igrow.trainer.diagnosis.change import Round, changed
-from igrow.trainer.diagnosis.design import Design
-from igrow.trainer.diagnosis.estimate import Estimated, estimate, with_refitted, within_bounds
-from igrow.trainer.diagnosis.freerun import LogDays
+from igrow.trainer.diagnosis.design.design import Design
+from igrow.trainer.diagnosis.design.freerun import LogDays
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge
-from igrow.trainer.diagnosis.null_gains import NullGains, read_null_gains, read_unknown_gains
-from igrow.trainer.diagnosis.parameter_change import ParameterChange
-from igrow.trainer.diagnosis.refit import refit
+from igrow.trainer.diagnosis.learned.null_gains import NullGains, read_null_gains, read_unknown_gains
 from igrow.trainer.diagnosis.rules import DecisionRules
-from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.diagnosis.search import cross_validation, history, parameter_change, unexplained
+from igrow.trainer.diagnosis.search.change import Round, changed
+from igrow.trainer.diagnosis.search.estimate import Estimated, estimate, with_refitted, within_bounds
+from igrow.trainer.diagnosis.search.parameter_change import ParameterChange
+from igrow.trainer.diagnosis.search.refit import refit
+from igrow.trainer.diagnosis.search.scan import Hypothesis
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.solver import DivergenceError
 

@@ -15,7 +15,7 @@ from igrow.core.errors import IgrowError
 from igrow.core.language import ENGLISH, Language
 from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator.hybrid.measurement import PREDICTED
-from igrow.trainer.diagnosis.evidence import Evidence
+from igrow.trainer.diagnosis.answer.evidence import Evidence
 from igrow.trainer.figure_style import COLOURS, STROKES, date_axis, few_ticks, legend, local, name_above, panels
 
 _BINS = 12

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from igrow.core.arrays import Floats, Mask
+from igrow.trainer.diagnosis.design.sensitivity import Linearisation
 from igrow.trainer.diagnosis.rules import DecisionRules
-from igrow.trainer.diagnosis.sensitivity import Linearisation
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from igrow.core.arrays import Floats
 from igrow.core.effects import EFFECTS
-from igrow.trainer.diagnosis.design import JOINT, Design
+from igrow.trainer.diagnosis.design.design import JOINT, Design
 from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, home_drift
 from igrow.trainer.diagnosis.rules import DecisionRules
 

@@ -23,14 +23,14 @@ from igrow.core.effects import EFFECTS
 from igrow.core.simulator.hybrid.climate import ActiveEffects
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.data.splits import DaySplit
-from igrow.trainer.diagnosis import candidates, linear, noise, possible_air, sensitivity
-from igrow.trainer.diagnosis.balances import Balances, balances_of
-from igrow.trainer.diagnosis.candidates import Candidate, Pattern
-from igrow.trainer.diagnosis.linear import DailyGrams, LinearModel
-from igrow.trainer.diagnosis.noise import NoiseFilter, Whitening
-from igrow.trainer.diagnosis.null_gains import NullGains
+from igrow.trainer.diagnosis.design import candidates, linear, noise, possible_air, sensitivity
+from igrow.trainer.diagnosis.design.balances import Balances, balances_of
+from igrow.trainer.diagnosis.design.candidates import Candidate, Pattern
+from igrow.trainer.diagnosis.design.linear import DailyGrams, LinearModel
+from igrow.trainer.diagnosis.design.noise import NoiseFilter, Whitening
+from igrow.trainer.diagnosis.design.sensitivity import Linearisation
+from igrow.trainer.diagnosis.learned.null_gains import NullGains
 from igrow.trainer.diagnosis.rules import DecisionRules
-from igrow.trainer.diagnosis.sensitivity import Linearisation
 from igrow.trainer.fit.gaussian import Gaussian
 
 JOINT = ("parameter", "effect", "pattern")

@@ -14,12 +14,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from igrow.core.effects import EFFECTS
-from igrow.trainer.diagnosis import linear, search
-from igrow.trainer.diagnosis.candidates import Pattern
-from igrow.trainer.diagnosis.design import Design
-from igrow.trainer.diagnosis.linear import Fit, LinearModel
-from igrow.trainer.diagnosis.null_gains import BEGINNING_PREFIX, NullGains
-from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.diagnosis.design import linear
+from igrow.trainer.diagnosis.design.candidates import Pattern
+from igrow.trainer.diagnosis.design.design import Design
+from igrow.trainer.diagnosis.design.linear import Fit, LinearModel
+from igrow.trainer.diagnosis.learned.null_gains import BEGINNING_PREFIX, NullGains
+from igrow.trainer.diagnosis.search import scan
+from igrow.trainer.diagnosis.search.scan import Hypothesis
 
 
 @dataclass(frozen=True)
@@ -51,10 +52,10 @@ def changed(
         patterns: look for patterns.
     """
     rules, null = design.rules, linear.fit(design.grams, design.null_model())
-    onsets = search.onset_days(design)
+    onsets = scan.onset_days(design)
     cause = chosen(design, scored(design, null, rng)) if causes else None
     times = onsets[:: rules.pattern_onset_stride]
-    pattern = best(design, search.score_patterns(design, null, times, rng)) if patterns else None
+    pattern = best(design, scan.score_patterns(design, null, times, rng)) if patterns else None
     nothing = Round(design, null, null, None, ())
     if pattern is not None:
         gained = 0.0 if cause is None else net_gain(design, cause)
@@ -74,8 +75,8 @@ def scored(design: Design, null: Fit, rng: np.random.Generator) -> list[Hypothes
 
     Beside what is unexplained a process that is there all the time may be a part of it: it is none.
     """
-    found = search.score_candidates(design, null, search.onset_days(design), rng)
-    always = {one.effect: one.gain for one in search.score_candidates(design, null, [None], rng)}
+    found = scan.score_candidates(design, null, scan.onset_days(design), rng)
+    always = {one.effect: one.gain for one in scan.score_candidates(design, null, [None], rng)}
     found = [one if one.term.onset is None else replace(one, always=always.get(one.effect, 0.0)) for one in found]
     alone = not design.known.unnamed
     return [one for one in found if alone or one.always is not None or EFFECTS[one.effect].kind == "sensor"]
@@ -103,7 +104,7 @@ def left_by_hour(design: Design, null: Fit, cause: Hypothesis, rng: np.random.Ge
     which nothing has changed leave as well.
     """
     named = linear.fit(design.grams, null.model.with_term(cause.term))
-    left = search.score_patterns(design, named, [None], rng)
+    left = scan.score_patterns(design, named, [None], rng)
     by_hour = (one for one in left if isinstance(one.cause, Pattern) and "hour" in one.cause.drivers)
     return max((proven_gain(design, one) for one in by_hour), default=0.0)
 
@@ -178,5 +179,5 @@ def beside(design: Design, model: LinearModel) -> Design:
     coefficients = fitted.solution.coefficients[: len(model.base)]
     errors = design.values[0] + np.tensordot(coefficients, design.values[list(model.base)], axes=1)
     for amplitude, term in zip(fitted.amplitudes, model.terms, strict=True):
-        errors = errors + amplitude * search.column_of(design, term)
+        errors = errors + amplitude * scan.column_of(design, term)
     return design.whitened(design.fit_noise(errors))

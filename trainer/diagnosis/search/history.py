@@ -20,10 +20,12 @@ from igrow.core.simulator.hybrid.climate import ActiveEffects
 from igrow.core.simulator.hybrid.record import Record
 from igrow.core.site import Site
 from igrow.trainer.data.splits import DaySplit, split_days
-from igrow.trainer.diagnosis import linear, noise, parameter_change, search
-from igrow.trainer.diagnosis.amplitudes import columns, drift_over, drift_within, hardly_shown, keys, omission
-from igrow.trainer.diagnosis.design import Design, History, lay_out
-from igrow.trainer.diagnosis.freerun import LogDays
+from igrow.trainer.diagnosis.design import linear, noise
+from igrow.trainer.diagnosis.design.amplitudes import columns, drift_over, drift_within, hardly_shown, keys, omission
+from igrow.trainer.diagnosis.design.design import Design, History, lay_out
+from igrow.trainer.diagnosis.design.freerun import LogDays
+from igrow.trainer.diagnosis.design.linear import DailyGrams, LinearModel
+from igrow.trainer.diagnosis.design.noise import Whitening
 from igrow.trainer.diagnosis.knowledge import (
     PARAMETER_PREFIX,
     VENTS,
@@ -32,10 +34,9 @@ from igrow.trainer.diagnosis.knowledge import (
     activate,
     knowledge_of,
 )
-from igrow.trainer.diagnosis.linear import DailyGrams, LinearModel
-from igrow.trainer.diagnosis.noise import Whitening
-from igrow.trainer.diagnosis.null_gains import NullGains, read_null_gains
+from igrow.trainer.diagnosis.learned.null_gains import NullGains, read_null_gains
 from igrow.trainer.diagnosis.rules import DecisionRules
+from igrow.trainer.diagnosis.search import parameter_change, scan
 from igrow.trainer.fit.climate import site_prior
 from igrow.trainer.fit.discrepancy import Discrepancy
 from igrow.trainer.fit.gaussian import Gaussian
@@ -319,7 +320,7 @@ def own_gains(design: Design) -> dict[str, float]:
             window = replace(design, grams=DailyGrams(design.grams.products, inside))
             current = linear.fit(window.grams, LinearModel(null.base, after.precision, after.mean))
             rng = np.random.default_rng(0)
-            for score in (search.score_candidates, search.score_patterns, parameter_change.score):
+            for score in (scan.score_candidates, scan.score_patterns, parameter_change.score):
                 for one in score(window, current, [None], rng):
                     largest[one.key] = max(largest.get(one.key, 0.0), one.gain)
     return {key: float(f"{gain:.4g}") for key, gain in largest.items()}

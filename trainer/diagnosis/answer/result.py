@@ -13,15 +13,15 @@ from igrow.core.effects import EFFECTS
 from igrow.core.language import Language, speak
 from igrow.core.quantities import QUANTITIES
 from igrow.trainer.data.screening import Screened
-from igrow.trainer.diagnosis.uncalibrated import FIRST, NO_NAME, how_to_calibrate
+from igrow.trainer.diagnosis.answer.uncalibrated import FIRST, NO_NAME, how_to_calibrate
 from igrow.trainer.diagnosis.visible_parameters import VISIBLE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from igrow.trainer.data.log import Log
-    from igrow.trainer.diagnosis.estimate import OnsetInterval
-    from igrow.trainer.diagnosis.evidence import Evidence
+    from igrow.trainer.diagnosis.answer.evidence import Evidence
+    from igrow.trainer.diagnosis.search.estimate import OnsetInterval
     from igrow.trainer.fit.model import FittedModel
 
 Verdict = Literal["nothing", "named", "ambiguous", "unexplained", "data_fault"]
@@ -187,31 +187,31 @@ class Diagnosis:
         Raises:
             IgrowError: there is nothing to plot.
         """
-        from igrow.trainer.diagnosis import plots  # noqa: PLC0415  (matplotlib is slow to import)
+        from igrow.trainer.diagnosis.answer import plots  # noqa: PLC0415  (matplotlib is slow to import)
 
         return plots.worst_day(plots.needed(self.evidence), quantity, self._english)
 
     def plot_evidence(self) -> Figure:
         """Return a figure of how the evidence adds up from day to day; raises as `plot_errors` does."""
-        from igrow.trainer.diagnosis import plots  # noqa: PLC0415
+        from igrow.trainer.diagnosis.answer import plots  # noqa: PLC0415
 
         return plots.evidence_by_day(plots.needed(self.evidence), self._english)
 
     def plot_days(self) -> Figure:
         """Return a figure of what is missing from day to day; raises as `plot_errors` does."""
-        from igrow.trainer.diagnosis import plots  # noqa: PLC0415
+        from igrow.trainer.diagnosis.answer import plots  # noqa: PLC0415
 
         return plots.residual_by_date(plots.needed(self.evidence), self._english)
 
     def plot_residual(self, driver: str) -> Figure:
         """Return a figure of what is missing against one of the model's drivers; raises as `plot_errors` does."""
-        from igrow.trainer.diagnosis import plots  # noqa: PLC0415
+        from igrow.trainer.diagnosis.answer import plots  # noqa: PLC0415
 
         return plots.residual_against_driver(plots.needed(self.evidence), driver, self._english)
 
     def plot_regimes(self, finding: Finding) -> Figure:
         """Return a figure of a finding's coefficient by regime; raises as `plot_errors` does."""
-        from igrow.trainer.diagnosis import plots  # noqa: PLC0415
+        from igrow.trainer.diagnosis.answer import plots  # noqa: PLC0415
 
         return plots.coefficient_by_regime(finding.regimes, self._english)
 

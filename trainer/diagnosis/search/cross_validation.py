@@ -17,14 +17,15 @@ import numpy as np
 
 from igrow.core.arrays import Floats
 from igrow.trainer.data.splits import folds
-from igrow.trainer.diagnosis import change, linear, search
-from igrow.trainer.diagnosis.candidates import Pattern
-from igrow.trainer.diagnosis.change import Round
-from igrow.trainer.diagnosis.design import Design
-from igrow.trainer.diagnosis.linear import DailyGrams, LinearModel
-from igrow.trainer.diagnosis.null_gains import read_null_skills
+from igrow.trainer.diagnosis.design import linear
+from igrow.trainer.diagnosis.design.candidates import Pattern
+from igrow.trainer.diagnosis.design.design import Design
+from igrow.trainer.diagnosis.design.linear import DailyGrams, LinearModel
+from igrow.trainer.diagnosis.learned.null_gains import read_null_skills
 from igrow.trainer.diagnosis.rules import DecisionRules
-from igrow.trainer.diagnosis.search import Hypothesis
+from igrow.trainer.diagnosis.search import change, scan
+from igrow.trainer.diagnosis.search.change import Round
+from igrow.trainer.diagnosis.search.scan import Hypothesis
 from igrow.trainer.fit.gaussian import Gaussian
 from igrow.trainer.fit.scales import CORRELATION_TIME
 
@@ -117,7 +118,7 @@ def with_what_outdoes_it(design: Design, by_physics: Gaussian, told: Round, rng:
     rules, first = design.rules, told.cause
     if change.over_null(design, first) >= rules.far_over_null:
         return told
-    scored = search.score_patterns(design, linear.fit(design.grams, design.null_model()), [None], rng)
+    scored = scan.score_patterns(design, linear.fit(design.grams, design.null_model()), [None], rng)
     own, *others = cross_validated(design, by_physics, [first, *rivals(design, first, scored)])
     rival = best(others)
     needed = max(own.skill + rules.least_skill, rules.pattern_over_skill * own.skill)
@@ -132,8 +133,8 @@ def clearest(design: Design, by_physics: Gaussian, told: Round, rng: np.random.G
     Arguments are as of `settled`, of a round with a pattern.
     """
     (first,) = told.patterns
-    null, onsets = linear.fit(design.grams, design.null_model()), search.onset_days(design)
-    scored = search.score_patterns(design, null, onsets[:: design.rules.pattern_onset_stride], rng)
+    null, onsets = linear.fit(design.grams, design.null_model()), scan.onset_days(design)
+    scored = scan.score_patterns(design, null, onsets[:: design.rules.pattern_onset_stride], rng)
     chosen = best(cross_validated(design, by_physics, [first, *rivals(design, first, scored)]))
     return told if chosen is None else replace(told, patterns=(chosen.hypothesis,))
 
@@ -155,7 +156,7 @@ def rivals(design: Design, first: Hypothesis, scored: Sequence[Hypothesis]) -> l
 def promising(design: Design, rng: np.random.Generator) -> list[Hypothesis]:
     """Return the effects that gain enough to be asked of unseen days, as if they had been there all the time."""
     null = linear.fit(design.grams, design.null_model())
-    scored = search.score_candidates(design, null, [None], rng)
+    scored = scan.score_candidates(design, null, [None], rng)
     asked = (one for one in scored if one.effect not in design.known.without)
     return [one for one in asked if change.net_gain(design, one) >= design.rules.least_unproven_change]
 
@@ -173,7 +174,7 @@ def cross_validated(design: Design, by_physics: Gaussian, hypotheses: Sequence[H
     assert design.prior.names == by_physics.names
     # Where the model is linear about: the prior is where the parameters are expected.
     stand = design.prior.mean - design.known.amplitudes.mean[: len(by_physics.names)]
-    columns = np.array([search.column_of(design, one.term) for one in hypotheses])
+    columns = np.array([scan.column_of(design, one.term) for one in hypotheses])
     limits = np.array([_reach(design, one) for one in hypotheses])
     joint = design.null_model()
     held = design.block("parameter").columns

@@ -1,0 +1,1 @@
+"""What commands have learned of virtual greenhouses, for every other: bounds of gains and skills, rules."""
