@@ -71,8 +71,8 @@ def test_what_came_with_the_trainer_knows_effects_and_parameters() -> None:
 
 
 def test_of_an_unknown_greenhouse_more_is_asked_and_of_effects_alone() -> None:
-    unknown = read_unknown_gains()
-    assert unknown.least > read_null_gains().least
+    unknown, known = read_unknown_gains(), read_null_gains()
+    assert sum(map(unknown.needed, EFFECTS)) > sum(map(known.needed, EFFECTS))
     assert {name.removeprefix(BEGINNING_PREFIX) for name in unknown.largest} <= set(EFFECTS)
 
 
