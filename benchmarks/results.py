@@ -199,6 +199,13 @@ RESULTS = {
         "0",
         long=True,
     ),
+    "diagnosis-catalogue": Result(
+        "Every cause of the catalogue in turn",
+        ("benchmarks.diagnosis", "catalogue", "--figure", "docs/results/diagnosis-catalogue.svg"),
+        "Each begins a week after the calibration: what is told two weeks later, and the error before and after.",
+        "150000 and on, 160000 and on",
+        long=True,
+    ),
     "diagnosis-same": Result(
         "The same greenhouse later",
         ("benchmarks.diagnosis", "same", "--greenhouses", "4", "--cases", "160"),

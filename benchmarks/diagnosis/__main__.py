@@ -6,9 +6,10 @@ each with a model calibrated on its own first weeks; `transferred` diagnoses the
 `same` does the like with greenhouses that have drifted a little since their calibration, and asks what has changed in
 them (`--foreign`: of another structure); `omission` takes terms out of the model before the calibration (with DATA: of
 the public logs) and asks the calibration log for them; `real` diagnoses the public logs, `real-faults` the same with
-faults put into them. `null-bounds` learns what a change must gain, and what it must take off unseen days, from seeds
-that no case has; `separating` asks what tests of the plant bring, and `thresholds` prints all rules. Everything is made
-afresh: an hour or so on two cores, most of it for simulated weeks.
+faults put into them. `catalogue` hides every cause in turn in one greenhouse. `null-bounds` learns what a change must
+gain, and what it must take off unseen days, from seeds that no case has; `separating` asks what tests of the plant
+bring, and `thresholds` prints all rules. Everything is made afresh: an hour or so on two cores, most of it for
+simulated weeks.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import sys
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from benchmarks.diagnosis import null_bounds, omission, real, real_faults, rules, same, separating
+from benchmarks.diagnosis import catalogue, null_bounds, omission, real, real_faults, rules, same, separating
 from benchmarks.diagnosis.cases import SEASONS, draw
 from benchmarks.diagnosis.greenhouses import of_seasons, others
 from benchmarks.diagnosis.logs import built_in, reference, simulated_cases
@@ -38,6 +39,7 @@ WHAT = (
     "real-faults",
     "null-bounds",
     "separating",
+    "catalogue",
 )
 OTHER_GREENHOUSES = 8
 SEASONS_USED = ("winter", "spring")
@@ -62,6 +64,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, help="of the first case; earlier tables had others")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--json", type=Path, help="write each case's outcome as a line of JSON")
+    parser.add_argument("--figure", type=Path, help="of `catalogue`: SVG to write")
     options = parser.parse_args()
     if options.what == "real":
         return real.main(options.data, options.compartment, withheld_only=options.withheld_only)
@@ -77,6 +80,8 @@ def main() -> int:
         return same.main(options)
     if options.what == "omission":
         return omission.main(options)
+    if options.what == "catalogue":
+        return catalogue.main(options)
     count = options.cases or 208
     away = options.what in {"others", "transferred"}
     if away and options.season:

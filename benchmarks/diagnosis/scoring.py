@@ -64,8 +64,9 @@ class Outcome:
     """Half of that interval over the truth."""
     onset_error: float | None
     """Days."""
+    deployed: float
+    """24 h error on unseen days by the model in force, quantities scaled and added."""
     recalibrated: float
-    """24 h error on unseen days, quantities scaled and added."""
     corrected: float
     perfect: float
     """With the true cause in the model, in the catalogue's form."""
@@ -135,6 +136,7 @@ def judge(
         covered,
         half_width,
         onset_error,
+        _sum(errors, "deployed"),
         _sum(errors, "recalibrated"),
         _sum(errors, "corrected"),
         _perfect(evidence, truth, site) if evidence is not None and truth else _sum(errors, "recalibrated"),
