@@ -92,6 +92,7 @@ def rows(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int]]:
         ("right cause first", *mean([is_first(one) for one in own])),
         ("the same, where recalibration errs a tenth more", *mean([is_first(one) for one in seen])),
         ("right, where a name is given", *mean([is_first(one) for one in named])),
+        ("another name beside a right one", *mean([len(one.found) > 1 for one in named if is_first(one)])),
         ("beginning within 2 days, where found", *mean([days <= 2.0 for days in begun])),
         ("size, median relative error", float(np.median(sizes)) if sizes else float("nan"), len(sizes)),
         ("recoverable error recovered", sum(one.recalibrated - one.corrected for one in own) / possible, len(own)),

@@ -49,6 +49,7 @@ def test_the_table_counts_names_sizes_beginnings_and_what_was_gained(tmp_path: P
     assert found["right cause first"] == (1 / 3, 3)
     assert found["the same, where recalibration errs a tenth more"] == (0.5, 2)
     assert found["right, where a name is given"] == (0.5, 2)
+    assert found["another name beside a right one"] == (0.0, 1)
     assert found["beginning within 2 days, where found"] == (1.0, 1)
     assert np.allclose(found["size, median relative error"], (0.2, 1))
     assert np.allclose(found["recoverable error recovered"], (0.8 / 2.05, 3))
