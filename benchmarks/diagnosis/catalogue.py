@@ -113,10 +113,10 @@ def draw(path: Path, by_season: Mapping[str, Sequence[Outcome]]) -> None:
             label = NAMES.get(stage, f"as {stage}" if stage == "deployed" else stage)
             panel.scatter(values, places, marker=mark, color=colour, s=70 if mark == "|" else 26, label=label)
         panel.set_yticks(places, [one.case.causes[0] + (" *" if is_first(one) else "") for one in ordered], fontsize=7)
-        panel.set_xscale("log")
-        panel.set_xlabel("error a day ahead on unseen days (see the table)")
+        panel.set_xlim(left=0.0)
         name_above(panel, f"{season}; * named first")
         panel.legend(loc="lower right", fontsize=8, frameon=False)
+    axes[-1].set_xlabel("error a day ahead on unseen days (see the table)")
     figure.savefig(path, facecolor="white")
 
 
