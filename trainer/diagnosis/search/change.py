@@ -97,31 +97,6 @@ def chosen(design: Design, found: list[Hypothesis]) -> Hypothesis | None:
     return sure or best(design, [one for one in found if begun_over_null(design, one) >= 1.0]) or first
 
 
-def at_its_beginning(design: Design, told: Round, rng: np.random.Generator) -> Round:
-    """Return a round with the cause that begins within the log, where that explains more than one there all the time.
-
-    A sensor that is off since some day looks like one that drifts. That something has changed is shown by then: against
-    a beginning stands no more than how many were tried, by their logarithm (an Occam factor: MacKay 1992, Neural
-    Computation 4, 415-447).
-
-    Args:
-        design: of the log, as the round was asked.
-        told: a round with a cause.
-        rng: for flips.
-    """
-    cause = told.cause
-    assert cause is not None
-    if cause.term.onset is not None:
-        return told
-    price = math.log(len(scan.onset_days(design)) - 1)
-    shown = replace(design, rules=replace(design.rules, onset_price=price))
-    null = linear.fit(design.grams, design.null_model())
-    begun = best(shown, [one for one in scored(shown, null, rng) if one.term.onset is not None])
-    if begun is None or net_gain(design, begun) <= net_gain(design, cause):
-        return told
-    return round_of(design, null, begun)
-
-
 def left_by_hour(design: Design, null: Fit, cause: Hypothesis, rng: np.random.Generator) -> float:
     """Return what a pattern by the hour still gains beside a cause.
 

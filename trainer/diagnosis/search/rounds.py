@@ -16,7 +16,7 @@ from igrow.trainer.diagnosis.knowledge import ActiveTerm, Knowledge
 from igrow.trainer.diagnosis.learned.null_gains import NullGains, read_null_gains, read_unknown_gains
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.diagnosis.search import cross_validation, history, parameter_change, unexplained
-from igrow.trainer.diagnosis.search.change import Round, at_its_beginning, changed
+from igrow.trainer.diagnosis.search.change import Round, changed
 from igrow.trainer.diagnosis.search.estimate import Estimated, estimate, with_refitted, within_bounds
 from igrow.trainer.diagnosis.search.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.search.refit import refit
@@ -116,7 +116,6 @@ class Search:
             judged = cross_validation.find(design, by_physics, rng) or judged
         if judged.cause is None:
             return judged
-        judged = at_its_beginning(design, judged, rng)
         return cross_validation.with_what_outdoes_it(design, by_physics, judged, rng)
 
     def design(self, causes: Sequence[Estimated]) -> Design:
