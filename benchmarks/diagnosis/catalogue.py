@@ -1,7 +1,7 @@
 """Every cause of the catalogue in turn, in one greenhouse a season: what is told of it, and the error before and after.
 
 The usual greenhouse is calibrated on eight weeks of its own. A week later one cause begins, twice as large as a clearly
-visible case of it, and two weeks later the log is diagnosed. First comes the same log with nothing in it. Seeds are
+visible case of it, and two weeks later the log is diagnosed. First comes a log with nothing in it. Seeds are
 those of no other benchmark.
 """
 
@@ -17,8 +17,9 @@ import numpy as np
 
 from benchmarks.diagnosis.cases import Case
 from benchmarks.diagnosis.logs import Reference
-from benchmarks.diagnosis.nurseries import calibrated, calibration_logs, later, later_logs, nursery
-from benchmarks.diagnosis.scoring import NOISE, Outcome, is_first, judge
+from benchmarks.diagnosis.nurseries import calibrated, calibration_logs, later_logs, nursery
+from benchmarks.diagnosis.same import MATTERS, judged
+from benchmarks.diagnosis.scoring import NOISE, Outcome, is_first
 from benchmarks.jobs import Jobs
 from igrow.core.effects import EFFECTS
 from igrow.core.telemetry import Telemetry
@@ -28,8 +29,11 @@ SEASONS_USED = ("winter", "spring")
 DAYS, BEGINS = 21, 7
 TIMES = 2.0
 """A typical amplitude."""
-STAGES = ("deployed", "recalibrated", "corrected", "perfect")
-NAMES = {"perfect": "the truth known", "corrected": "with the cause found"}
+STAGES = {
+    "deployed": "as deployed", "recalibrated": "recalibrated", "corrected": "with the cause found",
+    "perfect": "the truth known",
+}  # fmt: skip
+"""Of a model, by what an outcome calls their errors."""
 
 
 def cases(season: str, greenhouse: str) -> list[Case]:
@@ -57,12 +61,6 @@ def prepared(season: str) -> list[tuple[Case, Telemetry, Reference]]:
     return [(case, seen, one) for case, seen in zip(own, logs, strict=True)]
 
 
-def judged(job: tuple[Case, Telemetry, Reference]) -> Outcome:
-    """Diagnose a case as one job."""
-    case, log, known = job
-    return judge(case, log, known, later(known.greenhouse, case))
-
-
 def line(one: Outcome) -> str:
     """Return what was told of a case as a line."""
     (cause,) = one.case.causes or ("nothing",)
@@ -84,7 +82,7 @@ def rows(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int]]:
 
     own = [one for one in outcomes if one.case.causes]
     named = [one for one in own if one.confounded]
-    seen = [one for one in own if one.recalibrated >= 1.1 * one.perfect]
+    seen = [one for one in own if one.recalibrated >= MATTERS * one.perfect]
     sizes = [abs(one.relative_size - 1.0) for one in own if one.relative_size is not None]
     begun = [one.onset_error for one in own if one.onset_error is not None]
     possible = sum(max(one.recalibrated - one.perfect, 0.0) for one in own)
@@ -110,8 +108,8 @@ def draw(path: Path, by_season: Mapping[str, Sequence[Outcome]]) -> None:
         places = np.arange(len(ordered))
         for stage, (mark, colour) in marks.items():
             values = [getattr(one, stage) for one in ordered]
-            label = NAMES.get(stage, f"as {stage}" if stage == "deployed" else stage)
-            panel.scatter(values, places, marker=mark, color=colour, s=70 if mark == "|" else 26, label=label)
+            size = 70 if mark == "|" else 26
+            panel.scatter(values, places, marker=mark, color=colour, s=size, label=STAGES[stage])
         panel.set_yticks(places, [one.case.causes[0] + (" *" if is_first(one) else "") for one in ordered], fontsize=7)
         panel.set_xlim(left=0.0)
         name_above(panel, f"{season}; * named first")

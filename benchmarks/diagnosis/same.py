@@ -164,7 +164,8 @@ def prepared(job: tuple[str, str, int, int, int, bool]) -> list[tuple[Case, Tele
     ]
 
 
-def _judge(job: tuple[Case, Telemetry, Reference]) -> Outcome:
+def judged(job: tuple[Case, Telemetry, Reference]) -> Outcome:
+    """Diagnose the log of a greenhouse some time after its calibration, as one job."""
     case, log, known = job
     return judge(case, log, known, later(known.greenhouse, case))
 
@@ -178,7 +179,7 @@ def main(options: Namespace) -> int:
     with Jobs("diagnosis foreign" if options.foreign else "diagnosis same", options.processes) as jobs:
         wanted = [(kind, season, greenhouses, count, options.days, options.foreign) for season in seasons]
         cases = [case for own in jobs.each(prepared, wanted) for case in own]
-        for number, one in enumerate(jobs.each(_judge, cases), 1):
+        for number, one in enumerate(jobs.each(judged, cases), 1):
             outcomes.append(one)
             case = one.case
             said = f"{case.name} in {case.greenhouse} {case.causes} {case.size:g} -> {one.verdict} {one.found}"
