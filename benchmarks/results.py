@@ -220,6 +220,20 @@ RESULTS = {
         "800000 and on",
         long=True,
     ),
+    "diagnosis-false-claims": Result(
+        "Greenhouses in which nothing is missing",
+        ("benchmarks.diagnosis", "false-claims"),
+        "Calibrated on eight weeks of their own, diagnosed weeks later: whatever is told is false.",
+        "180000 and on",
+        long=True,
+    ),
+    "diagnosis-false-claims-foreign": Result(
+        "The same of another structure",
+        ("benchmarks.diagnosis", "false-claims", "--foreign"),
+        "Greenhouses of a simulator that shares no balance with the project's own plant.",
+        "190000 and on",
+        long=True,
+    ),
     "diagnosis-same-season": Result(
         "The same greenhouse later, over twelve weeks",
         ("benchmarks.diagnosis", "same", "--days", "84", "--greenhouses", "2", "--cases", "60"),

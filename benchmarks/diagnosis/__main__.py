@@ -4,12 +4,12 @@
 each, and prints the table beside its bounds. `others` does the same with greenhouses that nothing was learned from,
 each with a model calibrated on its own first weeks; `transferred` diagnoses the same logs with the built-in bundle.
 `same` does the like with greenhouses that have drifted a little since their calibration, and asks what has changed in
-them (`--foreign`: of another structure); `omission` takes terms out of the model before the calibration (with DATA: of
-the public logs) and asks the calibration log for them; `real` diagnoses the public logs, `real-faults` the same with
-faults put into them. `catalogue` hides every cause in turn in one greenhouse. `null-bounds` learns what a change must
-gain, and what it must take off unseen days, from seeds that no case has; `separating` asks what tests of the plant
-bring, and `thresholds` prints all rules. Everything is made afresh: an hour or so on two cores, most of it for
-simulated weeks.
+them (`--foreign`: of another structure), and `false-claims` what is told of many in which nothing is missing;
+`omission` takes terms out of the model before the calibration (with DATA: of the public logs) and asks the
+calibration log for them; `real` diagnoses the public logs, `real-faults` the same with faults put into them.
+`catalogue` hides every cause in turn in one greenhouse. `null-bounds` learns what a change must gain, and what it
+must take off unseen days, from seeds that no case has; `separating` asks what tests of the plant bring, and
+`thresholds` prints all rules. Everything is made afresh: an hour or so on two cores, most of it for simulated weeks.
 """
 
 from __future__ import annotations
@@ -20,7 +20,17 @@ import sys
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from benchmarks.diagnosis import catalogue, null_bounds, omission, real, real_faults, rules, same, separating
+from benchmarks.diagnosis import (
+    catalogue,
+    false_claims,
+    null_bounds,
+    omission,
+    real,
+    real_faults,
+    rules,
+    same,
+    separating,
+)
 from benchmarks.diagnosis.cases import SEASONS, draw
 from benchmarks.diagnosis.greenhouses import of_seasons, others
 from benchmarks.diagnosis.logs import built_in, reference, simulated_cases
@@ -40,6 +50,7 @@ WHAT = (
     "null-bounds",
     "separating",
     "catalogue",
+    "false-claims",
 )
 OTHER_GREENHOUSES = 8
 SEASONS_USED = ("winter", "spring")
@@ -51,10 +62,10 @@ def main() -> int:
     parser.add_argument("data", nargs="?", type=Path, help="folder of the public data sets, for `real`, `real-faults`")
     parser.add_argument("--cases", type=int, help="default: 208; of `same` 60, of `separating` 1 of each cause")
     parser.add_argument(
-        "--greenhouses", type=int, help="of `same`, `separating`: in the nursery of a season (default: 6; 2)"
+        "--greenhouses", type=int, help="of `same`, `false-claims`, `separating`: in a nursery (default: 6, 8, 2)"
     )
     parser.add_argument("--tuning", action="store_true", help="of `same`: greenhouses and seeds that rules are set on")
-    parser.add_argument("--foreign", action="store_true", help="of `same`: greenhouses of another structure")
+    parser.add_argument("--foreign", action="store_true", help="of `same`, `false-claims`: of another structure")
     parser.add_argument("--compartment", default="", help="of `real`: those whose name has this in it (default: all)")
     parser.add_argument("--withheld-only", action="store_true", help="of `real`: leave out built-in bundle and placebo")
     parser.add_argument("--days", type=int, default=28)
@@ -82,6 +93,8 @@ def main() -> int:
         return omission.main(options)
     if options.what == "catalogue":
         return catalogue.main(options)
+    if options.what == "false-claims":
+        return false_claims.main(options)
     count = options.cases or 208
     away = options.what in {"others", "transferred"}
     if away and options.season:

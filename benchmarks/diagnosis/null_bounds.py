@@ -8,7 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from benchmarks.diagnosis import null_gains, null_skills
-from benchmarks.diagnosis.null_logs import SEEDS, UNKNOWN_SEEDS, by_the_built_in_bundle, unchanged, unknown
+from benchmarks.diagnosis.null_logs import SEEDS, UNKNOWN_SEEDS, by_the_built_in_bundle, nurseries, unchanged, unknown
 from benchmarks.jobs import Jobs
 from benchmarks.provenance import provenance
 from igrow.trainer.diagnosis.learned.null_gains import FILE, UNKNOWN_FILE, NullGains
@@ -19,7 +19,7 @@ COMMAND = "python -m benchmarks.diagnosis null-bounds"
 def main(processes: int) -> int:
     """Write the bounds into the package: skills first, since diagnoses go by them when the least gain is learned."""
     with Jobs("diagnosis null-bounds", processes) as jobs:
-        logs, made = unchanged(jobs), provenance(COMMAND, dict(SEEDS))
+        logs, made = unchanged(jobs, nurseries()), provenance(COMMAND, dict(SEEDS))
         for file, bounds in null_skills.learn(jobs, logs, made).items():
             _write(file, bounds)
         _write(FILE, null_gains.learn(jobs, logs, made))

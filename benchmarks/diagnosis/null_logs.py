@@ -16,7 +16,8 @@ from dataclasses import replace
 from benchmarks.diagnosis.cases import Case
 from benchmarks.diagnosis.greenhouses import VirtualGreenhouse, others
 from benchmarks.diagnosis.logs import Reference, built_in, simulate_cases
-from benchmarks.diagnosis.nurseries import calibrated, calibration_logs, later_logs, nursery
+from benchmarks.diagnosis.makers import Maker
+from benchmarks.diagnosis.nurseries import Nursery, calibrated, calibration_logs, later_logs, nursery
 from benchmarks.jobs import Jobs
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import prepare_log
@@ -31,15 +32,20 @@ Later = tuple[Reference, Case, Telemetry]
 """A log in which nothing is missing, of a greenhouse, and the model that it is asked by."""
 
 
-def null_cases(season: str, known: Sequence[Reference]) -> list[list[Case]]:
+def nurseries() -> list[Nursery]:
+    """Draw the nurseries that bounds are learned of."""
+    return [nursery(season, GREENHOUSES, first) for season, first in SEEDS.items()]
+
+
+def null_cases(known: Nursery) -> list[list[Case]]:
     """Return three cases of every greenhouse in which nothing is missing."""
-    found = []
-    for place, one in enumerate(known):
+    season, found = known.season, []
+    for place, one in enumerate(known.greenhouses):
         groups = ("nothing", "nothing", "clean" if place % 2 else "noise")
         found.append([
             Case(
-                name=f"{season}-{place}-{number}", group=group, greenhouse=one.greenhouse.site.name,
-                seed=SEEDS[season] + 500 + 3 * place + number, heavy_tails=bool(number), wrong_noise=group == "noise",
+                name=f"{season}-{place}-{number}", group=group, greenhouse=one.site.name,
+                seed=known.seed + 500 + 3 * place + number, heavy_tails=bool(number), wrong_noise=group == "noise",
             )
             for number, group in enumerate(groups)
         ])  # fmt: skip
@@ -83,29 +89,26 @@ def _unknown(job: tuple[VirtualGreenhouse, Case]) -> Later:
     return described, case, log
 
 
-def unchanged(jobs: Jobs) -> list[Later]:
-    """Simulate the nurseries and calibrate their greenhouses; return the later logs in which nothing is missing."""
-    known = {season: nursery(season, GREENHOUSES, first) for season, first in SEEDS.items()}
-    weeks = jobs.each(calibration_logs, known.values())
-    own = [
-        pair
-        for one, logs in zip(known.values(), weeks, strict=True)
-        for pair in zip(one.greenhouses, logs, strict=True)
-    ]
+def unchanged(jobs: Jobs, known: Sequence[Nursery]) -> list[Later]:
+    """Simulate nurseries and calibrate their greenhouses; return the later logs in which nothing is missing."""
+    weeks = jobs.each(calibration_logs, known)
+    own = [pair for one, logs in zip(known, weeks, strict=True) for pair in zip(one.greenhouses, logs, strict=True)]
     references: list[Reference] = []
-    for one in jobs.each(calibrated, own):
-        references.append(one)
+    for reference in jobs.each(calibrated, own):
+        references.append(reference)
         print(f"{len(references)} of {len(own)} calibrated", file=sys.stderr, flush=True)
-    by_season = [references[place : place + GREENHOUSES] for place in range(0, len(references), GREENHOUSES)]
-    cases = [null_cases(season, greenhouses) for season, greenhouses in zip(SEEDS, by_season, strict=True)]
-    later = jobs.each(_later, list(zip(by_season, cases, strict=True)))
+    every = iter(references)
+    by_place = [list(itertools.islice(every, len(one.greenhouses))) for one in known]
+    cases = [null_cases(one) for one in known]
+    asked = [(found, mine, one.maker) for found, mine, one in zip(by_place, cases, known, strict=True)]
     return [
         (one, case, log)
-        for greenhouses, asked, logs in zip(by_season, cases, later, strict=True)
-        for one, mine, seen in zip(greenhouses, asked, logs, strict=True)
+        for (greenhouses, own_cases, _), later in zip(asked, jobs.each(_later, asked), strict=True)
+        for one, mine, seen in zip(greenhouses, own_cases, later, strict=True)
         for case, log in zip(mine, seen, strict=True)
     ]
 
 
-def _later(job: tuple[Sequence[Reference], Sequence[Sequence[Case]]]) -> list[list[Telemetry]]:
-    return later_logs(*job, DAYS)
+def _later(job: tuple[Sequence[Reference], Sequence[Sequence[Case]], Maker]) -> list[list[Telemetry]]:
+    known, cases, maker = job
+    return later_logs(known, cases, DAYS, maker)

@@ -32,6 +32,8 @@ class Nursery:
 
     season: str
     greenhouses: tuple[VirtualGreenhouse, ...]
+    seed: int
+    """Of the place; none of another nursery lies within a thousand."""
     maker: Maker = OWN
 
     @property
@@ -59,7 +61,7 @@ def nursery(season: str, count: int, first: int, maker: Maker = OWN) -> Nursery:
         if number % 2:
             plant = replace(plant, lamp_capacity=0.0)
         found.append(VirtualGreenhouse(site_of(f"{season}-{first}-{number}", plant), plant, start, seed))
-    return Nursery(season, tuple(found), maker)
+    return Nursery(season, tuple(found), first, maker)
 
 
 def calibration_logs(known: Nursery) -> list[tuple[Telemetry, State]]:

@@ -1,0 +1,44 @@
+"""False claims are counted by kind of log and by season, with an interval that says what so many logs can show."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from benchmarks.diagnosis.cases import SEASONS, Case
+from benchmarks.diagnosis.false_claims import FOREIGN_SEEDS, SEEDS, line, places, rows
+from benchmarks.diagnosis.null_logs import null_cases
+from benchmarks.diagnosis.scoring import Outcome
+
+QUIET = Outcome(
+    Case("winter-0-0", "nothing", "one", 1), "nothing", (), (), (),
+    relative_size=None, relative_flux=None, covered=None, half_width=None, onset_error=None, deployed=2.0,
+    recalibrated=2.0, corrected=2.0, perfect=2.0, expected_gain=None, known_gain=None, seconds=1.0,
+)  # fmt: skip
+
+
+def test_every_verdict_but_nothing_is_a_false_claim() -> None:
+    noisy = replace(QUIET, case=replace(QUIET.case, name="spring-0-1", group="noise"))
+    told = [replace(noisy, verdict=verdict) for verdict in ("named", "ambiguous", "unexplained")]
+    found = {what: (claims, count) for what, claims, count in rows([QUIET, noisy, *told])}
+    assert found["all"] == (3, 5)
+    assert found["nothing else"] == (0, 1)
+    assert found["disturbances twice as large"] == found["spring"] == (3, 4)
+    assert found["winter"] == (0, 1)
+    assert found["autumn"] == (0, 0)
+
+
+def test_the_interval_is_as_wide_as_the_logs_are_few() -> None:
+    # Of no event in n trials the exact upper end is 1 - 0.05^(1/n).
+    assert line("all", 0, 144).split()[-1] == f"{1.0 - 0.05 ** (1 / 144):.3f}"
+    assert line("all", 0, 0).split() == ["all", "0", "0"]
+
+
+def test_no_seed_of_a_place_or_a_log_comes_twice() -> None:
+    drawn = [one for foreign in (False, True) for one in places(foreign=foreign, greenhouses=2)]
+    assert [one.season for one in drawn] == 2 * [season for season in SEASONS for _ in range(2)]
+    assert [one.seed for one in drawn] == [
+        first + 1000 * number for first in (SEEDS, FOREIGN_SEEDS) for number in range(6)
+    ]
+    seeds = [case.seed for one in drawn for own in null_cases(one) for case in own]
+    seeds += [greenhouse.seed for one in drawn for greenhouse in one.greenhouses]
+    assert len(set(seeds)) == len(seeds)
