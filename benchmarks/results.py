@@ -285,6 +285,13 @@ RESULTS = {
         "none",
         long=True,
     ),
+    "diagnosis-real-withheld": Result(
+        "Columns withheld from real logs, four weeks later",
+        ("benchmarks.diagnosis", "real", "../shared/data", "--withheld-only", "--beginning", "42"),
+        "In weeks that no rule was chosen by: calibrated on eight, asked of the two to four that follow.",
+        "none",
+        long=True,
+    ),
     "diagnosis-real-faults": Result(
         "Faults in real logs",
         ("benchmarks.diagnosis", "real-faults", "../shared/data"),

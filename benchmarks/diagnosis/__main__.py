@@ -68,6 +68,7 @@ def main() -> int:
     parser.add_argument("--foreign", action="store_true", help="of `same`, `false-claims`: of another structure")
     parser.add_argument("--compartment", default="", help="of `real`: those whose name has this in it (default: all)")
     parser.add_argument("--withheld-only", action="store_true", help="of `real`: leave out built-in bundle and placebo")
+    parser.add_argument("--beginning", type=int, help="of `real`: days of each log that are left out (default: 14)")
     parser.add_argument("--days", type=int, default=28)
     parser.add_argument(
         "--season", action="append", choices=tuple(SEASONS), help="default: winter and spring; of `same` all"
@@ -78,7 +79,7 @@ def main() -> int:
     parser.add_argument("--figure", type=Path, help="of `catalogue`: SVG to write")
     options = parser.parse_args()
     if options.what == "real":
-        return real.main(options.data, options.compartment, withheld_only=options.withheld_only)
+        return real.main(options.data, options.compartment, options.beginning, withheld_only=options.withheld_only)
     if options.what == "real-faults":
         return real_faults.main(options.data, options.compartment, options.processes)
     if options.what == "null-bounds":

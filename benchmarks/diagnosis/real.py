@@ -98,14 +98,21 @@ def placebo(log: Log, other: Log) -> Log:
     return log.with_columns({name: given[name][rows] for name in PLACEBO if name in log.telemetry and name in given})
 
 
-def main(data: Path | None, only: str = "", *, withheld_only: bool = False) -> int:
-    """Print it all; `only` compartments of this name, `withheld_only` without built-in bundle and placebo."""
+def main(data: Path | None, only: str = "", beginning: int | None = None, *, withheld_only: bool = False) -> int:
+    """Print it all.
+
+    Args:
+        data: folder of the public data sets.
+        only: of compartments whose name has this in it.
+        beginning: days of each log that are left out (None: `BEGINNING`).
+        withheld_only: leave out built-in bundle and placebo.
+    """
     if data is None or not data.is_dir():
         print("error: name the folder of the public data sets: python -m benchmarks.diagnosis real DATA")
         return 2
     found: dict[str, set[str]] = {}
     withheld: list[tuple[bool, bool]] = []
-    for one in compartments(data):
+    for one in compartments(data, BEGINNING if beginning is None else beginning):
         if only not in one.name:
             continue
         print(f"calibrating {one.name} on {CALIBRATION_DAYS} days", file=sys.stderr)
