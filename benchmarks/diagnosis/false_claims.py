@@ -60,7 +60,7 @@ def main(options: Namespace) -> int:
     """Print the table, and what was told."""
     known = places(foreign=options.foreign, greenhouses=options.greenhouses or GREENHOUSES)
     outcomes: list[Outcome] = []
-    with Jobs("diagnosis false-claims", options.processes) as jobs:
+    with Jobs(f"diagnosis false-claims{' foreign' * options.foreign}", options.processes) as jobs:
         wanted = [(case, log, one) for one, case, log in unchanged(jobs, known)]
         for number, one in enumerate(jobs.each(judged, wanted), 1):
             outcomes.append(one)

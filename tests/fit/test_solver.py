@@ -121,9 +121,11 @@ def test_one_step_solves_what_is_linear_within_bounds_and_counts_outliers_as_the
     assert stays[0] == pytest.approx(0.46, abs=1e-2)
 
 
-def test_what_runs_out_of_all_bounds_a_little_further_on_stays_in_a_step() -> None:
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("runaway", [np.nan, np.inf, -1e274, 1e8])
+def test_what_runs_out_of_all_bounds_a_little_further_on_stays_in_a_step(runaway: float) -> None:
     prior = Gaussian.independent({"a": 0.0, "b": 0.0}, {"a": 1.0, "b": 1.0})
-    slopes = np.stack([np.full(20, np.nan), np.ones(20)], axis=1)
+    slopes = np.stack([np.full(20, runaway), np.ones(20)], axis=1)
     point = step(np.full(20, -3.0), slopes, prior, -FAR[:2], FAR[:2], np.zeros(2))
     np.testing.assert_allclose(point, [0.0, 3.0 * 20 / 21])
 
@@ -168,13 +170,15 @@ def test_a_model_without_a_finite_error_at_the_start_is_refused(broken) -> None:
         solve(broken, lambda _: np.eye(1), prior, -FAR[:1], FAR[:1])
 
 
-def test_a_parameter_whose_difference_diverges_stays_and_the_others_are_fitted() -> None:
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("runaway", [np.nan, np.inf, 1e274])
+def test_a_parameter_whose_difference_diverges_stays_and_the_others_are_fitted(runaway: float) -> None:
     prior = Gaussian.independent({"a": 0.0, "b": 0.0}, {"a": 1.0, "b": 1.0})
     measured = np.linspace(0.0, 3.0, 20)
 
     def batch(points: np.ndarray) -> np.ndarray:
         a, b = points[:, :1], points[:, 1:]
-        return np.where(b > 0.0, np.nan, 10.0 * (a * measured - 2.0 * measured))
+        return np.where(b > 0.0, runaway, 10.0 * (a * measured - 2.0 * measured))
 
     residuals, jacobian = by_differences(batch, prior, FAR[:2])
     found = solve(residuals, jacobian, prior, -FAR[:2], FAR[:2])

@@ -40,6 +40,9 @@ _AT_BOUND = 1e-3
 """Distance from a bound, in standard deviations of the prior, within which a solution lies on it."""
 _INSIDE = 0.1
 """Distance from a bound, in standard deviations of the prior, at which a search begins that may not begin on it."""
+RUNAWAY = 1e6
+"""Change of an error, in its scale, for a standard deviation of a parameter, from which on the model runs out of all
+bounds a little further on, whether or not the last number of the run is a finite one."""
 _ARRIVED = 1e-3
 """Relative fall of the cost that a full step without bounds promises at most where a search has arrived."""
 
@@ -111,7 +114,7 @@ def solve(
     def slopes(moved: Floats) -> Floats:
         nonlocal latest, steps
         point = begin + scale * moved
-        latest = point, residuals(point), _finite_slopes(jacobian(point), weight)
+        latest = point, residuals(point), _finite_slopes(jacobian(point), weight, scale)
         if progress is not None:
             progress(steps, latest[1])
         steps += 1
@@ -172,7 +175,9 @@ def step(
         robust: size of an error from which on it counts linearly.
     """
     weight = np.broadcast_to(np.asarray(weights, dtype=np.float64), len(residuals))
-    slope, errors, scale = _weighted(residuals, _finite_slopes(jacobian, weight), prior, weight, robust)
+    slope, errors, scale = _weighted(
+        residuals, _finite_slopes(jacobian, weight, prior.standard_deviation), prior, weight, robust
+    )
     white = prior.whitening
     slopes, apart = np.concatenate([slope, white * scale]), np.append(errors, white @ (start - prior.mean))
     # A triangle in place of many rows: the same sum of squares.
@@ -233,9 +238,17 @@ def _has_arrived(found: OptimizeResult) -> bool:
     return fall <= _ARRIVED * float(found.cost)
 
 
-def _finite_slopes(jacobian: Floats, weight: Floats) -> Floats:
-    """Return slopes (n, p), 0 of what runs out of all bounds a little further on: it stays where it is in a step."""
-    return np.where(np.isfinite(jacobian[weight > 0.0]).all(axis=0), jacobian, 0.0)
+def _finite_slopes(jacobian: Floats, weight: Floats, scale: Floats) -> Floats:
+    """Return slopes (n, p), 0 of what runs out of all bounds a little further on: it stays where it is in a step.
+
+    Args:
+        jacobian: slopes, (n, p).
+        weight: of the errors, (n,); a slope of one that does not count may be anything.
+        scale: standard deviations of the prior, (p,).
+    """
+    # No comparison holds of what is no number.
+    within = np.abs(jacobian[weight > 0.0]) < RUNAWAY / scale
+    return np.where(within.all(axis=0), jacobian, 0.0)
 
 
 def _weighted(

@@ -32,6 +32,7 @@ from igrow.trainer.diagnosis.design.sensitivity import (
     sensor_sensitivities,
     unit_fluxes,
 )
+from igrow.trainer.fit.solver import RUNAWAY
 
 _TABLE = yaml.safe_load(files("igrow.trainer.diagnosis").joinpath("design/candidates.yaml").read_text(encoding="utf-8"))
 SHAPES: Mapping[str, Mapping[str, Sequence[float]]] = _TABLE["shapes"]
@@ -132,7 +133,10 @@ def effect_columns(line: Linearisation) -> EffectColumns:
     ageing = np.zeros_like(columns)
     old = [index for index, candidate in enumerate(found) if candidate.ages]
     ageing[old] = _columns(_with_elapsed_one(line), [found[index] for index in old])
-    seen = [index for index, column in enumerate(columns) if np.isfinite(column).all() and _is_visible(line, column)]
+    sizes = [abs(one.definition.amplitude.typical) for one in found]
+    # No comparison holds of what is no number.
+    bounded = [(np.abs(column) < RUNAWAY / size).all() for column, size in zip(columns, sizes, strict=True)]
+    seen = [index for index, column in enumerate(columns) if bounded[index] and _is_visible(line, column)]
     names = {found[index].effect for index in seen}
     return EffectColumns(
         tuple(found[index] for index in seen),

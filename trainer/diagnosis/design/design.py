@@ -32,6 +32,7 @@ from igrow.trainer.diagnosis.design.sensitivity import Linearisation
 from igrow.trainer.diagnosis.learned.null_gains import NullGains
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.fit.gaussian import Gaussian
+from igrow.trainer.fit.solver import RUNAWAY
 
 JOINT = ("parameter", "effect", "pattern")
 """Blocks of all that may be missing: of each something may have been there before the log."""
@@ -164,6 +165,9 @@ def lay_out(
     """Return the design of a log about the prior's mean, before any noise.
 
     Patterns of single weekdays are left out: eight weeks know too little of them.
+
+    Raises:
+        DivergenceError: the model runs out of all bounds on the log, or with any parameter a little further on.
     """
     runs = sensitivity.day_runs(record, split.day)
     line = sensitivity.linearise(record, runs, prior.values, effects)
@@ -174,6 +178,9 @@ def lay_out(
     patterns = tuple(every[place] for place in lasting)
     labels = tuple(one.key for one in found.candidates)
     slopes = sensitivity.parameter_sensitivities(line, prior.names, prior.standard_deviation)
+    # No comparison holds of what is no number.
+    if not (np.abs(slopes) < (RUNAWAY / prior.standard_deviation)[:, None, None, None]).all():
+        raise sensitivity.divergence(effects)
     parts = {
         "residual": (("residual",), line.errors[None]),
         "parameter": (prior.names, slopes),

@@ -124,11 +124,16 @@ def linearise(
     line = Linearisation(record, runs, parameters, effects, _stacked(shown), states, drivers, added or {})
     errors = line.errors
     if not (np.isfinite(errors).all() and (np.abs(errors[_AIR_TEMPERATURE]) <= DIVERGED).all()):
-        active = f" with {', '.join(effects)}" if effects else ""
-        raise DivergenceError(
-            f"the model{active} runs out of all bounds on this log: calibrate it on this greenhouse first"
-        )
+        raise divergence(effects)
     return line
+
+
+def divergence(effects: ActiveEffects) -> DivergenceError:
+    """Return what is said of a model that runs out of all bounds with these effects."""
+    active = f" with {', '.join(effects)}" if effects else ""
+    return DivergenceError(
+        f"the model{active} runs out of all bounds on this log: calibrate it on this greenhouse first"
+    )
 
 
 def parameter_sensitivities(
