@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -194,6 +195,23 @@ def test_a_model_that_runs_out_of_all_bounds_says_so_though_its_air_has_a_temper
     absurd = {"lamp_heat": {"share": share}}
     with pytest.raises(DivergenceError, match="lamp_heat runs out of all bounds"):
         sensitivity.linearise(line.record, line.runs, line.parameters, absurd)
+
+
+@pytest.mark.parametrize("runaway", [np.nan, np.inf, 1e274])
+def test_an_effect_that_runs_out_of_all_bounds_a_little_further_on_is_none_that_the_log_tells(
+    line: Linearisation, monkeypatch: pytest.MonkeyPatch, runaway: float
+) -> None:
+    def diverged(*asked: Any) -> Any:
+        columns = sensitivity.sensor_sensitivities(*asked)
+        columns[0, 0, 0, -1] = runaway
+        return columns
+
+    monkeypatch.setattr(candidates, "sensor_sensitivities", diverged)
+    first = next(one.name for one in EFFECTS.values() if one.kind == "sensor")
+    found = candidates.effect_columns(line)
+    assert first in found.untestable
+    assert first not in {one.effect for one in found.candidates}
+    assert np.isfinite(found.columns).all()
 
 
 def test_a_pipe_sensor_can_be_off_in_a_greenhouse_without_a_grow_pipe(record: Record) -> None:

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from igrow.trainer.data import Log
 from igrow.trainer.data.splits import split_days
+from igrow.trainer.diagnosis.design import sensitivity
 from igrow.trainer.diagnosis.design.balances import balances_of
 from igrow.trainer.diagnosis.design.candidates import Candidate
 from igrow.trainer.diagnosis.design.design import Design, lay_out
 from igrow.trainer.diagnosis.knowledge import knowledge_of
 from igrow.trainer.diagnosis.rules import DEFAULT
+from igrow.trainer.fit.solver import DivergenceError
 from tests.diagnosis.conftest import model_in_force
 from tests.diagnosis.synthetic_design import NEVER, make_design
 from tests.virtual_log import SITE
@@ -53,6 +56,20 @@ def test_every_column_of_a_log_has_a_label_and_a_place(quiet: Design) -> None:
     assert len(quiet.columns("effect:wind_infiltration")) == 4
     assert [one.key for one in quiet.patterns] == list(quiet.block("pattern").labels)
     assert not any(one.is_weekly for one in quiet.patterns)
+
+
+@pytest.mark.parametrize("runaway", [np.nan, 1e274])
+def test_a_log_is_not_laid_out_about_a_model_that_runs_out_of_all_bounds_a_little_further_on(
+    quiet: Design, monkeypatch: pytest.MonkeyPatch, runaway: float
+) -> None:
+    def diverged(*asked: Any) -> Any:
+        slopes = quiet.values[quiet.block("parameter").columns].copy()
+        slopes[0, 0, 0, -1] = runaway
+        return slopes
+
+    monkeypatch.setattr(sensitivity, "parameter_sensitivities", diverged)
+    with pytest.raises(DivergenceError, match="out of all bounds"):
+        lay_out(quiet.line.record, quiet.split, quiet.prior, {}, SITE.longitude, DEFAULT)
 
 
 def test_a_time_step_counts_only_if_every_balance_was_seen_in_it(quiet: Design) -> None:
