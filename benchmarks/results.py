@@ -288,7 +288,7 @@ RESULTS = {
     "diagnosis-real-withheld": Result(
         "Columns withheld from real logs, four weeks later",
         ("benchmarks.diagnosis", "real", "../shared/data", "--withheld-only", "--beginning", "42"),
-        "In weeks that no rule was chosen by: calibrated on eight, asked of the two to four that follow.",
+        "Calibrated on eight weeks, asked of the next two to four; how they are told was chosen by earlier weeks.",
         "none",
         long=True,
     ),

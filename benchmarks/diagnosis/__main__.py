@@ -71,7 +71,10 @@ def main() -> int:
     parser.add_argument("--beginning", type=int, help="of `real`: days of each log that are left out (default: 14)")
     parser.add_argument("--days", type=int, default=28)
     parser.add_argument(
-        "--season", action="append", choices=tuple(SEASONS), help="default: winter and spring; of `same` all"
+        "--season",
+        action="append",
+        choices=tuple(SEASONS),
+        help="default: winter and spring; all of `same`, `false-claims`",
     )
     parser.add_argument("--seed", type=int, help="of the first case; earlier tables had others")
     parser.add_argument("--processes", type=int, default=2)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from scipy.stats import binomtest
 
@@ -28,11 +28,11 @@ CONFIDENCE = 0.9
 GROUPS = {"nothing": "nothing else", "noise": "disturbances twice as large", "clean": "a cleaned cover"}
 
 
-def places(*, foreign: bool, greenhouses: int) -> list[Nursery]:
-    """Draw the nurseries."""
+def places(*, foreign: bool, greenhouses: int, seasons: Collection[str] = tuple(SEASONS)) -> list[Nursery]:
+    """Draw the nurseries of some seasons; each is the same whichever others are asked for."""
     seeds, maker = (FOREIGN_SEEDS, FOREIGN) if foreign else (SEEDS, OWN)
-    seasons = [season for season in SEASONS for _ in range(PLACES)]
-    return [nursery(season, greenhouses, seeds + 1000 * number, maker) for number, season in enumerate(seasons)]
+    every = enumerate(season for season in SEASONS for _ in range(PLACES))
+    return [nursery(season, greenhouses, seeds + 1000 * number, maker) for number, season in every if season in seasons]
 
 
 def rows(outcomes: Sequence[Outcome]) -> list[tuple[str, int, int]]:
@@ -58,7 +58,8 @@ def line(what: str, told: int, count: int) -> str:
 
 def main(options: Namespace) -> int:
     """Print the table, and what was told."""
-    known = places(foreign=options.foreign, greenhouses=options.greenhouses or GREENHOUSES)
+    seasons = options.season or tuple(SEASONS)
+    known = places(foreign=options.foreign, greenhouses=options.greenhouses or GREENHOUSES, seasons=seasons)
     outcomes: list[Outcome] = []
     with Jobs(f"diagnosis false-claims{' foreign' * options.foreign}", options.processes) as jobs:
         wanted = [(case, log, one) for one, case, log in unchanged(jobs, known)]

@@ -39,6 +39,8 @@ def test_no_seed_of_a_place_or_a_log_comes_twice() -> None:
     assert [one.seed for one in drawn] == [
         first + 1000 * number for first in (SEEDS, FOREIGN_SEEDS) for number in range(6)
     ]
+    autumn = places(foreign=False, greenhouses=2, seasons=["autumn"])
+    assert [one.seed for one in autumn] == [SEEDS + 4000, SEEDS + 5000]
     seeds = [case.seed for one in drawn for own in null_cases(one) for case in own]
     seeds += [greenhouse.seed for one in drawn for greenhouse in one.greenhouses]
     assert len(set(seeds)) == len(seeds)

@@ -17,7 +17,7 @@ from typing import TypeVar
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares, lsq_linear
 
-from igrow.core.arrays import Floats
+from igrow.core.arrays import Floats, Mask
 from igrow.core.errors import IgrowError
 from igrow.trainer.fit.gaussian import Gaussian
 
@@ -41,8 +41,8 @@ _AT_BOUND = 1e-3
 _INSIDE = 0.1
 """Distance from a bound, in standard deviations of the prior, at which a search begins that may not begin on it."""
 RUNAWAY = 1e6
-"""Change of an error, in its scale, for a standard deviation of a parameter, from which on the model runs out of all
-bounds a little further on, whether or not the last number of the run is a finite one."""
+"""Change of an error, in its scale or its unit, for a standard deviation of a parameter, from which on the model runs
+out of all bounds a little further on, whether or not the run still ends in a number."""
 _ARRIVED = 1e-3
 """Relative fall of the cost that a full step without bounds promises at most where a search has arrived."""
 
@@ -238,6 +238,18 @@ def _has_arrived(found: OptimizeResult) -> bool:
     return fall <= _ARRIVED * float(found.cost)
 
 
+def is_bounded(slopes: Floats, scale: Floats | float) -> Mask:
+    """Tell of each slope whether the model stays within all bounds a little further on, as `RUNAWAY` says.
+
+    Args:
+        slopes: change of errors with a parameter, of any shape.
+        scale: standard deviation of the parameter, or a typical size of it, that broadcasts to that shape.
+    """
+    # No comparison holds of what is no number.
+    bounded: Mask = np.abs(slopes) < RUNAWAY / np.asarray(scale)
+    return bounded
+
+
 def _finite_slopes(jacobian: Floats, weight: Floats, scale: Floats) -> Floats:
     """Return slopes (n, p), 0 of what runs out of all bounds a little further on: it stays where it is in a step.
 
@@ -246,9 +258,7 @@ def _finite_slopes(jacobian: Floats, weight: Floats, scale: Floats) -> Floats:
         weight: of the errors, (n,); a slope of one that does not count may be anything.
         scale: standard deviations of the prior, (p,).
     """
-    # No comparison holds of what is no number.
-    within = np.abs(jacobian[weight > 0.0]) < RUNAWAY / scale
-    return np.where(within.all(axis=0), jacobian, 0.0)
+    return np.where(is_bounded(jacobian[weight > 0.0], scale).all(axis=0), jacobian, 0.0)
 
 
 def _weighted(

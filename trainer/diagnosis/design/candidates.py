@@ -32,7 +32,7 @@ from igrow.trainer.diagnosis.design.sensitivity import (
     sensor_sensitivities,
     unit_fluxes,
 )
-from igrow.trainer.fit.solver import RUNAWAY
+from igrow.trainer.fit.solver import is_bounded
 
 _TABLE = yaml.safe_load(files("igrow.trainer.diagnosis").joinpath("design/candidates.yaml").read_text(encoding="utf-8"))
 SHAPES: Mapping[str, Mapping[str, Sequence[float]]] = _TABLE["shapes"]
@@ -134,8 +134,7 @@ def effect_columns(line: Linearisation) -> EffectColumns:
     old = [index for index, candidate in enumerate(found) if candidate.ages]
     ageing[old] = _columns(_with_elapsed_one(line), [found[index] for index in old])
     sizes = [abs(one.definition.amplitude.typical) for one in found]
-    # No comparison holds of what is no number.
-    bounded = [(np.abs(column) < RUNAWAY / size).all() for column, size in zip(columns, sizes, strict=True)]
+    bounded = [is_bounded(column, size).all() for column, size in zip(columns, sizes, strict=True)]
     seen = [index for index, column in enumerate(columns) if bounded[index] and _is_visible(line, column)]
     names = {found[index].effect for index in seen}
     return EffectColumns(
