@@ -40,6 +40,12 @@ RESULTS = {
         "Its value, whether it was chosen or fitted, and what it means.",
         "none",
     ),
+    "diagnosis-summary": Result(
+        "The diagnosis at a glance",
+        ("benchmarks.diagnosis", "summary"),
+        "Its figures side by side, each from the page of its own command, beside what it was to be.",
+        "none",
+    ),
     "diagnosis-scoring": Result(
         "The diagnosis on logs of known truth",
         ("benchmarks.diagnosis", "scoring"),

@@ -7,9 +7,10 @@ each with a model calibrated on its own first weeks; `transferred` diagnoses the
 them (`--foreign`: of another structure), and `false-claims` what is told of many in which nothing is missing;
 `omission` takes terms out of the model before the calibration (with DATA: of the public logs) and asks the
 calibration log for them; `real` diagnoses the public logs, `real-faults` the same with faults put into them.
-`catalogue` hides every cause in turn in one greenhouse. `null-bounds` learns what a change must gain, and what it
-must take off unseen days, from seeds that no case has; `separating` asks what tests of the plant bring, and
-`thresholds` prints all rules. Everything is made afresh: an hour or so on two cores, most of it for simulated weeks.
+`catalogue` hides every cause in turn in one greenhouse. `null-bounds` learns what a change must gain, and what it must
+take off unseen days, from seeds that no case has; `separating` asks what tests of the plant bring, and `thresholds`
+prints all rules. `summary` sets the figures of all pages of results side by side. All else is made afresh: an hour or
+so on two cores, most of it for simulated weeks.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from benchmarks.diagnosis import (
     rules,
     same,
     separating,
+    summary,
 )
 from benchmarks.diagnosis.cases import SEASONS, draw
 from benchmarks.diagnosis.greenhouses import of_seasons, others
@@ -51,6 +53,7 @@ WHAT = (
     "separating",
     "catalogue",
     "false-claims",
+    "summary",
 )
 OTHER_GREENHOUSES = 8
 SEASONS_USED = ("winter", "spring")
@@ -89,6 +92,8 @@ def main() -> int:
         return null_bounds.main(options.processes)
     if options.what == "thresholds":
         return rules.show()
+    if options.what == "summary":
+        return summary.show()
     if options.what == "separating":
         return separating.main(options)
     if options.what == "same":
