@@ -230,7 +230,7 @@ RESULTS = {
         "Greenhouses in which nothing is missing",
         ("benchmarks.diagnosis", "false-claims"),
         "Calibrated on eight weeks of their own, diagnosed weeks later: whatever is told is false.",
-        "180000 and on",
+        "180000 and on, 240000 and on",
         long=True,
     ),
     "diagnosis-false-claims-foreign": Result(

@@ -20,10 +20,10 @@ from benchmarks.diagnosis.same import judged
 from benchmarks.diagnosis.scoring import Outcome
 from benchmarks.jobs import Jobs
 
-SEEDS, FOREIGN_SEEDS = 180_000, 190_000
-"""Of the first nursery; each place's are a thousand on."""
+SEEDS, FOREIGN_SEEDS = (180_000, 240_000), (190_000,)
+"""Each of the first of its nurseries; each place's are a thousand on."""
 PLACES, GREENHOUSES = 2, 8
-"""Nurseries a season, and greenhouses in each."""
+"""Nurseries a season of each of these seeds, and greenhouses in every one."""
 CONFIDENCE = 0.9
 GROUPS = {"nothing": "nothing else", "noise": "disturbances twice as large", "clean": "a cleaned cover"}
 
@@ -31,8 +31,13 @@ GROUPS = {"nothing": "nothing else", "noise": "disturbances twice as large", "cl
 def places(*, foreign: bool, greenhouses: int, seasons: Collection[str] = tuple(SEASONS)) -> list[Nursery]:
     """Draw the nurseries of some seasons; each is the same whichever others are asked for."""
     seeds, maker = (FOREIGN_SEEDS, FOREIGN) if foreign else (SEEDS, OWN)
-    every = enumerate(season for season in SEASONS for _ in range(PLACES))
-    return [nursery(season, greenhouses, seeds + 1000 * number, maker) for number, season in every if season in seasons]
+    every = [season for season in SEASONS for _ in range(PLACES)]
+    return [
+        nursery(season, greenhouses, first + 1000 * number, maker)
+        for first in seeds
+        for number, season in enumerate(every)
+        if season in seasons
+    ]
 
 
 def rows(outcomes: Sequence[Outcome]) -> list[tuple[str, int, int]]:

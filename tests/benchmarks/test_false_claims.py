@@ -35,12 +35,12 @@ def test_the_interval_is_as_wide_as_the_logs_are_few() -> None:
 
 def test_no_seed_of_a_place_or_a_log_comes_twice() -> None:
     drawn = [one for foreign in (False, True) for one in places(foreign=foreign, greenhouses=2)]
-    assert [one.season for one in drawn] == 2 * [season for season in SEASONS for _ in range(2)]
+    assert [one.season for one in drawn] == 3 * [season for season in SEASONS for _ in range(2)]
     assert [one.seed for one in drawn] == [
-        first + 1000 * number for first in (SEEDS, FOREIGN_SEEDS) for number in range(6)
+        first + 1000 * number for first in (*SEEDS, *FOREIGN_SEEDS) for number in range(6)
     ]
     autumn = places(foreign=False, greenhouses=2, seasons=["autumn"])
-    assert [one.seed for one in autumn] == [SEEDS + 4000, SEEDS + 5000]
+    assert [one.seed for one in autumn] == [first + more for first in SEEDS for more in (4000, 5000)]
     seeds = [case.seed for one in drawn for own in null_cases(one) for case in own]
     seeds += [greenhouse.seed for one in drawn for greenhouse in one.greenhouses]
     assert len(set(seeds)) == len(seeds)
