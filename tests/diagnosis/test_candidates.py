@@ -214,6 +214,24 @@ def test_an_effect_that_runs_out_of_all_bounds_a_little_further_on_is_none_that_
     assert np.isfinite(found.columns).all()
 
 
+@pytest.mark.parametrize("runaway", [np.nan, np.inf, 1e274])
+def test_a_pattern_that_runs_out_of_all_bounds_a_little_further_on_is_not_asked(
+    line: Linearisation, monkeypatch: pytest.MonkeyPatch, runaway: float
+) -> None:
+    """About stomata that close two ran away on one day of 27, and with them every gain of the log was no number."""
+    usual, columns = candidates.pattern_columns(line, SITE.longitude)
+
+    def diverged(*asked: Any) -> Any:
+        columns = sensitivity.flux_sensitivities(*asked)
+        columns[0, 0, 0, -1] = runaway
+        return columns
+
+    monkeypatch.setattr(candidates, "flux_sensitivities", diverged)
+    found, others = candidates.pattern_columns(line, SITE.longitude)
+    assert found == usual[1:]
+    np.testing.assert_array_equal(others, columns[1:])
+
+
 def test_a_pipe_sensor_can_be_off_in_a_greenhouse_without_a_grow_pipe(record: Record) -> None:
     offset = EFFECTS["pipe_temperature_offset"]
     one = replace(record, missing=(*record.missing, "grow_pipe_temperature"))

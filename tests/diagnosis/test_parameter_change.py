@@ -15,7 +15,7 @@ from igrow.core.simulator.hybrid.record import observe
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.diagnosis import Diagnosis, Finding, diagnose
 from igrow.trainer.diagnosis.answer import wording
-from igrow.trainer.diagnosis.design import amplitudes
+from igrow.trainer.diagnosis.design import amplitudes, linear, sensitivity
 from igrow.trainer.diagnosis.design.design import Design, History
 from igrow.trainer.diagnosis.learned.null_gains import NullGains
 from igrow.trainer.diagnosis.search import history, parameter_change
@@ -32,8 +32,8 @@ from tests.virtual_log import GREENHOUSE, SITE
 NAMES = ("transmissivity", "mass_heat_capacity", "leakage_wind")
 
 
-@pytest.fixture
-def linear(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture(name="linear")
+def linear_at_any_size(monkeypatch: pytest.MonkeyPatch) -> None:
     """No greenhouse stands behind a design of `with_parameters`: its columns are what the changes are at any size."""
     monkeypatch.setattr(parameter_change, "at_its_size", lambda design, one, *_: (design, one))
 
@@ -64,6 +64,17 @@ def with_parameters(truth: Truth, seed: int, *, names: Sequence[str] = NAMES, **
     )
     _, solved = history.solve_jointly(replace(design, history=known))
     return solved
+
+
+def test_a_change_at_whose_size_the_model_runs_out_of_all_bounds_is_what_its_slope_says(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    design = parameter_change.joined(with_parameters(Truth({}, {}, (0.0, 1.2, 0.0)), 4))
+    null, rng = linear.fit(design.grams, design.null_model()), np.random.default_rng(0)
+    (first, *_) = parameter_change.score(design, null, [None], rng)
+    monkeypatch.setattr(sensitivity, "parameter_secant", lambda *_: np.full(design.values.shape[1:], np.inf))
+    told, at_its_size = parameter_change.at_its_size(design, first, [None], rng)
+    assert told is design and at_its_size is first
 
 
 @pytest.mark.usefixtures("linear")

@@ -134,7 +134,10 @@ def effect_columns(line: Linearisation) -> EffectColumns:
     old = [index for index, candidate in enumerate(found) if candidate.ages]
     ageing[old] = _columns(_with_elapsed_one(line), [found[index] for index in old])
     sizes = [abs(one.definition.amplitude.typical) for one in found]
-    bounded = [is_bounded(column, size).all() for column, size in zip(columns, sizes, strict=True)]
+    bounded = [
+        is_bounded(column, size).all() and is_bounded(shift, size).all()
+        for column, shift, size in zip(columns, ageing, sizes, strict=True)
+    ]
     seen = [index for index, column in enumerate(columns) if bounded[index] and _is_visible(line, column)]
     names = {found[index].effect for index in seen}
     return EffectColumns(
@@ -272,7 +275,9 @@ def _pattern_columns(
             found.append(Pattern(channel, when, drivers))
             fluxes.append((_fluxes(channel, course), _PATTERN_DIFFERENCE))
     columns = flux_sensitivities(line, fluxes)
-    kept = [index for index, column in enumerate(columns) if _is_visible(line, column)]
+    kept = [
+        index for index, column in enumerate(columns) if is_bounded(column, 1.0).all() and _is_visible(line, column)
+    ]
     return tuple(found[index] for index in kept), columns[kept]
 
 

@@ -32,7 +32,6 @@ from igrow.trainer.diagnosis.design.sensitivity import Linearisation
 from igrow.trainer.diagnosis.learned.null_gains import NullGains
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.fit.gaussian import Gaussian
-from igrow.trainer.fit.solver import is_bounded
 
 JOINT = ("parameter", "effect", "pattern")
 """Blocks of all that may be missing: of each something may have been there before the log."""
@@ -177,9 +176,7 @@ def lay_out(
     lasting = [place for place, one in enumerate(every) if not one.is_weekly]
     patterns = tuple(every[place] for place in lasting)
     labels = tuple(one.key for one in found.candidates)
-    slopes = sensitivity.parameter_sensitivities(line, prior.names, prior.standard_deviation)
-    if not is_bounded(slopes, prior.standard_deviation[:, None, None, None]).all():
-        raise sensitivity.divergence(effects)
+    slopes = sensitivity.bounded_parameter_sensitivities(line, prior.names, prior.standard_deviation)
     parts = {
         "residual": (("residual",), line.errors[None]),
         "parameter": (prior.names, slopes),

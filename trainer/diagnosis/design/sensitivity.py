@@ -23,7 +23,7 @@ from igrow.core.simulator.hybrid import climate, measurement
 from igrow.core.simulator.hybrid.climate import ActiveEffects
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.core.simulator.hybrid.record import SUBSTEP, Record, free_run, observe
-from igrow.trainer.fit.solver import DivergenceError
+from igrow.trainer.fit.solver import DivergenceError, is_bounded
 
 PARAMETER_DIFFERENCE = 0.05
 """Finite difference of a parameter, in prior standard deviations."""
@@ -169,6 +169,18 @@ def parameter_sensitivities(
     shown = free_run(line.record, states, line.runs.starts, line.runs.steps, varied, effects, line.added)
     amounts = np.array([*step, *(amount for _, amount in others)])
     return np.asarray(-(_batched(shown, len(amounts), line) - line.shown) / amounts[:, None, None, None])
+
+
+def bounded_parameter_sensitivities(line: Linearisation, names: Sequence[str], spread: Floats) -> Floats:
+    """Return `parameter_sensitivities`, (len(names), 3, r, steps), of a model that stays within all bounds with them.
+
+    Raises:
+        DivergenceError: it does not, with one of the parameters a little further on.
+    """
+    slopes = parameter_sensitivities(line, names, spread)
+    if not is_bounded(slopes, spread[:, None, None, None]).all():
+        raise divergence(line.effects)
+    return slopes
 
 
 def _joined(first: Array, others: Sequence[Array], count: int) -> Array:

@@ -175,7 +175,7 @@ def share_of_course(days: LogDays, trial: LogDays, knowledge: Knowledge, rules: 
         sensitivity.linearise(one.record, one.runs, values, activate(one.record, knowledge.terms))
         for one in (days, trial)
     )
-    slopes = sensitivity.parameter_sensitivities(dressed, prior.names, prior.standard_deviation)
+    slopes = sensitivity.bounded_parameter_sensitivities(dressed, prior.names, prior.standard_deviation)
     columns = np.concatenate([bare.errors[None], slopes, (dressed.errors - bare.errors)[None]])
     weighted = np.where(counted, columns / SCALES, 0.0) * np.sqrt(days.record.step / CORRELATION_TIME)
     grams = linear.DailyGrams(linear.daily_products(weighted, days.runs.day, days.split.days), days.split.fit)
