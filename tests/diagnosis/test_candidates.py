@@ -14,7 +14,9 @@ from igrow.core.simulator.hybrid.nominal import nominal
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.data import Log
 from igrow.trainer.data.splits import split_days
+from igrow.trainer.diagnosis import DEFAULT
 from igrow.trainer.diagnosis.design import candidates, sensitivity
+from igrow.trainer.diagnosis.design.balances import balances_of
 from igrow.trainer.diagnosis.design.candidates import UNIT_FLUX, Candidate, Pattern
 from igrow.trainer.diagnosis.design.sensitivity import Linearisation
 from igrow.trainer.diagnosis.knowledge import ActiveTerm, activate
@@ -212,6 +214,31 @@ def test_an_effect_that_runs_out_of_all_bounds_a_little_further_on_is_none_that_
     assert first in found.untestable
     assert first not in {one.effect for one in found.candidates}
     assert np.isfinite(found.columns).all()
+
+
+def test_where_the_errors_do_not_count_the_model_may_show_anything(
+    line: Linearisation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    weight = line.runs.weight.copy()
+    weight[2] = False
+    blind = replace(line, runs=replace(line.runs, weight=weight))
+
+    def diverged(*asked: Any) -> Any:
+        columns = sensitivity.flux_sensitivities(*asked)
+        columns[:, 2] = np.nan
+        return columns
+
+    usual = candidates.effect_columns(blind), candidates.pattern_columns(blind, SITE.longitude)
+    monkeypatch.setattr(candidates, "flux_sensitivities", diverged)
+    effects, (patterns, columns) = candidates.effect_columns(blind), candidates.pattern_columns(blind, SITE.longitude)
+    assert (effects.candidates, effects.untestable, patterns) == (usual[0].candidates, usual[0].untestable, usual[1][0])
+    counted = balances_of(blind, DEFAULT)
+    assert counted.numbers == (0, 1)
+    assert np.isfinite(counted(effects.columns)).all() and np.isfinite(counted(columns)).all()
+    # Nor where a run has left the steps that are driven.
+    late = replace(counted, observed=counted.observed & (np.arange(line.runs.steps) < 40))
+    columns[:, :, :, 40:] = np.inf
+    assert np.isfinite(late(columns)).all()
 
 
 @pytest.mark.parametrize("runaway", [np.nan, np.inf, 1e274])

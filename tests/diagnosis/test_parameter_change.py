@@ -72,7 +72,7 @@ def test_a_change_at_whose_size_the_model_runs_out_of_all_bounds_is_what_its_slo
     design = parameter_change.joined(with_parameters(Truth({}, {}, (0.0, 1.2, 0.0)), 4))
     null, rng = linear.fit(design.grams, design.null_model()), np.random.default_rng(0)
     (first, *_) = parameter_change.score(design, null, [None], rng)
-    monkeypatch.setattr(sensitivity, "parameter_secant", lambda *_: np.full(design.values.shape[1:], np.inf))
+    monkeypatch.setattr(sensitivity, "parameter_secant", lambda *_: np.full(design.line.shown.shape, np.inf))
     told, at_its_size = parameter_change.at_its_size(design, first, [None], rng)
     assert told is design and at_its_size is first
 

@@ -22,8 +22,7 @@ class Balances:
 
     def __call__(self, values: Floats) -> Floats:
         """Return of errors or sensitivities, (k, 3, r, steps), those that count, (k, b, r, steps), else 0."""
-        counted: Floats = values[:, list(self.numbers)] * self.observed
-        return counted
+        return np.where(self.observed, values[:, list(self.numbers)], 0.0)
 
 
 def balances_of(line: Linearisation, rules: DecisionRules) -> Balances:

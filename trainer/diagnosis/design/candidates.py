@@ -32,7 +32,6 @@ from igrow.trainer.diagnosis.design.sensitivity import (
     sensor_sensitivities,
     unit_fluxes,
 )
-from igrow.trainer.fit.solver import is_bounded
 
 _TABLE = yaml.safe_load(files("igrow.trainer.diagnosis").joinpath("design/candidates.yaml").read_text(encoding="utf-8"))
 SHAPES: Mapping[str, Mapping[str, Sequence[float]]] = _TABLE["shapes"]
@@ -133,11 +132,8 @@ def effect_columns(line: Linearisation) -> EffectColumns:
     ageing = np.zeros_like(columns)
     old = [index for index, candidate in enumerate(found) if candidate.ages]
     ageing[old] = _columns(_with_elapsed_one(line), [found[index] for index in old])
-    sizes = [abs(one.definition.amplitude.typical) for one in found]
-    bounded = [
-        is_bounded(column, size).all() and is_bounded(shift, size).all()
-        for column, shift, size in zip(columns, ageing, sizes, strict=True)
-    ]
+    sizes = np.array([abs(one.definition.amplitude.typical) for one in found])
+    bounded = line.stays_bounded(columns, sizes) & line.stays_bounded(ageing, sizes)
     seen = [index for index, column in enumerate(columns) if bounded[index] and _is_visible(line, column)]
     names = {found[index].effect for index in seen}
     return EffectColumns(
@@ -275,9 +271,8 @@ def _pattern_columns(
             found.append(Pattern(channel, when, drivers))
             fluxes.append((_fluxes(channel, course), _PATTERN_DIFFERENCE))
     columns = flux_sensitivities(line, fluxes)
-    kept = [
-        index for index, column in enumerate(columns) if is_bounded(column, 1.0).all() and _is_visible(line, column)
-    ]
+    bounded = line.stays_bounded(columns, np.ones(len(columns)))
+    kept = [index for index, column in enumerate(columns) if bounded[index] and _is_visible(line, column)]
     return tuple(found[index] for index in kept), columns[kept]
 
 

@@ -105,6 +105,15 @@ class Linearisation:
         measured = np.stack([self.record.measured[name][self.runs.samples] for name in measurement.PREDICTED])
         return np.where(self.runs.weight, np.nan_to_num(measured) - self.shown, 0.0)
 
+    def stays_bounded(self, slopes: Floats, spread: Floats) -> Mask:
+        """Tell of each slope whether the model stays within all bounds a little further on, (k,).
+
+        Args:
+            slopes: of the errors, (k, 3, r, steps); where these do not count the model may show anything.
+            spread: standard deviation, or a typical size, of what they are slopes with, (k,).
+        """
+        return np.asarray(is_bounded(slopes[:, self.runs.weight], spread[:, None]).all(axis=1))
+
 
 def linearise(
     record: Record,
@@ -178,7 +187,7 @@ def bounded_parameter_sensitivities(line: Linearisation, names: Sequence[str], s
         DivergenceError: it does not, with one of the parameters a little further on.
     """
     slopes = parameter_sensitivities(line, names, spread)
-    if not is_bounded(slopes, spread[:, None, None, None]).all():
+    if not line.stays_bounded(slopes, spread).all():
         raise divergence(line.effects)
     return slopes
 

@@ -23,7 +23,6 @@ from igrow.trainer.diagnosis.search.estimate import OnsetInterval, onset_interva
 from igrow.trainer.diagnosis.search.scan import Hypothesis
 from igrow.trainer.diagnosis.visible_parameters import TOGETHER, VISIBLE, members
 from igrow.trainer.fit.climate import bounds
-from igrow.trainer.fit.solver import is_bounded
 
 SECANTS = 2
 """Turns in which the size of a change is found by the change of before: the first is that of the slope."""
@@ -159,7 +158,7 @@ def at_its_size(
         column = sensitivity.parameter_secant(
             design.line, members(one.parameter), one.amplitude, one.parameter in TOGETHER
         )
-        if not is_bounded(column, abs(one.amplitude)).all():
+        if not design.line.stays_bounded(column[None], np.array([abs(one.amplitude)])).all():
             break
         block = Block((one.parameter,), range(place, place + 1))
         wider = replace(
