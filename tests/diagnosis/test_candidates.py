@@ -190,13 +190,19 @@ def test_an_effect_is_tried_at_every_shape_of_its_grid_and_has_a_key_for_each(li
     assert asked.isdisjoint(found.untestable)
 
 
-@pytest.mark.parametrize("share", [1e300, 100.0])
+@pytest.mark.parametrize(
+    ("effect", "values"),
+    [
+        ("lamp_heat", {"share": 1e300}),
+        ("lamp_heat", {"share": 100.0}),
+        ("co2_valve_leak", {"rate": 1e9}),
+    ],
+)
 def test_a_model_that_runs_out_of_all_bounds_says_so_though_its_air_has_a_temperature(
-    line: Linearisation, share: float
+    line: Linearisation, effect: str, values: dict[str, float]
 ) -> None:
-    absurd = {"lamp_heat": {"share": share}}
-    with pytest.raises(DivergenceError, match="lamp_heat runs out of all bounds"):
-        sensitivity.linearise(line.record, line.runs, line.parameters, absurd)
+    with pytest.raises(DivergenceError, match=f"{effect} runs out of all bounds"):
+        sensitivity.linearise(line.record, line.runs, line.parameters, {effect: values})
 
 
 @pytest.mark.parametrize("runaway", [np.nan, np.inf, 1e274])

@@ -125,14 +125,14 @@ def linearise(
     """Run the model once along a log; `added` are further fluxes by channel, (n,).
 
     Raises:
-        DivergenceError: a prediction that counts is no finite number, or the air's is off by more than `DIVERGED`.
+        DivergenceError: a prediction that counts is off by more than any greenhouse's, or the air's by `DIVERGED`.
     """
     states = observe(record, parameters, effects)
     shown = free_run(record, states, runs.starts, runs.steps, parameters, effects, added)
     drivers = climate.derive(np, states, record.inputs, parameters, record.lamp_efficacy)
     line = Linearisation(record, runs, parameters, effects, _stacked(shown), states, drivers, added or {})
     errors = line.errors
-    if not (np.isfinite(errors).all() and (np.abs(errors[_AIR_TEMPERATURE]) <= DIVERGED).all()):
+    if not (is_bounded(errors, 1.0).all() and (np.abs(errors[_AIR_TEMPERATURE]) <= DIVERGED).all()):
         raise divergence(effects)
     return line
 
