@@ -58,6 +58,13 @@ def test_every_column_of_a_log_has_a_label_and_a_place(quiet: Design) -> None:
     assert not any(one.is_weekly for one in quiet.patterns)
 
 
+def test_a_column_without_numbers_is_said_and_hides_no_cause() -> None:
+    design = make_design(seed=2)
+    design.values[design.block("pattern").columns[0], 0, 3, 2] = np.nan
+    with pytest.raises(DivergenceError, match="runs out of all bounds"):
+        design.whitened(design.whitening)
+
+
 @pytest.mark.parametrize("runaway", [np.nan, 1e274])
 def test_a_log_is_not_laid_out_about_a_model_that_runs_out_of_all_bounds_a_little_further_on(
     quiet: Design, monkeypatch: pytest.MonkeyPatch, runaway: float

@@ -153,8 +153,14 @@ class Design:
         return noise.fit_noise(errors, self.observed, self.fitted, start)
 
     def whitened(self, whitening: Whitening) -> Design:
-        """Return the design as another noise shows it."""
+        """Return the design as another noise shows it.
+
+        Raises:
+            DivergenceError: a column holds no numbers: no gain would be one, and nothing would be found.
+        """
         products = linear.daily_products(whitening(self.values), self.line.runs.day, self.split.days)
+        if not np.isfinite(products).all():
+            raise sensitivity.divergence(self.line.effects)
         return replace(self, whitening=whitening, grams=DailyGrams(products, self.split.fit))
 
 
