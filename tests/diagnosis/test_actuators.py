@@ -10,9 +10,11 @@ import pytest
 from igrow.core.simulator.hybrid.nominal import site_record
 from igrow.trainer.data import Log
 from igrow.trainer.diagnosis import DEFAULT, Diagnosis, diagnose
+from igrow.trainer.diagnosis.design import sensitivity
 from igrow.trainer.diagnosis.design.freerun import log_days
 from igrow.trainer.diagnosis.knowledge import knowledge_of
 from igrow.trainer.diagnosis.search import actuators
+from igrow.trainer.fit.solver import DivergenceError
 from tests.diagnosis.conftest import DAYS, STEP, greenhouse_log, model_in_force
 from tests.made_once import made_once
 from tests.virtual_log import SITE
@@ -89,6 +91,18 @@ def test_the_share_of_a_course_is_found_beside_the_parameters(
     assert found.value == pytest.approx(share, abs=2.0 * found.deviation)
     assert found.deviation < 0.2
     assert (found.log_odds >= DEFAULT.least_actuator_odds) == (share == 1.0)
+
+
+def test_a_course_beside_which_the_model_runs_out_of_all_bounds_has_no_share(
+    quiet_log: Log, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model, seen = model_in_force(), quiet_log.without("lamp_power")
+    days, known = log_days(seen, model), knowledge_of(model, SITE, DEFAULT)
+    trial = actuators.with_inputs(days, actuators.courses(seen, days.record, model))
+    slopes = np.full((len(known.prior.names), 3, len(days.runs.starts), days.runs.steps), np.nan)
+    monkeypatch.setattr(sensitivity, "parameter_sensitivities", lambda *_: slopes)
+    with pytest.raises(DivergenceError, match="runs out of all bounds"):
+        actuators.share_of_course(days, trial, known, DEFAULT)
 
 
 @pytest.mark.slow
