@@ -20,6 +20,14 @@ COLUMNS = {
     "built-in": "by the built-in bundle: of the greenhouse only the site's file is known",
     "real": "faults put into five real logs, and columns withheld from them",
 }
+PAGES = {
+    "same": "diagnosis-same",
+    "in turn": "diagnosis-catalogue",
+    "structure": "diagnosis-foreign",
+    "built-in": "diagnosis-transferred",
+    "real": "diagnosis-real-faults",
+}
+"""On which each column's figures stand, but those that name another."""
 WIDTH = 15
 
 
@@ -60,26 +68,18 @@ class Question:
     asked: str
     wanted: str
     """The bound that the figures of the same greenhouse are to keep; a dash for none."""
-    answers: Mapping[str, Figure]
-    """By column."""
+    answers: Mapping[str, str | Figure]
+    """By column: the label of a line on its page, or a figure of another page."""
+
+    def figure(self, column: str) -> Figure | None:
+        """Return the figure that answers it in a column, None where none does."""
+        answer = self.answers.get(column)
+        return Figure(PAGES[column], answer) if isinstance(answer, str) else answer
 
 
-def _of_all(asked: str, wanted: str, label: str, **others: Figure) -> Question:
-    """Return a question that three kinds of greenhouses answer by the same label."""
-    pages = {"same": "diagnosis-same", "structure": "diagnosis-foreign"}
-    return Question(asked, wanted, {**{column: Figure(page, label) for column, page in pages.items()}, **others})
-
-
-def _in_turn(label: str) -> Figure:
-    return Figure("diagnosis-catalogue", label)
-
-
-def _built_in(label: str) -> Figure:
-    return Figure("diagnosis-transferred", label)
-
-
-def _faults(label: str) -> Figure:
-    return Figure("diagnosis-real-faults", label)
+def _virtual(label: str) -> dict[str, str | Figure]:
+    """Return answers of virtual greenhouses of both structures, whose pages are of one command."""
+    return {"same": label, "structure": label}
 
 
 QUESTIONS = (
@@ -89,74 +89,73 @@ QUESTIONS = (
         {
             "same": Figure("diagnosis-false-claims", "all", value=2),
             "structure": Figure("diagnosis-false-claims-foreign", "all", value=2),
-            "built-in": _built_in("false claims on nothing"),
+            "built-in": "false claims on nothing",
         },
     ),
-    _of_all("named first, thrice the noise", "-", "right cause first, ENR 3"),
-    _of_all(
-        "named first, as large as the noise", ">= .80", "right cause first, ENR 1",
-        **{"built-in": _built_in("right cause first, ENR 1")},
+    Question("named first, thrice the noise", "-", _virtual("right cause first, ENR 3")),
+    Question(
+        "named first, as large as the noise",
+        ">= .80",
+        _virtual("right cause first, ENR 1") | {"built-in": "right cause first, ENR 1"},
     ),
-    _of_all(
-        "named first, a third of the noise", ">= .35", "right cause first, ENR 0.3",
-        **{"built-in": _built_in("right cause first, ENR 0.3")},
+    Question(
+        "named first, a third of the noise",
+        ">= .35",
+        _virtual("right cause first, ENR 0.3") | {"built-in": "right cause first, ENR 0.3"},
     ),
-    _of_all(
-        "named first, where recalibration errs more", "-", "right first, where recalibration errs a tenth more",
-        **{
-            "in turn": _in_turn("the same, where recalibration errs a tenth more"),
-            "real": _faults("right first, where an error rises by a fifth"),
+    Question(
+        "named first, where recalibration errs more",
+        "-",
+        _virtual("right first, where recalibration errs a tenth more")
+        | {
+            "in turn": "the same, where recalibration errs a tenth more",
+            "real": "right first, where an error rises by a fifth",
         },
     ),
-    _of_all(
-        "right, where a name is given", ">= .95", "right cause first, where a name was given",
-        **{
-            "in turn": _in_turn("right, where a name is given"),
-            "built-in": _built_in("right cause first, where something was claimed"),
-            "real": _faults("right, where a name is given"),
+    Question(
+        "right, where a name is given",
+        ">= .95",
+        _virtual("right cause first, where a name was given")
+        | {
+            "in turn": "right, where a name is given",
+            "built-in": "right cause first, where something was claimed",
+            "real": "right, where a name is given",
         },
     ),
-    _of_all("both of a pair", ">= .45", "both of a pair", **{"built-in": _built_in("both of a pair")}),
-    _of_all(
-        "size, median relative error", "<= .10", "size, median relative error",
-        **{
-            "in turn": _in_turn("size, median relative error"),
-            "built-in": _built_in("size, median relative error"),
-            "real": _faults("size, median relative error"),
+    Question("both of a pair", ">= .45", _virtual("both of a pair") | {"built-in": "both of a pair"}),
+    Question("size, median relative error", "<= .10", dict.fromkeys(PAGES, "size, median relative error")),
+    Question(
+        "90 % intervals that cover",
+        ".85 to .95",
+        dict.fromkeys((one for one in PAGES if one != "in turn"), "90 % intervals that cover"),
+    ),
+    Question(
+        "beginning within 2 days",
+        ">= .90",
+        _virtual("beginning within 2 days, where found")
+        | {
+            "in turn": "beginning within 2 days, where found",
+            "built-in": "onset within 2 days, where the cause was found",
+            "real": "beginning within 2 days",
         },
     ),
-    _of_all(
-        "90 % intervals that cover", ".85 to .95", "90 % intervals that cover",
-        **{"built-in": _built_in("90 % intervals that cover"), "real": _faults("90 % intervals that cover")},
+    Question(
+        "not in the catalogue: a wrong name",
+        "<= .05",
+        _virtual("outside the catalogue: wrong name")
+        | {"built-in": "outside: confident wrong name", "real": "no cause of the catalogue: a name all the same"},
     ),
-    _of_all(
-        "beginning within 2 days", ">= .90", "beginning within 2 days, where found",
-        **{
-            "in turn": _in_turn("beginning within 2 days, where found"),
-            "built-in": _built_in("onset within 2 days, where the cause was found"),
-            "real": _faults("beginning within 2 days"),
-        },
+    Question(
+        "not in the catalogue: silence",
+        "<= .30",
+        _virtual("outside the catalogue: silence")
+        | {"built-in": "outside: silence", "real": "no cause of the catalogue: silence"},
     ),
-    _of_all(
-        "not in the catalogue: a wrong name", "<= .05", "outside the catalogue: wrong name",
-        **{
-            "built-in": _built_in("outside: confident wrong name"),
-            "real": _faults("no cause of the catalogue: a name all the same"),
-        },
-    ),
-    _of_all(
-        "not in the catalogue: silence", "<= .30", "outside the catalogue: silence",
-        **{
-            "built-in": _built_in("outside: silence"),
-            "real": _faults("no cause of the catalogue: silence"),
-        },
-    ),
-    _of_all(
-        "recoverable error recovered", ">= .85", "recoverable error recovered",
-        **{
-            "in turn": _in_turn("recoverable error recovered"),
-            "built-in": _built_in("share of the recoverable error recovered"),
-        },
+    Question(
+        "recoverable error recovered",
+        ">= .85",
+        _virtual("recoverable error recovered")
+        | {"in turn": "recoverable error recovered", "built-in": "share of the recoverable error recovered"},
     ),
     Question(
         "a withheld column traced, where it matters",
@@ -179,7 +178,7 @@ QUESTIONS = (
             "real": Figure("diagnosis-omission-real", "all", cases=2),
         },
     ),
-)  # fmt: skip
+)
 
 
 def table(folder: Path = FOLDER) -> list[str]:
@@ -193,17 +192,16 @@ def table(folder: Path = FOLDER) -> list[str]:
     heads = "".join(f"{name:>{WIDTH}}" for name in COLUMNS)
     lines = [f"{'':{wide}}  {'wanted':>10}{heads}"]
     for one in QUESTIONS:
-        cells = [one.answers[name].read(folder) if name in one.answers else "" for name in COLUMNS]
+        figures = [one.figure(name) for name in COLUMNS]
+        cells = ["" if figure is None else figure.read(folder) for figure in figures]
         lines.append(f"{one.asked:{wide}}  {one.wanted:>10}{''.join(f'{cell:>{WIDTH}}' for cell in cells)}".rstrip())
     return lines
 
 
-def pages() -> dict[str, list[str]]:
-    """Return the pages that each column is read from, in the order of its questions."""
-    return {
-        name: list(dict.fromkeys(one.answers[name].page for one in QUESTIONS if name in one.answers))
-        for name in COLUMNS
-    }
+def pages(column: str) -> list[str]:
+    """Return the pages that a column is read from, in the order of the questions."""
+    figures = (one.figure(column) for one in QUESTIONS)
+    return list(dict.fromkeys(figure.page for figure in figures if figure is not None))
 
 
 def show() -> int:
@@ -211,5 +209,5 @@ def show() -> int:
     print("\n".join(table()))
     print("\nthe noise: the error that stays though nothing is missing; beside each figure the number of cases\n")
     for name, about in COLUMNS.items():
-        print(f"{name:10} {about}\n{'':10} ({', '.join(pages()[name])})")
+        print(f"{name:10} {about}\n{'':10} ({', '.join(pages(name))})")
     return 0
