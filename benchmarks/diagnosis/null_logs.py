@@ -17,7 +17,7 @@ from benchmarks.diagnosis.cases import Case
 from benchmarks.diagnosis.greenhouses import VirtualGreenhouse, others
 from benchmarks.diagnosis.logs import Reference, built_in, simulate_cases
 from benchmarks.diagnosis.makers import Maker
-from benchmarks.diagnosis.nurseries import Nursery, calibrated, calibration_logs, later_logs, nursery
+from benchmarks.diagnosis.nurseries import Nursery, calibrated, calibration_logs, later_logs, nurseries, nursery
 from benchmarks.jobs import Jobs
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import prepare_log
@@ -26,15 +26,30 @@ from igrow.trainer.diagnosis.circumstances import Circumstances, circumstances_o
 
 SEEDS = {"spring": 110_000, "autumn": 120_000, "winter": 130_000}
 GREENHOUSES, DAYS = 16, 28
+MORE_SEEDS, MORE_GREENHOUSES = {"two places a season": 250_000}, 8
+"""Of the first of six further places, and how many greenhouses at each: what nothing misses differs from place to
+place more than from greenhouse to greenhouse.
+"""
+FALSE_CLAIMS = 0.02
+"""Share of these logs that may be told something, each place judged by the others."""
 UNKNOWN_SEEDS, UNKNOWN = {"anywhere": 140_000}, 72
 """Of greenhouses anywhere, and how many."""
 Later = tuple[Reference, Case, Telemetry]
 """A log in which nothing is missing, of a greenhouse, and the model that it is asked by."""
 
 
-def nurseries() -> list[Nursery]:
+def places() -> list[Nursery]:
     """Draw the nurseries that bounds are learned of."""
-    return [nursery(season, GREENHOUSES, first) for season, first in SEEDS.items()]
+    (more,) = MORE_SEEDS.values()
+    return [
+        *(nursery(season, GREENHOUSES, first) for season, first in SEEDS.items()),
+        *nurseries(more, MORE_GREENHOUSES),
+    ]
+
+
+def place(job: Later) -> float:
+    """Return what tells a log's place from all others: its latitude, of which greenhouses of one nursery have one."""
+    return job[0].greenhouse.site.latitude
 
 
 def null_cases(known: Nursery) -> list[list[Case]]:

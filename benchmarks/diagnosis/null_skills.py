@@ -2,8 +2,7 @@
 
 An effect must exceed some times what it took off in any of these logs (`DecisionRules.days_over_null`), a pattern
 without a name the same of any of its kind. Above that stands what every change must take off: the least with which
-these logs, each greenhouse judged by the others, are told to lack one no more often than they may; of patterns the
-same.
+these logs, each place judged by the others, are told to lack one no more often than they may; of patterns the same.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.diagnosis.null_gains import largest
-from benchmarks.diagnosis.null_logs import Later, circumstances
+from benchmarks.diagnosis.null_logs import Later, circumstances, place
 from benchmarks.jobs import Jobs
 from igrow.trainer.diagnosis.design.candidates import Pattern
 from igrow.trainer.diagnosis.learned import null_gains
@@ -27,8 +26,6 @@ from igrow.trainer.diagnosis.search import cross_validation, unexplained
 from igrow.trainer.diagnosis.search.cross_validation import CrossValidated, cross_validated
 from igrow.trainer.diagnosis.search.rounds import search_of
 
-FALSE_CLAIMS = 0.02
-"""Share of logs with nothing missing that may be told a change, each greenhouse judged by the skills of the others."""
 Skills = Mapping[str, float]
 """Share of the squared error of unseen days that each takes off; the largest first."""
 
@@ -37,6 +34,7 @@ Skills = Mapping[str, float]
 class Told:
     """What unseen days tell of one log in which nothing is missing."""
 
+    place: float
     greenhouse: str
     group: str
     skills: dict[str, float]
@@ -57,7 +55,7 @@ def told(job: Later) -> Told:
     for one in _ranked(unexplained.judged(design, site.longitude, by_physics).found):
         assert isinstance(one.hypothesis.cause, Pattern)
         patterns.setdefault(one.hypothesis.cause.kind, one.skill)
-    return Told(site.name, case.group, {one.hypothesis.effect: one.skill for one in effects}, patterns)
+    return Told(place(job), site.name, case.group, {one.hypothesis.effect: one.skill for one in effects}, patterns)
 
 
 def _ranked(found: Sequence[CrossValidated]) -> list[CrossValidated]:
@@ -69,47 +67,56 @@ def of_each(skills: Sequence[Skills]) -> dict[str, float]:
     return {name: skill for name, skill in largest(skills).items() if skill > 0.0}
 
 
-def least_skill(found: Sequence[tuple[str, Skills]]) -> float:
+def least_skill(found: Sequence[tuple[float, Skills]], false_claims: float) -> float:
     """Return the least that every change must take off, so that few enough logs are told one by what others take off.
 
     Args:
-        found: greenhouse and skills of every log.
+        found: place and skills of every log.
+        false_claims: share of them that may be told one.
     """
     told = []
-    for greenhouse, skills in found:
-        by_others = of_each([other for name, other in found if name != greenhouse])
+    for here, skills in found:
+        by_others = of_each([other for elsewhere, other in found if elsewhere != here])
         best, skill = next(iter(skills.items()), ("", 0.0))
         if skill > 0.0 and skill >= DEFAULT.days_over_null * by_others.get(best, 0.0):
             told.append(skill)
-    may = int(FALSE_CLAIMS * len(found))
+    may = int(false_claims * len(found))
     least = sorted((0.0, *told), reverse=True)[min(may, len(told))]
     return (math.floor(1000.0 * least) + 1.0) / 1000.0
 
 
-def learned(found: Sequence[Told], made: Mapping[str, Any]) -> dict[str, NullGains]:
+def learned(
+    found: Sequence[Told], made: Mapping[str, Any], *, false_causes: float, false_patterns: float
+) -> dict[str, NullGains]:
     """Return the bounds of effects and of patterns, by their file.
 
     Args:
         found: what unseen days tell of every log.
         made: provenance of these logs.
+        false_causes: share of them that may be told an effect, each place judged by the others.
+        false_patterns: the same of patterns.
     """
     by_file = {
-        null_gains.SKILLS_FILE: [(one.greenhouse, one.skills) for one in found],
-        null_gains.PATTERN_SKILLS_FILE: [(one.greenhouse, one.patterns) for one in found],
+        null_gains.SKILLS_FILE: ([(one.place, one.skills) for one in found], false_causes),
+        null_gains.PATTERN_SKILLS_FILE: ([(one.place, one.patterns) for one in found], false_patterns),
     }
     return {
-        file: NullGains(of_each([skills for _, skills in those]), least_skill(those), made)
-        for file, those in by_file.items()
+        file: NullGains(of_each([skills for _, skills in those]), least_skill(those, may), made)
+        for file, (those, may) in by_file.items()
     }
 
 
-def learn(jobs: Jobs, logs: Sequence[Later], made: Mapping[str, Any]) -> dict[str, NullGains]:
+def learn(
+    jobs: Jobs, logs: Sequence[Later], made: Mapping[str, Any], *, false_causes: float, false_patterns: float
+) -> dict[str, NullGains]:
     """Return the skills that come with the trainer, of effects and of patterns, by their file.
 
     Args:
         jobs: that ask the unseen days.
         logs: in which nothing has changed.
         made: provenance of them.
+        false_causes: share of them that may be told an effect, each place judged by the others.
+        false_patterns: the same of patterns.
     """
     found: list[Told] = []
     for one in jobs.each(told, logs):
@@ -119,4 +126,4 @@ def learn(jobs: Jobs, logs: Sequence[Later], made: Mapping[str, Any]) -> dict[st
         of_patterns = {f"pattern of {name}": skill for name, skill in one.patterns.items()}
         for name, skill in (one.skills | of_patterns).items():
             print(f"{one.greenhouse:24} {one.group:8} {name:32} {skill:6.3f}")
-    return learned(found, made)
+    return learned(found, made, false_causes=false_causes, false_patterns=false_patterns)

@@ -7,7 +7,7 @@ every third has a crop that was planted when the calibration log begins.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,6 +24,8 @@ CLEANED = 1.06
 """What a cleaned cover lets through, over before."""
 JITTER = 15
 """Days by which a season may begin earlier or later."""
+PLACES = 2
+"""Nurseries a season of `nurseries`."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,25 @@ def nursery(season: str, count: int, first: int, maker: Maker = OWN) -> Nursery:
             plant = replace(plant, lamp_capacity=0.0)
         found.append(VirtualGreenhouse(site_of(f"{season}-{first}-{number}", plant), plant, start, seed))
     return Nursery(season, tuple(found), first, maker)
+
+
+def nurseries(
+    first: int, greenhouses: int, seasons: Collection[str] = tuple(SEASONS), maker: Maker = OWN
+) -> list[Nursery]:
+    """Draw the nurseries of some seasons, two of each; each is the same whichever others are asked for.
+
+    Args:
+        first: seed of the first of all seasons; each place's is a thousand on.
+        greenhouses: of every nursery.
+        seasons: of `SEASONS`.
+        maker: whose greenhouses they are.
+    """
+    every = [season for season in SEASONS for _ in range(PLACES)]
+    return [
+        nursery(season, greenhouses, first + 1000 * number, maker)
+        for number, season in enumerate(every)
+        if season in seasons
+    ]
 
 
 def calibration_logs(known: Nursery) -> list[tuple[Telemetry, State]]:

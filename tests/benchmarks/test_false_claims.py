@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from benchmarks.diagnosis import null_logs
 from benchmarks.diagnosis.cases import SEASONS, Case
 from benchmarks.diagnosis.false_claims import FOREIGN_SEEDS, SEEDS, line, places, rows
 from benchmarks.diagnosis.null_logs import null_cases
@@ -44,3 +45,16 @@ def test_no_seed_of_a_place_or_a_log_comes_twice() -> None:
     seeds = [case.seed for one in drawn for own in null_cases(one) for case in own]
     seeds += [greenhouse.seed for one in drawn for greenhouse in one.greenhouses]
     assert len(set(seeds)) == len(seeds)
+
+
+def test_bounds_are_learned_at_nine_places_of_which_each_has_a_latitude_of_its_own() -> None:
+    drawn = null_logs.places()
+    latitudes = [{greenhouse.site.latitude for greenhouse in one.greenhouses} for one in drawn]
+    assert all(len(one) == 1 for one in latitudes)
+    assert len(set.union(*latitudes)) == len(drawn) == 9
+    assert [sum(one.season == season for one in drawn) for season in SEASONS] == [3, 3, 3]
+    seeds = [case.seed for one in drawn for own in null_cases(one) for case in own]
+    seeds += [greenhouse.seed for one in drawn for greenhouse in one.greenhouses]
+    assert len(set(seeds)) == len(seeds) == 96 * 4
+    judged = {one.seed for foreign in (False, True) for one in places(foreign=foreign, greenhouses=1)}
+    assert judged.isdisjoint(one.seed for one in drawn)
