@@ -23,7 +23,7 @@ from igrow.core.simulator.hybrid import climate, measurement
 from igrow.core.simulator.hybrid.climate import ActiveEffects
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
 from igrow.core.simulator.hybrid.record import SUBSTEP, Record, free_run, observe
-from igrow.trainer.fit.solver import DivergenceError, is_bounded
+from igrow.trainer.fit.solver import RUNAWAY, DivergenceError, is_bounded
 
 PARAMETER_DIFFERENCE = 0.05
 """Finite difference of a parameter, in prior standard deviations."""
@@ -132,7 +132,8 @@ def linearise(
     drivers = climate.derive(np, states, record.inputs, parameters, record.lamp_efficacy)
     line = Linearisation(record, runs, parameters, effects, _stacked(shown), states, drivers, added or {})
     errors = line.errors
-    if not (is_bounded(errors, 1.0).all() and (np.abs(errors[_AIR_TEMPERATURE]) <= DIVERGED).all()):
+    # No comparison holds of what is no number.
+    if not ((np.abs(errors) < RUNAWAY).all() and (np.abs(errors[_AIR_TEMPERATURE]) <= DIVERGED).all()):
         raise divergence(effects)
     return line
 
