@@ -9,6 +9,7 @@ from benchmarks.diagnosis.cases import SEASONS, Case
 from benchmarks.diagnosis.false_claims import FOREIGN_SEEDS, SEEDS, line, places, rows
 from benchmarks.diagnosis.null_logs import null_cases
 from benchmarks.diagnosis.scoring import Outcome
+from benchmarks.results import RESULTS
 
 QUIET = Outcome(
     Case("winter-0-0", "nothing", "one", 1), "nothing", (), (), (),
@@ -58,3 +59,8 @@ def test_bounds_are_learned_at_nine_places_of_which_each_has_a_latitude_of_its_o
     assert len(set(seeds)) == len(seeds) == 96 * 4
     judged = {one.seed for foreign in (False, True) for one in places(foreign=foreign, greenhouses=1)}
     assert judged.isdisjoint(one.seed for one in drawn)
+
+
+def test_pages_say_the_seeds_that_are_drawn() -> None:
+    for page, seeds in (("diagnosis-false-claims", SEEDS), ("diagnosis-false-claims-foreign", FOREIGN_SEEDS)):
+        assert RESULTS[page].seeds == ", ".join(f"{first} and on" for first in seeds)
