@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import shutil
 import signal
 import subprocess
@@ -81,9 +82,13 @@ def moved_away(state: Path) -> None:
 def replaced_by_a_copy(state: Path) -> None:
     """As by a restore that was made by hand."""
     # A file that the daemon is just writing may be whole, and under its own name, before it is copied.
-    shutil.copytree(state, state.with_name("copy"), ignore=shutil.ignore_patterns("*.part"))
-    state.rename(state.with_name("away"))
-    state.with_name("copy").rename(state)
+    copy = shutil.copytree(state, state.with_name("copy"), ignore=shutil.ignore_patterns("*.part"))
+    for number in itertools.count():
+        state.rename(state.with_name(f"away{number}"))
+        # In between the daemon may have made the folder anew, and written into it.
+        with contextlib.suppress(OSError):
+            copy.rename(state)
+            return
 
 
 @pytest.mark.parametrize("what", [removed, lock_removed, moved_away, replaced_by_a_copy])
