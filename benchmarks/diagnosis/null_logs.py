@@ -1,6 +1,6 @@
 """Logs of greenhouses in which nothing is missing: what a change must exceed comes of these.
 
-In every nursery (one a season) each greenhouse is calibrated on eight weeks, and then logged three times more, with
+In every nursery (three a season) each greenhouse is calibrated on eight weeks, and then logged three times more, with
 nothing missing but a little drift, once with wrong noise or a cleaned cover. Of greenhouses of which the site's
 description alone is known these logs tell something too, beside logs of other places and at any time of the year. No
 case of a benchmark has these seeds.
@@ -27,9 +27,7 @@ from igrow.trainer.diagnosis.circumstances import Circumstances, circumstances_o
 SEEDS = {"spring": 110_000, "autumn": 120_000, "winter": 130_000}
 GREENHOUSES, DAYS = 16, 28
 MORE_SEEDS, MORE_GREENHOUSES = {"two places a season": 250_000}, 8
-"""Of the first of six further places, and how many greenhouses at each: what nothing misses differs from place to
-place more than from greenhouse to greenhouse.
-"""
+"""Of the first of six further places, and how many greenhouses at each: three places alone say too little of others."""
 FALSE_CLAIMS = 0.02
 """Share of these logs that may be told something, each place judged by the others."""
 UNKNOWN_SEEDS, UNKNOWN = {"anywhere": 140_000}, 72

@@ -29,7 +29,7 @@ class NullGains:
     largest: Mapping[str, float]
     """In any such log, of effects, beginnings, parameters (``parameter:name``) or kinds of patterns."""
     least: float
-    """What any change must gain: of such logs none or nearly none is told one then, each by what others gained."""
+    """What any change must gain: hardly any of such logs is told one then, each by what was gained at other places."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
     """The command that learned it, its date and seeds."""
 
