@@ -28,7 +28,10 @@ BY_STEPS, BY_DAYS = FALSE_CLAIMS / 4, {"false_causes": FALSE_CLAIMS / 2, "false_
 
 
 def main(processes: int) -> int:
-    """Write the bounds into the package: skills first, since diagnoses go by them when the least gain is learned."""
+    """Write the bounds into the package: skills first, since diagnoses go by them when the least gain is learned.
+
+    These skills are of all places, and know the logs that are asked then.
+    """
     seeds = SEEDS | MORE_SEEDS
     made, made_of_unknown = provenance(COMMAND, seeds), provenance(COMMAND, seeds | UNKNOWN_SEEDS)
     with Jobs("diagnosis null-bounds", processes) as jobs:

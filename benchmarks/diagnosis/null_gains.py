@@ -35,6 +35,7 @@ class Gained:
     """What was gained in such a log, that first which would be named."""
 
     place: float
+    """Its latitude."""
     greenhouse: str
     effects: dict[str, float]
     beginnings: dict[str, float]

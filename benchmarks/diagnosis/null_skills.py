@@ -35,6 +35,7 @@ class Told:
     """What unseen days tell of one log in which nothing is missing."""
 
     place: float
+    """Its latitude."""
     greenhouse: str
     group: str
     skills: dict[str, float]
