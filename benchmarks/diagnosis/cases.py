@@ -8,7 +8,8 @@ Tuning and scoring draw from disjoint seeds, and bend the truth with disjoint fo
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,18 +20,6 @@ from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
 
 SEASONS = {"winter": "2020-01-20", "spring": "2020-04-01", "autumn": "2020-10-05"}
 """First day of the log; the reference log of the calibration ends there."""
-SIZES = (0.3, 1.0, 3.0)
-SHARES = {
-    "nothing": 0.25,
-    "single": 0.27,
-    "sensor": 0.11,
-    "pair": 0.08,
-    "onset": 0.1,
-    "outside": 0.11,
-    "withheld": 0.08,
-}
-"""Of all cases."""
-SEEDS = {"tuning": 1000, "scoring": 26000}
 FORMS = {
     "tuning": ((1.0, 0.0, 0.0), (1.2, 0.0, 0.0), (1.0, 0.1, 0.0), (1.0, 0.0, 600.0), (0.85, 0.0, 300.0)),
     "scoring": (
@@ -60,7 +49,7 @@ class Case:
 
     name: str
     group: str
-    """nothing, single, sensor, pair, onset, outside, withheld or parameter."""
+    """nothing, noise, clean, single, onset, pair, outside or parameter."""
     greenhouse: str
     """Key of `greenhouses`."""
     seed: int
@@ -69,8 +58,6 @@ class Case:
     """ENR."""
     forms: tuple[tuple[float, float, float], ...] = ()
     onset_day: float | None = None
-    without: tuple[str, ...] = ()
-    """Taken out of the catalogue for this case."""
     heavy_tails: bool = False
     wrong_noise: bool = False
     """Disturbances twice as large, with six times the correlation time, than the calibration saw."""
@@ -78,61 +65,52 @@ class Case:
     """Parameter of the plant that is another since the calibration, of `CHANGES`."""
 
 
-def draw(kind: str, count: int, units: Mapping[str, Mapping[str, float]], seed: int | None = None) -> list[Case]:
-    """Draw a balanced list of cases: a quarter with nothing missing.
+def draw(
+    kind: str,
+    first: int,
+    count: int,
+    units: Mapping[str, Mapping[str, float]],
+    groups: Sequence[tuple[str, float, float]],
+) -> list[Case]:
+    """Draw cases.
 
     Args:
-        kind: ``tuning`` or ``scoring``.
+        kind: ``tuning`` or ``scoring``, of `FORMS`.
+        first: seed; each case's is a thousand and more on.
         count: about how many.
-        units: amplitude of ENR 1 of every cause, by greenhouse; its greenhouses are used.
-        seed: of the first case (None: the kind's).
+        units: amplitude of ENR 1 of every cause, by greenhouse, which take turns.
+        groups: name, ENR, and share of the cases.
     """
-    first = SEEDS[kind] if seed is None else seed
     rng = np.random.default_rng(first)
-    process = [name for name, effect in EFFECTS.items() if effect.kind == "process"]
-    sensor = [name for name, effect in EFFECTS.items() if effect.kind == "sensor"]
-    turns = {
-        "single": Turn(rng, process),
-        "sensor": Turn(rng, sensor),
-        "withheld": Turn(rng, process),
-        "outside": Turn(rng, list(UNCATALOGUED)),
-        "pair": Turn(rng, process),
-        "onset": Turn(rng, [*process, *sensor]),
-    }
-    greenhouses = list(units)
+    turn, beyond = Turn(rng, list(EFFECTS)), Turn(rng, list(UNCATALOGUED))
+    greenhouses = itertools.cycle(units)
+    changes = list(CHANGES)
     cases: list[Case] = []
-    for group, share in SHARES.items():
-        for index in range(max(1, round(share * count))):
-            greenhouse = greenhouses[index % len(greenhouses)]
+    for group, size, share in groups:
+        for place in range(max(1, round(share * count))):
+            greenhouse, number = next(greenhouses), len(cases)
             causes: tuple[str, ...] = ()
-            if group != "nothing":
-                causes = (turns[group].next(units[greenhouse], ()),)
+            if size:
+                causes = ((beyond if group == "outside" else turn).next(units[greenhouse], ()),)
             if group == "pair":
-                causes = (*causes, turns["single" if index % 2 else "sensor"].next(units[greenhouse], causes))
+                causes = (*causes, turn.next(units[greenhouse], causes))
             cases.append(
                 Case(
-                    name=f"{kind}-{group}-{index:03d}",
+                    name=f"{kind}-{group}-{number:03d}",
                     group=group,
                     greenhouse=greenhouse,
-                    seed=first + len(cases),
+                    seed=first + 1000 + number,
                     causes=causes,
-                    size=_size(group, index // len(greenhouses)),
+                    size=size,
                     forms=tuple(FORMS[kind][int(rng.integers(len(FORMS[kind])))] for _ in causes),
                     onset_day=float(rng.uniform(7.0, 20.0)) if group == "onset" else None,
-                    without=causes if group == "withheld" else (),
                     heavy_tails=bool(rng.random() < 0.5),
-                    wrong_noise=group == "nothing" and index % 4 == 3,
+                    wrong_noise=group == "noise",
+                    # In every greenhouse another each time round.
+                    changed=changes[(place + place // len(units)) % len(changes)] if group == "parameter" else "",
                 )
             )
     return cases
-
-
-def _size(group: str, turn: int) -> float:
-    if group == "nothing":
-        return 0.0
-    if group in {"single", "sensor"}:
-        return SIZES[turn % 3]
-    return (1.0, 3.0)[turn % 2] if group in {"outside", "withheld"} else 1.5
 
 
 def hidden(case: Case, unit: dict[str, float], start: np.datetime64) -> list[HiddenEffect]:

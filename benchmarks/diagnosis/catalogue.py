@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.diagnosis.cases import Case
+from benchmarks.diagnosis.figures import MATTERS
 from benchmarks.diagnosis.logs import Reference
 from benchmarks.diagnosis.nurseries import calibrated, calibration_logs, later_logs, nursery
-from benchmarks.diagnosis.same import MATTERS, judged
-from benchmarks.diagnosis.scoring import NOISE, Outcome, is_first
+from benchmarks.diagnosis.scoring import NOISE, Outcome, is_first, judged
 from benchmarks.jobs import Jobs
 from igrow.core.effects import EFFECTS
 from igrow.core.telemetry import Telemetry

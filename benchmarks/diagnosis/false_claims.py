@@ -16,8 +16,7 @@ from benchmarks.diagnosis.cases import SEASONS
 from benchmarks.diagnosis.makers import FOREIGN, OWN
 from benchmarks.diagnosis.null_logs import DAYS, unchanged
 from benchmarks.diagnosis.nurseries import Nursery, nurseries
-from benchmarks.diagnosis.same import judged
-from benchmarks.diagnosis.scoring import Outcome
+from benchmarks.diagnosis.scoring import Outcome, judged
 from benchmarks.jobs import Jobs
 
 SEEDS, FOREIGN_SEEDS = (260_000, 270_000), (280_000,)

@@ -7,15 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.diagnosis.cases import SEASONS
 from benchmarks.diagnosis.makers import Plant
 from igrow.core.greenhouse import GreenhouseParameters, generate_weather
 from igrow.core.greenhouse.weather import WeatherClimate
 from igrow.core.site import Crop, Greenhouse, Lamps, Site
 from igrow.core.telemetry import Telemetry
 
-OTHERS_SEED = 60_000
-"""Of other greenhouses that cases are drawn for."""
 OTHERS_SPREAD = 0.25
 """How far other greenhouses lie from the usual one in each of their parameters, relative."""
 STANDING = Crop(planting_date=datetime.date(2019, 11, 1))
@@ -37,16 +34,7 @@ class VirtualGreenhouse:
         return generate_weather(start, end, seed=seed, climate=WeatherClimate(self.site.latitude, self.site.longitude))
 
 
-def of_seasons() -> dict[str, VirtualGreenhouse]:
-    """Return the one greenhouse that most of the benchmark is about, by season."""
-    site = Site(name="benchmark", latitude=52.0, longitude=4.5, greenhouse=Greenhouse(mean_height=5.8), crop=STANDING)
-    return {
-        season: VirtualGreenhouse(site, GreenhouseParameters(), np.datetime64(f"{day}T00:00:00"), 77 + number)
-        for number, (season, day) in enumerate(SEASONS.items())
-    }
-
-
-def others(count: int, first: int = OTHERS_SEED) -> dict[str, VirtualGreenhouse]:
+def others(count: int, first: int) -> dict[str, VirtualGreenhouse]:
     """Draw other greenhouses: each a quarter off in every parameter, half of them unlit, at any time of the year.
 
     Args:

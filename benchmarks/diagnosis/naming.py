@@ -22,8 +22,3 @@ def is_same(name: str, cause: str) -> bool:
 def is_named(cause: str, told: Collection[str]) -> bool:
     """Tell whether one of the names that were told is right of a cause."""
     return any(is_same(name, cause) for name in told)
-
-
-def kind(name: str) -> str:
-    """Return whether a name is of a process or of a sensor; what a parameter of the model stands for is a process."""
-    return EFFECTS[name].kind if name in EFFECTS else "process"

@@ -1,18 +1,16 @@
-"""What a diagnosis got right in a case whose truth is known, and the table of all cases beside the bounds."""
+"""What a diagnosis got right in a case whose truth is known."""
 
 from __future__ import annotations
 
-import itertools
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from benchmarks.diagnosis.cases import CHANGES, Case, hidden
-from benchmarks.diagnosis.logs import Reference, moved
-from benchmarks.diagnosis.makers import Plant
-from benchmarks.diagnosis.naming import is_named, kind
+from benchmarks.diagnosis.logs import Reference
+from benchmarks.diagnosis.naming import is_named
 from igrow.core import sun
 from igrow.core.arrays import Floats
 from igrow.core.effects import EFFECTS
@@ -22,7 +20,7 @@ from igrow.core.site import Site
 from igrow.core.sun import unix_seconds
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import prepare_log
-from igrow.trainer.diagnosis import DEFAULT, diagnose
+from igrow.trainer.diagnosis import diagnose
 from igrow.trainer.diagnosis.answer.evidence import Evidence, errors_with
 from igrow.trainer.diagnosis.answer.result import Finding
 from igrow.trainer.diagnosis.design import linear, sensitivity
@@ -30,17 +28,10 @@ from igrow.trainer.diagnosis.design.design import Design
 from igrow.trainer.diagnosis.design.linear import Term
 from igrow.trainer.diagnosis.design.sensitivity import Linearisation
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
-from igrow.trainer.diagnosis.learned.null_gains import read_null_gains
 from igrow.trainer.diagnosis.search import change
 
 NOISE = {"air_temperature": 0.5, "air_humidity": 2.0, "air_co2": 35.0}
 """Scales under which errors of different quantities are added."""
-
-GAIN_CLASSES = (0.0, read_null_gains().least, 30.0, 100.0, float("inf"))
-"""Classes of the log-likelihood that is to be expected of a cause; gains below the second are not named."""
-
-PLANT_PARAMETERS = {name: parameter for parameter, (_, names) in CHANGES.items() for name in names}
-"""Of the model's parameters, those that stand for one of the plant's: whether these have changed is known."""
 
 
 @dataclass(frozen=True)
@@ -51,8 +42,6 @@ class Outcome:
     verdict: str
     found: tuple[str, ...]
     confounded: tuple[tuple[str, ...], ...]
-    true_changes: tuple[str, ...]
-    """Of what was found, the parameters that have changed as told."""
     relative_size: float | None
     """Estimate over truth of the first finding, where it is right: of the amplitude, which is not the same where the
     truth has another form, or another value of the nonlinear parameter beside it."""
@@ -81,27 +70,21 @@ class Outcome:
 def judged(job: tuple[Case, Telemetry, Reference]) -> Outcome:
     """Diagnose one case as one job."""
     case, telemetry, reference = job
-    return judge(case, telemetry, reference, moved(reference.greenhouse, case))
+    return judge(case, telemetry, reference)
 
 
-def judge(
-    case: Case,
-    telemetry: Telemetry,
-    reference: Reference,
-    plant: Plant,
-) -> Outcome:
+def judge(case: Case, telemetry: Telemetry, reference: Reference) -> Outcome:
     """Diagnose one case and compare with the truth.
 
     Args:
         case: the case.
         telemetry: its log.
-        reference: the greenhouse that its model was calibrated on.
-        plant: the greenhouse that the log is of.
+        reference: its greenhouse, and the model that it is asked by.
     """
     begun = time.perf_counter()
     site = reference.greenhouse.site
     log = prepare_log(telemetry, site)
-    diagnosis = diagnose(log, reference.model, without=case.without)
+    diagnosis = diagnose(log, reference.model)
     evidence = diagnosis.evidence
     seconds = time.perf_counter() - begun
     causes = [one for one in diagnosis.findings if one.effect in EFFECTS]
@@ -130,7 +113,6 @@ def judge(
         diagnosis.verdict,
         found,
         tuple(one.confounded for one in diagnosis.findings if one.kind in {"process", "sensor", "parameter"}),
-        true_changes(diagnosis.findings, reference.greenhouse.plant, plant),
         relative,
         flux,
         covered,
@@ -168,26 +150,6 @@ def relative_flux(line: Linearisation, told: Finding, true: HiddenEffect) -> flo
         channel, truly[row] = next(iter(added.items()))
     as_told = amount * sensitivity.unit_fluxes(line, effect, shape)[channel]
     return float(np.sqrt(np.mean(as_told[begun] ** 2) / max(np.mean(truly[begun] ** 2), 1e-300)))
-
-
-def true_changes(findings: Sequence[Finding], before: Plant, now: Plant) -> tuple[str, ...]:
-    """Return the parameters told to have changed of which the plant's has: as told more or less, and enough to be told.
-
-    Args:
-        findings: of a diagnosis.
-        before: the greenhouse that its model was calibrated on.
-        now: the greenhouse that its log is of.
-    """
-
-    def has_changed(one: Finding) -> bool:
-        if one.kind != "parameter" or one.effect not in PLANT_PARAMETERS:
-            return False
-        name = PLANT_PARAMETERS[one.effect]
-        share = float(np.mean(getattr(now, name) / np.asarray(getattr(before, name)))) - 1.0
-        told = one.parameters["change"].value
-        return share * told > 0.0 and abs(share) >= DEFAULT.least_leading_change
-
-    return tuple(one.effect for one in findings if has_changed(one))
 
 
 def expected_gains(design: Design, case: Case, truth: Mapping[str, HiddenEffect]) -> tuple[float | None, float | None]:
@@ -240,14 +202,6 @@ def _perfect(evidence: Evidence, truth: Mapping[str, HiddenEffect], site: Site) 
     return sum(error / NOISE[name] for name, error in errors_with(evidence, terms, added).items())
 
 
-def _share(chosen: Sequence[Outcome], right: Callable[[Outcome], bool]) -> tuple[float, int]:
-    return (float(np.mean([right(one) for one in chosen])) if chosen else float("nan")), len(chosen)
-
-
-def _group(outcomes: Sequence[Outcome], *groups: str, size: float | None = None) -> list[Outcome]:
-    return [one for one in outcomes if one.case.group in groups and (size is None or one.case.size == size)]
-
-
 def is_first(one: Outcome) -> bool:
     """Tell whether the first name is right of a true cause, or of a parameter that has changed."""
     if one.case.changed:
@@ -258,124 +212,3 @@ def is_first(one: Outcome) -> bool:
 def has_all(one: Outcome) -> bool:
     """Tell whether every true cause is named."""
     return all(is_named(cause, one.found) for cause in one.case.causes)
-
-
-def _is_false(one: Outcome) -> bool:
-    """Tell whether something was told of a log in which nothing is missing that is not so.
-
-    The greenhouse of a log is not quite that of the calibration: that a parameter has changed may be true.
-    """
-    return one.verdict != "nothing" and (not one.found or set(one.found) != set(one.true_changes))
-
-
-def _gain_between(outcomes: Sequence[Outcome], low: float, high: float) -> list[Outcome]:
-    return [one for one in outcomes if one.expected_gain is not None and low <= one.expected_gain < high]
-
-
-def _claims(outcomes: Sequence[Outcome]) -> list[Outcome]:
-    return [one for one in _group(outcomes, "single", "sensor", "onset") if one.confounded]
-
-
-def _recovered(outcomes: Sequence[Outcome]) -> tuple[float, int]:
-    """Return the share of what a perfect correction removes beyond recalibration, summed over cases."""
-    gain = sum(one.recalibrated - one.corrected for one in outcomes)
-    possible = sum(max(one.recalibrated - one.perfect, 0.0) for one in outcomes)
-    return (gain / possible if possible > 0.0 else float("nan")), len(outcomes)
-
-
-def table(outcomes: Sequence[Outcome]) -> list[tuple[str, float, int, str]]:
-    """Return rows (what, figure, cases, bound of the issue at 28 days [84 days])."""
-    outside = _group(outcomes, "outside", "withheld")
-    beyond = _group(outcomes, "outside")
-    sizes = [abs(one.relative_size - 1.0) for one in outcomes if one.relative_size is not None]
-    covered = [one.covered for one in outcomes if one.covered is not None]
-    claims = _claims(outcomes)
-    alone = _group(outcomes, "single", "sensor")
-    expected = {
-        size: [one.expected_gain for one in alone if one.case.size == size and one.expected_gain is not None]
-        for size in (1.0, 0.3)
-    }
-    known = {
-        size: [one.known_gain for one in alone if one.case.size == size and one.known_gain is not None]
-        for size in (1.0, 0.3)
-    }
-    return [
-        (
-            "false claims on nothing",
-            *_share(_group(outcomes, "nothing"), _is_false),
-            "<= .02 [.05]",
-        ),
-        (
-            "a parameter's change told on nothing, and true",
-            *_share(_group(outcomes, "nothing"), lambda o: bool(o.true_changes)),
-            "-",
-        ),
-        ("right cause first, ENR 3", *_share(_group(outcomes, "single", "sensor", size=3.0), is_first), "-"),
-        ("right cause first, ENR 1", *_share(_group(outcomes, "single", "sensor", size=1.0), is_first), ">= .95"),
-        ("right cause first, ENR 0.3", *_share(_group(outcomes, "single", "sensor", size=0.3), is_first), ">= .85"),
-        *(
-            (
-                f"right cause first, expected gain {low:g} to {high:g}",
-                *_share(_gain_between(alone, low, high), is_first),
-                "-",
-            )
-            for low, high in itertools.pairwise(GAIN_CLASSES)
-        ),
-        ("right cause first, where something was claimed", *_share(claims, is_first), "-"),
-        *(
-            (f"  expected gain of ENR {size:g}, {what}median", float(np.median(values)), len(values), "-")
-            for what, sizes_of in (("", expected), ("parameters known, ", known))
-            for size, values in sizes_of.items()
-            if values
-        ),
-        (
-            "process and sensor told apart, of claims",
-            *_share(claims, lambda o: kind(o.found[0]) == kind(o.case.causes[0])),
-            ">= .97",
-        ),
-        (
-            "true cause in the set of confounded, of claims",
-            *_share(claims, lambda o: is_named(o.case.causes[0], o.confounded[0])),
-            ">= .97",
-        ),
-        (
-            "mean size of the set of confounded",
-            float(np.mean([len(one.confounded[0]) for one in claims])) if claims else float("nan"),
-            len(claims),
-            "<= 1.5",
-        ),
-        (
-            "share of the recoverable error recovered",
-            *_recovered(_group(outcomes, "single", "sensor", "onset", "pair")),
-            ">= .90",
-        ),
-        ("size, median relative error", float(np.median(sizes)) if sizes else float("nan"), len(sizes), "<= .10"),
-        ("90 % intervals that cover", float(np.mean(covered)) if covered else float("nan"), len(covered), ".85 to .95"),
-        (
-            "both of a pair",
-            *_share(_group(outcomes, "pair"), has_all),
-            ">= .80 [.90]",
-        ),
-        (
-            "onset within 2 days, where the cause was found",
-            *_share([o for o in outcomes if o.onset_error is not None], lambda o: (o.onset_error or 0.0) <= 2.0),
-            ">= .95",
-        ),
-        ("outside: confident wrong name", *_share(beyond, lambda o: o.verdict == "named"), "<= .10"),
-        ("outside: silence", *_share(beyond, lambda o: o.verdict == "nothing"), "<= .10"),
-        (
-            "withheld: confident wrong name",
-            *_share(_group(outcomes, "withheld"), lambda o: o.verdict == "named"),
-            "<= .10",
-        ),
-        ("withheld: silence", *_share(_group(outcomes, "withheld"), lambda o: o.verdict == "nothing"), "<= .10"),
-        ("outside and withheld: recoverable error recovered", *_recovered(outside), ">= .60"),
-        ("seconds a case, largest", max(one.seconds for one in outcomes), len(outcomes), "<= 60 (84 days, 2 cores)"),
-    ]
-
-
-def show(rows: Sequence[tuple[str, float, int, str]]) -> str:
-    """Return the table as text."""
-    lines = [f"{'':62} {'figure':>8} {'cases':>6}  bound"]
-    lines += [f"{what:62} {figure:8.2f} {count:6d}  {bound}" for what, figure, count, bound in rows]
-    return "\n".join(lines)

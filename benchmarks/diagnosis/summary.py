@@ -17,6 +17,7 @@ COLUMNS = {
     "same": "a virtual greenhouse some weeks after its calibration, as far off as greenhouses drift",
     "in turn": "one such greenhouse, every cause of the catalogue in it in turn, begun a week after the calibration",
     "structure": "the same of greenhouses of another structure than the model's",
+    "neighbour's": "by the model of another greenhouse, 8 % off in every parameter",
     "built-in": "by the built-in bundle: of the greenhouse only the site's file is known",
     "real": "faults put into five real logs, and columns withheld from them",
 }
@@ -24,11 +25,14 @@ PAGES = {
     "same": "diagnosis-same",
     "in turn": "diagnosis-catalogue",
     "structure": "diagnosis-foreign",
+    "neighbour's": "diagnosis-transferred",
     "built-in": "diagnosis-transferred",
     "real": "diagnosis-real-faults",
 }
 """On which each column's figures stand, but those that name another."""
-WIDTH = 15
+SECOND = "built-in"
+"""The column that stands on its page behind another's."""
+WIDTH = 14
 
 
 @dataclass(frozen=True)
@@ -74,35 +78,30 @@ class Question:
     def figure(self, column: str) -> Figure | None:
         """Return the figure that answers it in a column, None where none does."""
         answer = self.answers.get(column)
-        return Figure(PAGES[column], answer) if isinstance(answer, str) else answer
+        if not isinstance(answer, str):
+            return answer
+        first = 2 if column == SECOND else 0
+        return Figure(PAGES[column], answer, first, first + 1)
 
 
 def _virtual(label: str) -> dict[str, str | Figure]:
-    """Return answers of virtual greenhouses of both structures, whose pages are of one command."""
-    return {"same": label, "structure": label}
+    """Return answers of virtual greenhouses, whose pages have the same lines."""
+    return dict.fromkeys(("same", "structure", "neighbour's", "built-in"), label)
 
 
 QUESTIONS = (
     Question(
         "told something, nothing missing",
         "<= .02",
-        {
+        _virtual("false claims, nothing missing")
+        | {
             "same": Figure("diagnosis-false-claims", "all", value=2),
             "structure": Figure("diagnosis-false-claims-foreign", "all", value=2),
-            "built-in": "false claims on nothing",
         },
     ),
     Question("named first, thrice the noise", "-", _virtual("right cause first, ENR 3")),
-    Question(
-        "named first, as large as the noise",
-        ">= .80",
-        _virtual("right cause first, ENR 1") | {"built-in": "right cause first, ENR 1"},
-    ),
-    Question(
-        "named first, a third of the noise",
-        ">= .35",
-        _virtual("right cause first, ENR 0.3") | {"built-in": "right cause first, ENR 0.3"},
-    ),
+    Question("named first, as large as the noise", ">= .80", _virtual("right cause first, ENR 1")),
+    Question("named first, a third of the noise", ">= .35", _virtual("right cause first, ENR 0.3")),
     Question(
         "named first, where recalibration errs more",
         "-",
@@ -116,13 +115,9 @@ QUESTIONS = (
         "right, where a name is given",
         ">= .95",
         _virtual("right cause first, where a name was given")
-        | {
-            "in turn": "right, where a name is given",
-            "built-in": "right cause first, where something was claimed",
-            "real": "right, where a name is given",
-        },
+        | dict.fromkeys(("in turn", "real"), "right, where a name is given"),
     ),
-    Question("both of a pair", ">= .45", _virtual("both of a pair") | {"built-in": "both of a pair"}),
+    Question("both of a pair", ">= .45", _virtual("both of a pair")),
     Question("size, median relative error", "<= .10", dict.fromkeys(PAGES, "size, median relative error")),
     Question(
         "90 % intervals that cover",
@@ -133,29 +128,22 @@ QUESTIONS = (
         "beginning within 2 days",
         ">= .90",
         _virtual("beginning within 2 days, where found")
-        | {
-            "in turn": "beginning within 2 days, where found",
-            "built-in": "onset within 2 days, where the cause was found",
-            "real": "beginning within 2 days",
-        },
+        | {"in turn": "beginning within 2 days, where found", "real": "beginning within 2 days"},
     ),
     Question(
         "not in the catalogue: a wrong name",
         "<= .05",
-        _virtual("outside the catalogue: wrong name")
-        | {"built-in": "outside: confident wrong name", "real": "no cause of the catalogue: a name all the same"},
+        _virtual("outside the catalogue: wrong name") | {"real": "no cause of the catalogue: a name all the same"},
     ),
     Question(
         "not in the catalogue: silence",
         "<= .30",
-        _virtual("outside the catalogue: silence")
-        | {"built-in": "outside: silence", "real": "no cause of the catalogue: silence"},
+        _virtual("outside the catalogue: silence") | {"real": "no cause of the catalogue: silence"},
     ),
     Question(
         "recoverable error recovered",
         ">= .85",
-        _virtual("recoverable error recovered")
-        | {"in turn": "recoverable error recovered", "built-in": "share of the recoverable error recovered"},
+        _virtual("recoverable error recovered") | {"in turn": "recoverable error recovered"},
     ),
     Question(
         "a withheld column traced, where it matters",

@@ -20,7 +20,7 @@ def outcome(cause: str, *found: str, corrected: float = 1.2) -> Outcome:
     (case,) = [one for one in cases("winter", "one") if one.causes == ((cause,) if cause else ())]
     right = found[:1] == (cause,)
     return Outcome(
-        case, "named" if found else "nothing", found, (found,) if found else (), (),
+        case, "named" if found else "nothing", found, (found,) if found else (),
         relative_size=1.2 if right else None, relative_flux=None, covered=None, half_width=None,
         onset_error=0.5 if right else None, deployed=3.0, recalibrated=2.0, corrected=corrected, perfect=1.0,
         expected_gain=None, known_gain=None, seconds=1.0,

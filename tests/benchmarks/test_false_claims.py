@@ -12,7 +12,7 @@ from benchmarks.diagnosis.scoring import Outcome
 from benchmarks.results import RESULTS
 
 QUIET = Outcome(
-    Case("winter-0-0", "nothing", "one", 1), "nothing", (), (), (),
+    Case("winter-0-0", "nothing", "one", 1), "nothing", (), (),
     relative_size=None, relative_flux=None, covered=None, half_width=None, onset_error=None, deployed=2.0,
     recalibrated=2.0, corrected=2.0, perfect=2.0, expected_gain=None, known_gain=None, seconds=1.0,
 )  # fmt: skip

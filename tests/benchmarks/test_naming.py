@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.diagnosis.naming import is_named, is_same, kind
+from benchmarks.diagnosis.naming import is_named, is_same
 
 
 @pytest.mark.parametrize(
@@ -28,7 +28,3 @@ def test_a_cause_is_named_wherever_its_name_stands() -> None:
     assert is_named("wind_infiltration", ("humidity_offset", "leakage_wind"))
     assert not is_named("wind_infiltration", ("humidity_offset",))
     assert not is_named("wind_infiltration", ())
-
-
-def test_what_a_parameter_stands_for_is_a_process() -> None:
-    assert (kind("vent_stack"), kind("screen_gap"), kind("humidity_offset")) == ("process", "process", "sensor")
