@@ -196,6 +196,7 @@ def show() -> int:
     """Print the summary."""
     print("\n".join(table()))
     print("\nthe noise: the error that stays though nothing is missing; beside each figure the number of cases\n")
+    wide = max(map(len, COLUMNS))
     for name, about in COLUMNS.items():
-        print(f"{name:10} {about}\n{'':10} ({', '.join(pages(name))})")
+        print(f"{name:{wide}} {about}\n{'':{wide}} ({', '.join(pages(name))})")
     return 0
