@@ -10,6 +10,8 @@ import pytest
 
 from benchmarks.plausibility import SPOILS, Clean, Spoil, false_alarms, real_logs
 from igrow.core import sun
+from igrow.core.greenhouse import generate_weather
+from igrow.core.greenhouse.weather import WeatherClimate
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry, to_grid
 from igrow.core.yaml_schema import parse
@@ -242,3 +244,16 @@ def test_real_logs_raise_no_alarm(data_folder: Path) -> None:
     logs = [log for log in real_logs(data_folder) if "from" not in log.name or "28 days" in log.name]
     assert len(logs) > 15
     assert false_alarms(logs) == []
+
+
+def test_clouds_about_a_change_of_clocks_are_no_jump_of_noon() -> None:
+    """Mornings of one week and afternoons of the next were clear: by its radiation noon came .7 h later."""
+    place = WeatherClimate(latitude=43.6, longitude=6.0)
+    weather = generate_weather(np.datetime64("2020-08-24"), np.datetime64("2020-09-20"), seed=284002, climate=place)
+    elsewhere = Site(name="elsewhere", latitude=43.6, longitude=6.0)
+    for step in (300, 3600):
+        assert against_the_sun(to_grid(weather, step), elsewhere) == []
+        late = weather.time >= np.datetime64("2020-09-06T04:00:00")
+        time = weather.time + np.where(late, 3600, 0).astype("timedelta64[s]")
+        jumped = to_grid(merge(time, weather.columns).telemetry, step)
+        assert [fault.kind for fault in against_the_sun(jumped, elsewhere)] == ["local_time"]

@@ -1,8 +1,9 @@
 """Radiation against the sun over the site: the clock, the unit, and sums that were taken for rates.
 
 The sun keeps the best clock of all. The mean solar hour of the radiation, weighted by the radiation, is noon to within
-a quarter of an hour over a fortnight, whatever the weather; and what reaches the ground is 0.5 to 0.8 of what would
-without air, whenever the sky is clear.
+a quarter of an hour over a fortnight, whatever the weather; halfway between first and last light it is noon on every
+single day, under clouds too, but for hills and chimneys, which are the same the day after; and what reaches the ground
+is 0.5 to 0.8 of what would without air, whenever the sky is clear.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from igrow.core import sun
-from igrow.core.arrays import Floats, Integers, Mask, Times
+from igrow.core.arrays import Floats, Integers, Times
 from igrow.core.local_time import from_local, to_local
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
@@ -46,6 +47,8 @@ CLEAR = 0.8
 _DULL = "or these weeks were dull, which `--accept radiation_unit` passes"
 _WINDOW = 12
 """Days on either side of a change of clocks."""
+_LIT = 0.05
+"""Of the brightest moments, over the darkness of night, from which on it is light."""
 _ZONES = ("Europe/Amsterdam", "America/New_York", "Australia/Sydney", "America/Santiago")
 """Whose changes of clocks are looked for where a site does not tell its zone."""
 
@@ -63,17 +66,15 @@ class _Daylight:
     length: Floats
     """Of the mean vector of what would come without air, (d,)."""
 
-    def offset(self, chosen: Mask | None = None) -> float:
-        """Return the hours by which noon comes late by the log's clock, -12 to 12; of the days `chosen`, (d,)."""
-        vector = self.vector if chosen is None else self.vector[chosen]
-        return float(np.angle(-vector.sum()) * 12.0 / np.pi)
+    def offset(self) -> float:
+        """Return the hours by which noon comes late by the log's clock, -12 to 12."""
+        return float(np.angle(-self.vector.sum()) * 12.0 / np.pi)
 
-    def error(self, chosen: Mask | None = None) -> float:
-        """Return the standard error of the offset over days `chosen`, (d,), weighted as the offset is."""
-        vector = self.vector if chosen is None else self.vector[chosen]
-        whole = vector.sum()
-        across = np.angle(vector / (whole / abs(whole))) * 12.0 / np.pi
-        weight = np.abs(vector) / np.abs(vector).sum()
+    def error(self) -> float:
+        """Return the standard error of the offset over days, weighted as the offset is."""
+        whole = self.vector.sum()
+        across = np.angle(self.vector / (whole / abs(whole))) * 12.0 / np.pi
+        weight = np.abs(self.vector) / np.abs(self.vector).sum()
         return float(np.sqrt((weight**2 * across**2).sum()))
 
 
@@ -135,7 +136,7 @@ def _clock(telemetry: Telemetry, daylight: _Daylight, site: Site) -> DataFault |
         seen = "global_radiation does not follow the sun: as much of it comes by night as by day"
         mend = "its column is another quantity, or day and month of the dates are exchanged"
         return DataFault("no_daylight", "global_radiation", seen, mend)
-    jump = _change_of_clocks(telemetry, daylight, site)
+    jump = _change_of_clocks(telemetry, site)
     if jump is not None:
         return jump
     offset = daylight.offset()
@@ -167,21 +168,50 @@ def _fits_as_wall_time(telemetry: Telemetry, site: Site) -> bool:
     return len(daylight.day) >= LEAST_DAYS and abs(daylight.offset()) < limit
 
 
-def _change_of_clocks(telemetry: Telemetry, daylight: _Daylight, site: Site) -> DataFault | None:
+def _change_of_clocks(telemetry: Telemetry, site: Site) -> DataFault | None:
     """Return the fault of a log whose noon jumps by an hour on the day on which clocks change."""
-    for zone in (site.time_zone,) if site.time_zone != "UTC" else _ZONES:
-        for day in _changes(telemetry.time, zone):
-            before = (daylight.day >= day - _WINDOW) & (daylight.day < day)
-            after = (daylight.day > day) & (daylight.day <= day + _WINDOW)
-            if min(before.sum(), after.sum()) < LEAST_DAYS:
-                continue
-            jump = daylight.offset(after) - daylight.offset(before)
-            error = ERRORS * float(np.hypot(daylight.error(after), daylight.error(before)))
-            if max(JUMP[0], error) <= abs(jump) <= JUMP[1]:
-                date = np.datetime64(int(day), "D")
-                seen = f"noon jumps by {jump:+.1f} h on {date}, when clocks change in {zone}"
-                return DataFault("local_time", "", seen, _name_zone(zone))
+    zones = (site.time_zone,) if site.time_zone != "UTC" else _ZONES
+    changes = [(zone, day) for zone in zones for day in _changes(telemetry.time, zone)]
+    if not changes:
+        return None
+    days, noon = _noon_by_light(telemetry.time, telemetry["global_radiation"], site)
+    for zone, day in changes:
+        before, after = noon[(days >= day - _WINDOW) & (days < day)], noon[(days > day) & (days <= day + _WINDOW)]
+        if min(len(before), len(after)) < LEAST_DAYS:
+            continue
+        jump = float(after.mean() - before.mean())
+        error = ERRORS * float(np.hypot(*(np.std(one, ddof=1) / np.sqrt(len(one)) for one in (before, after))))
+        if max(JUMP[0], error) <= abs(jump) <= JUMP[1]:
+            date = np.datetime64(int(day), "D")
+            seen = f"noon jumps by {jump:+.1f} h on {date}, when clocks change in {zone}"
+            return DataFault("local_time", "", seen, _name_zone(zone))
     return None
+
+
+def _noon_by_light(time: Times, values: Floats, site: Site) -> tuple[Integers, Floats]:
+    """Return the days of which nine tenths were read, from 1970, and the hour halfway between first and last light."""
+    hour, day = sun.solar_hour(time, site.latitude, site.longitude), sun.solar_day(time, site.longitude)
+    step = own_step(time) / 3600.0
+    known = np.isfinite(values)
+    # An hour off by the log's clock, these hours are night all the same.
+    night = values[known & ((hour < 3.0) | (hour > 21.0))]
+    dark = float(np.quantile(night, 0.99)) if len(night) else float(np.nanmin(values))
+    lit = dark + _LIT * (float(np.quantile(values[known], 0.98)) - dark)
+    found: list[tuple[int, float]] = []
+    for rows in np.split(np.arange(len(time)), np.flatnonzero(np.diff(day)) + 1):
+        light, hours = np.where(known[rows], values[rows], dark), hour[rows]
+        bright = np.flatnonzero(light > lit)
+        if known[rows].sum() < 0.9 * 24.0 / step or len(bright) == 0:
+            continue
+        first, last = int(bright[0]), int(bright[-1])
+        begins, ends = float(hours[first]), float(hours[last])
+        # Between two rows, so that hourly ones tell it as well.
+        if first > 0:
+            begins -= step * float((light[first] - lit) / (light[first] - light[first - 1]))
+        if last < len(light) - 1:
+            ends += step * float((light[last] - lit) / (light[last] - light[last + 1]))
+        found.append((int(day[rows[0]]), 0.5 * (begins + ends)))
+    return np.array([one for one, _ in found], dtype=np.int64), np.array([noon for _, noon in found])
 
 
 def _changes(time: Times, zone: str) -> list[int]:
