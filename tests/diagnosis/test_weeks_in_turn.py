@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from igrow.core.errors import IgrowError
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import Log, prepare_log
 from igrow.trainer.diagnosis import DEFAULT, Diagnosis, Finding, diagnose
@@ -15,6 +16,7 @@ from igrow.trainer.diagnosis.answer import wording
 from igrow.trainer.diagnosis.answer.answers import Answer
 from igrow.trainer.diagnosis.design import amplitudes, linear
 from igrow.trainer.diagnosis.design.freerun import log_days
+from igrow.trainer.diagnosis.diagnosed_days import weeks_in_turn, well_read
 from igrow.trainer.diagnosis.knowledge import PARAMETER_PREFIX, knowledge_of
 from igrow.trainer.diagnosis.search import history
 from igrow.trainer.diagnosis.search.rounds import search_of
@@ -24,6 +26,7 @@ from tests.virtual_log import SITE
 
 IN_PARTS = replace(DEFAULT, long_days=11.5)
 """Two parts of the twenty days after the calibration."""
+AIR = ("air_temperature", "air_humidity", "air_co2")
 module = sys.modules[diagnose.__module__]
 
 
@@ -114,6 +117,35 @@ def test_which_part_is_told(
     )
     assert [one.effect for one in found.findings] == [told] * bool(told)
     assert found.notes[-1] == note
+
+
+def test_weeks_in_which_the_air_was_not_read_are_left_out(known_weeks: Telemetry) -> None:
+    def unread(begin: int, end: int | None) -> Telemetry:
+        since = (known_weeks.time - known_weeks.time[0]) / np.timedelta64(1, "D")
+        dead = (since >= begin) & (since < (np.inf if end is None else end))
+        return known_weeks.with_columns({"air_temperature": np.where(dead, np.nan, known_weeks["air_temperature"])})
+
+    def parts(telemetry: Telemetry) -> list[Log]:
+        return weeks_in_turn(prepare_log(telemetry, SITE), replace(DEFAULT, long_days=16.0))
+
+    every = parts(known_weeks)
+    assert well_read(every) == (every, ())
+    for begin, end, left in ((14, 30, [0, 2]), (8, None, [0]), (0, 18, [1, 2])):
+        own = parts(unread(begin, end))
+        read, notes = well_read(own)
+        assert [one.telemetry.time[0] for one in read] == [every[one].telemetry.time[0] for one in left]
+        assert notes == (wording.UNREAD,)
+    with pytest.raises(IgrowError, match=r"air_temperature has readings in half of the hours on 0 days.*needs 5"):
+        well_read(parts(unread(3, None))[1:])
+
+
+@pytest.mark.slow
+def test_a_sensor_that_died_is_no_end_of_a_diagnosis(known_weeks: Telemetry, known_model: FittedModel) -> None:
+    """Of a long log a whole part may be without readings."""
+    dead = known_weeks.with_columns({name: np.full(len(known_weeks), np.nan) for name in AIR})
+    told = diagnose(later(known_weeks, dead, begins=10), known_model, rules=IN_PARTS)
+    assert wording.UNREAD in told.notes
+    assert told.end <= known_weeks.time[0] + np.timedelta64(KNOWN + 10, "D")
 
 
 def diagnosis_of(effect: str, log: Log, model: FittedModel) -> Diagnosis:

@@ -27,7 +27,7 @@ from igrow.trainer.diagnosis.answer.result import Diagnosis, Finding, Verdict
 from igrow.trainer.diagnosis.circumstances import Circumstances, circumstances_of
 from igrow.trainer.diagnosis.crop import of_one_crop
 from igrow.trainer.diagnosis.design.candidates import hidden_by_missing_weather
-from igrow.trainer.diagnosis.diagnosed_days import since_calibration, weeks_in_turn
+from igrow.trainer.diagnosis.diagnosed_days import since_calibration, weeks_in_turn, well_read
 from igrow.trainer.diagnosis.knowledge import ActiveTerm
 from igrow.trainer.diagnosis.learned.null_gains import NullGains
 from igrow.trainer.diagnosis.rules import DEFAULT, DecisionRules
@@ -110,7 +110,7 @@ class _Question:
         """Return the diagnosis of a log: of a long one its weeks in turn, each by what those before it have told."""
         since, notes = since_calibration(log, self.model, self.rules)
         since, left_out = of_one_crop(since, self.rules)
-        first, *later = weeks_in_turn(since, self.rules)
+        (first, *later), unread = well_read(weeks_in_turn(since, self.rules))
         told = latest = self.answer(first)
         for number, weeks in enumerate(later, 2):
             self.progress(f"part {number} of {len(later) + 1}")
@@ -119,7 +119,7 @@ class _Question:
             if bears_out(latest, told, self.rules):
                 told = latest
         beside = (wording.IN_TURN if told is latest else wording.EARLIER,) if later else ()
-        return replace(told.diagnosis, notes=(*notes, *left_out, *told.diagnosis.notes, *beside))
+        return replace(told.diagnosis, notes=(*notes, *left_out, *unread, *told.diagnosis.notes, *beside))
 
     def answer(
         self,

@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
+from igrow.core.errors import IgrowError
 from igrow.trainer.data.log import Log
+from igrow.trainer.data.plausibility.order import LEAST_DAYS, days_read
+from igrow.trainer.data.screening import NEEDED
+from igrow.trainer.diagnosis.answer import wording
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.fit.model import FittedModel
 from igrow.trainer.fit.unseen_days import unseen
@@ -35,3 +40,25 @@ def weeks_in_turn(log: Log, rules: DecisionRules) -> list[Log]:
     start, end = log.telemetry.time[0], log.telemetry.time[-1]
     ends = [start + (end - start) * part // count for part in range(1, count)]
     return [log.select(begin, until) for begin, until in zip([None, *ends], [*ends, None], strict=True)]
+
+
+def well_read(parts: Sequence[Log]) -> tuple[list[Log], tuple[str, ...]]:
+    """Return the parts that show as much as a log of its own must, with a note where others are left out.
+
+    Raises:
+        IgrowError: none does.
+    """
+    read = [one for one in parts if min(_days_read(one).values()) >= LEAST_DAYS]
+    if not read:
+        first = parts[0]
+        name, days = min(_days_read(first).items(), key=lambda one: one[1])
+        since = str(first.telemetry.time[0].astype("datetime64[m]")).replace("T", " ")
+        raise IgrowError(
+            f"{first.name}: since {since} UTC {name} has readings in half of the hours on {days} days: a diagnosis "
+            f"needs {LEAST_DAYS} in any six weeks"
+        )
+    return read, (wording.UNREAD,) if len(read) < len(parts) else ()
+
+
+def _days_read(log: Log) -> dict[str, int]:
+    return {name: days_read(log.telemetry, name) for name in NEEDED}

@@ -17,6 +17,15 @@ LEAST_CORRELATION = 0.3
 _LEAST_ROWS = 100
 
 
+def days_read(telemetry: Telemetry, name: str) -> int:
+    """Return on how many days a quantity has readings in half of the hours."""
+    if name not in telemetry:
+        return 0
+    hours = np.unique(telemetry.time.astype("datetime64[h]")[np.isfinite(telemetry[name])])
+    _, count = np.unique(hours.astype("datetime64[D]"), return_counts=True)
+    return int((count >= 12).sum())
+
+
 def sparse(telemetry: Telemetry) -> DataFault | None:
     """Tell whether the rows, or the readings in them, lie too far apart for any model."""
     step = own_step(telemetry.time)
@@ -24,15 +33,12 @@ def sparse(telemetry: Telemetry) -> DataFault | None:
     if not step <= HOUR:
         pace = f"a row every {step / HOUR:.3g} h" if step > 0.0 else "a single row"
         return DataFault("sparse", "", f"{pace} is too sparse for any model", mend)
-    hours = telemetry.time.astype("datetime64[h]")
     days = np.unique(telemetry.time.astype("datetime64[D]"))
     for name in NEEDED:
-        if name not in telemetry:
+        if name not in telemetry or not np.isfinite(telemetry[name]).any():
             continue
-        known = np.unique(hours[np.isfinite(telemetry[name])])
-        there, count = np.unique(known.astype("datetime64[D]"), return_counts=True)
-        whole = int((count >= 12).sum())
-        if len(there) and len(days) > LEAST_DAYS and whole < LEAST_DAYS:
+        whole = days_read(telemetry, name)
+        if len(days) > LEAST_DAYS and whole < LEAST_DAYS:
             seen = f"{name} has readings in half of the hours on {whole} of {len(days)} days only"
             return DataFault("sparse", name, f"{seen}, too sparse for any model", mend)
     return None

@@ -30,6 +30,7 @@ EARLIER = N_(
     "Within more than six weeks a crop changes: they were asked part by part, the oldest first. The newest part does "
     "not tell again what an earlier one has told: look whether it is still so. The errors are of the earlier part."
 )
+UNREAD = N_("In some of these weeks air or outdoor temperature was hardly read: nothing is told of them.")
 WAITING = N_("Something began less than a week ago: what it is, a later log tells.")
 NEW_CROP = N_(
     "A new crop was planted since the calibration: what it does otherwise cannot be told from a fault, so that none is "
