@@ -160,7 +160,8 @@ class Plant:
         conductance = canopy.vapour_conductance(p, area, stomata)
         fixed = canopy.photosynthesis(xp, p, light.par_absorbed, ppm, leaf, area)
         fixed = fixed * tomato.assimilation_share(xp, s.crop) * (0.3 + 0.7 * stress)
-        uptake = 0.04401 * fixed + added.get("assimilation", zero)
+        # A crop assimilates nothing at the least, whatever is hidden in it.
+        uptake = xp.maximum(0.04401 * fixed + added.get("assimilation", zero), zero)
         respired = tomato.CO2_PER_CARBOHYDRATE * s.respiration
 
         heat, vapour, co2 = s.disturbance

@@ -121,3 +121,14 @@ def test_an_unknown_effect_or_shape_is_refused_by_name() -> None:
 def test_at_least_six_causes_are_not_in_the_catalogue() -> None:
     assert len(UNCATALOGUED) >= 6
     assert not set(UNCATALOGUED) & set(EFFECTS)
+
+
+def test_a_crop_that_has_lost_all_its_assimilation_loses_no_more(spring: Telemetry) -> None:
+    """Two hundred per cent less would be CO2 that it gives off, more of it the more there is, without an end."""
+    decline = HiddenEffect("photosynthesis_decline", 2.0, SPRING - hours(24 * 100), exponent=1.3)
+    (season,) = simulate_many(
+        GreenhouseParameters(), spring, recipe, SPRING, SPRING + hours(22), count=1, seed=1, effects=[decline],
+        disturbances=QUIET, sensors=EXACT,
+    )  # fmt: skip
+    assert all(np.isfinite(values).all() for values in season.measured.columns.values())
+    assert 300.0 < season.measured["air_co2"].min() < season.measured["air_co2"].max() < 3000.0
