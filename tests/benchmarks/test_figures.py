@@ -14,7 +14,8 @@ from benchmarks.diagnosis.figures import Row
 from benchmarks.diagnosis.greenhouses import others
 from benchmarks.diagnosis.logs import Reference
 from benchmarks.diagnosis.scoring import Outcome
-from benchmarks.diagnosis.transferred import MODELS, by_each
+from benchmarks.diagnosis.transferred import CASES_SEED, MODELS, SEED, by_each
+from benchmarks.results import RESULTS
 from igrow.core.greenhouse import generate_weather
 from igrow.trainer.diagnosis import DEFAULT
 from igrow.trainer.diagnosis.knowledge import knowledge_of
@@ -78,3 +79,7 @@ def test_a_neighbours_model_and_the_built_in_bundle_are_models_of_another_greenh
     for _, _, one in asked.values():
         assert knowledge_of(one.model, one.greenhouse.site, DEFAULT).transferred
     assert knowledge_of(model, greenhouse.site, DEFAULT).transferred is False
+
+
+def test_the_page_says_the_seeds_that_are_drawn() -> None:
+    assert RESULTS["diagnosis-transferred"].seeds == f"{SEED} and on; cases from {CASES_SEED}"

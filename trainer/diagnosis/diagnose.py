@@ -79,7 +79,7 @@ def diagnose(
         progress: is told what is being done, in lines.
 
     Raises:
-        IgrowError: the log is shorter than a week, or lacks outdoor or air temperature.
+        IgrowError: the log is shorter than a week, or lacks outdoor or air temperature, or hardly has readings of it.
     """
     must_be(Log, log, READ)
     must_be(FittedModel, model, MADE)
