@@ -32,7 +32,7 @@ class PlantState:
     transpiration: Array
     """Of the last tick, kg m-2 s-1, as is the next."""
     assimilation: Array
-    """Gross uptake of CO2."""
+    """Gross uptake of CO2 without what is hidden: a hidden effect takes its share of this, and not of its own."""
     respiration: Array
     """Of the crop, kg CH2O m-2 s-1, as of the last slow step."""
     light: Light | None

@@ -12,9 +12,12 @@ from igrow.core.errors import IgrowError
 from igrow.core.greenhouse import GreenhouseParameters, HiddenEffect, recipe, simulate_many
 from igrow.core.greenhouse.disturbances import QUIET
 from igrow.core.greenhouse.hidden import REFERENCE_DRIVERS, EffectBank
+from igrow.core.greenhouse.plant import Plant
 from igrow.core.greenhouse.sensors import EXACT
 from igrow.core.greenhouse.uncatalogued import UNCATALOGUED
+from igrow.core.greenhouse.weather_table import WeatherTable
 from igrow.core.namespace import FloatNamespace
+from igrow.core.sun import unix_seconds
 from igrow.core.telemetry import Telemetry
 from tests.greenhouse.greenhouse_seasons import SPRING, hours
 
@@ -132,3 +135,19 @@ def test_a_crop_that_has_lost_all_its_assimilation_loses_no_more(spring: Telemet
     )  # fmt: skip
     assert all(np.isfinite(values).all() for values in season.measured.columns.values())
     assert 300.0 < season.measured["air_co2"].min() < season.measured["air_co2"].max() < 3000.0
+
+
+def test_a_crop_loses_the_share_of_its_assimilation_that_is_hidden_and_no_less(spring: Telemetry) -> None:
+    """Taken of what is left, a half would lose a third, and a third a quarter."""
+    noon = float(unix_seconds(SPRING + hours(12)))
+    declines = [
+        [HiddenEffect("photosynthesis_decline", loss, SPRING + hours(12 - 24 * 100))] for loss in (0.0, 0.5, 1.0)
+    ]
+    plant = Plant(GreenhouseParameters(), WeatherTable(spring), noon, count=3, effects=declines, disturbances=QUIET)
+    setpoints = recipe(SPRING + hours(12))
+    plant.advance(600.0, setpoints)  # until the air is at rest: an effect is of the crop of a tick ago
+    before = plant.state.totals["co2_taken_up"].copy()
+    plant.advance(120.0, setpoints)
+    whole, half, none = plant.state.totals["co2_taken_up"] - before
+    assert half / whole == pytest.approx(0.5, abs=0.02)
+    assert none / whole == pytest.approx(0.0, abs=0.02)

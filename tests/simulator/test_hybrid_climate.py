@@ -144,6 +144,19 @@ def test_a_closed_screen_stops_vents_and_leaks() -> None:
     assert exchange[1] < 0.7 * exchange[0]
 
 
+@pytest.mark.parametrize(("channel", "most"), [("light_loss", 1.0), ("assimilation", -1.0)])
+def test_an_effect_takes_no_more_light_or_assimilation_than_there_is(channel: str, most: float) -> None:
+    """Effects that go on with time would in the end take more than all: a crop that gives off CO2, a sun that cools."""
+    values, inputs = nominal(SITE), steady_inputs()
+    start = {"air_temperature": 20.0, "air_humidity": 75.0, "air_co2": 600.0}
+    state = climate.initial_state(np, start, inputs, values, {}, 1.2)
+    drivers = climate.derive(np, state, inputs, values, 1.2)
+    whole = most * (drivers["assimilation"] if channel == "assimilation" else 1.0)
+    none, all_of_it, twice = (balances(np, state, drivers, values, {channel: share * whole}).of for share in (0, 1, 2))
+    assert {name: flux for name, (flux, *_) in twice.items()} == {name: flux for name, (flux, *_) in all_of_it.items()}
+    assert all_of_it["co2_concentration"][0] > none["co2_concentration"][0]
+
+
 def test_a_crop_answers_less_to_drier_air_the_drier_it_is() -> None:
     """What it says of its answer is the slope of what it evaporates, in moist air four times that at a kilopascal."""
     values, inputs = nominal(SITE), steady_inputs()

@@ -56,11 +56,14 @@ def balances(xp: Any, state: Values, drivers: Drivers, parameters: Values, added
     grow = parameters["grow_pipe_heat_transfer"] * drivers["grow_pipe_excess"]
     sun, transpiration, assimilation = (drivers[name] for name in ("radiation_inside", "transpiration", "assimilation"))
     if "light_loss" in added:
-        light = 1.0 - added["light_loss"]
+        # No effect takes more than there is, however long it goes on.
+        light = xp.maximum(1.0 - added["light_loss"], 0.0 * sun)
         sun = sun * light
         transpiration = transpiration - (1.0 - light) * drivers["sun_transpiration"]
         assimilation = assimilation * (1.0 - (1.0 - light) * drivers["sun_share_of_par"])
     to_mass = parameters["mass_heat_transfer"] * (temperature - mass)
+    if "assimilation" in added:
+        assimilation = xp.maximum(assimilation + added["assimilation"], 0.0 * assimilation)
     dried = drying(xp, state, drivers)
     heat = (
         rail
@@ -100,7 +103,7 @@ def balances(xp: Any, state: Values, drivers: Drivers, parameters: Values, added
     co2_flux = (
         parameters["dosing_share"] * drivers["co2_dosing"] / 3600.0
         - exchange * (co2 - drivers["outdoor_co2_concentration"])
-        - (assimilation + added.get("assimilation", 0.0))
+        - assimilation
         + respiration
         + added.get("co2", 0.0)
     )
