@@ -1,8 +1,9 @@
 """The one calibration: from a log to the fitted model of its greenhouse.
 
-    log --> alignment --> record on the working grid --> parameters --> what the model lacks --> discrepancy
+    log --> alignment --> record on the working grid --> parameters --> what the model lacks --> growth --> discrepancy
                                                     \\-> rules of the PLC, and how it holds heat and CO2
-                                                    \\-> growth, where the log counts any
+
+Growth is fitted where the log counts any.
 
 The parameters are fitted to all of the log; how well they predict is told by a second fit that leaves every fourth week
 out, on these weeks.
@@ -17,16 +18,18 @@ import numpy as np
 from igrow.core.bundle import HeldOutError, Span, default_bundle_folder, read_bundle
 from igrow.core.errors import IgrowError
 from igrow.core.local_time import utc_datetime
+from igrow.core.simulator.crop import CropStages
 from igrow.core.simulator.hybrid.record import Record
 from igrow.trainer.data import Log
 from igrow.trainer.data.splits import held_out_weeks
 from igrow.trainer.diagnosis import DEFAULT, examine, history_of
 from igrow.trainer.diagnosis.answer.wording import thin_air
+from igrow.trainer.diagnosis.knowledge import activate, active_term
 from igrow.trainer.fit.actuation import by_its_own_rules, fit_actuation, setpoint_columns, unanswered
 from igrow.trainer.fit.climate import fit_climate
 from igrow.trainer.fit.evaluation import held_out_errors
 from igrow.trainer.fit.gaussian import Gaussian
-from igrow.trainer.fit.growth import built_in_crop, growth_notes, growth_of_log
+from igrow.trainer.fit.growth import Canopy, built_in_crop, growth_notes, growth_of_log
 from igrow.trainer.fit.holding import fit_holding
 from igrow.trainer.fit.model import FittedModel, training_envelope, united
 from igrow.trainer.fit.omission import Omission
@@ -70,11 +73,6 @@ def calibrate(
     setpoints, inferred = setpoint_columns(log.telemetry, record, site)
     rules = fit_actuation([(record, setpoints, by_its_own_rules(log.telemetry, record))], posterior.values)
     progress("rules of the climate computer fitted")
-    stages = before.crop or built_in_crop()
-    crop, growth = growth_of_log(log, record, posterior.values, stages)
-    counted = growth_notes(site, stages, growth)
-    for note in counted:
-        progress(note)
     model = replace(
         before,
         site=site,
@@ -86,7 +84,6 @@ def calibrate(
         omission=None,
         actuation=rules,
         holding=fit_holding(record, setpoints, posterior.values, before.holding),
-        crop=crop,
         season=before.season if before.site.name == site.name else None,
         training_span=Span(utc_datetime(record.time[0]), utc_datetime(record.time[-1])),
         # The balances are physics, and what few weeks leave open of them is in the posterior's spread. The bounds of
@@ -97,10 +94,13 @@ def calibrate(
             read_bundle(default_bundle_folder()).manifest.training_range,
         ),
         errors=_held_out_errors(record, before.posterior, progress),
-        notes=(*_notes(record, inferred), *unanswered(site, rules), *counted, *thin_air(site)),
+        notes=(*_notes(record, inferred), *unanswered(site, rules), *thin_air(site)),
     )
     model = replace(model, omission=_omission(record, model, progress))
-    return _with_discrepancy(model.completed() if complete else model, record, log.days, population, progress)
+    model = _with_growth(
+        model.completed() if complete else model, log, record, before.crop or built_in_crop(), progress
+    )
+    return _with_discrepancy(model, record, log.days, population, progress)
 
 
 def _held_out_errors(record: Record, prior: Gaussian, progress: Progress) -> tuple[HeldOutError, ...]:
@@ -130,6 +130,16 @@ def _omission(record: Record, model: FittedModel, progress: Progress) -> Omissio
     except (IgrowError, np.linalg.LinAlgError) as error:
         progress(f"what the model lacks could not be asked of its own log: {error}")
         return None
+
+
+def _with_growth(model: FittedModel, log: Log, record: Record, before: CropStages, progress: Progress) -> FittedModel:
+    """Return the model with the growth that its log counts, beside what its canopy takes up."""
+    terms = [active_term(one) for one in model.effects]
+    crop, growth = growth_of_log(log, record, Canopy(model.posterior.values, activate(record, terms)), before)
+    notes = growth_notes(model.site, before, growth)
+    for note in notes:
+        progress(note)
+    return replace(model, crop=crop, notes=(*model.notes, *notes))
 
 
 def _with_discrepancy(

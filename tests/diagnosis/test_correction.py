@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 from types import SimpleNamespace
@@ -11,21 +12,28 @@ import numpy as np
 import pytest
 
 from igrow.core.bundle import EffectRecord, Estimate
+from igrow.core.simulator.hybrid.record import Record, uptake
+from igrow.trainer.data import Log
+from igrow.trainer.diagnosis.answer.result import Finding
 from igrow.trainer.diagnosis.answer.wording import discrepancy, finding
+from igrow.trainer.diagnosis.answer.wording import parameter as parameter_finding
 from igrow.trainer.diagnosis.design.candidates import Candidate, Pattern
 from igrow.trainer.diagnosis.design.freerun import Stage
 from igrow.trainer.diagnosis.design.linear import Term
-from igrow.trainer.diagnosis.knowledge import ActiveTerm
+from igrow.trainer.diagnosis.knowledge import ActiveTerm, knowledge_of
 from igrow.trainer.diagnosis.rules import DEFAULT
 from igrow.trainer.diagnosis.search.estimate import Estimated, OnsetInterval
+from igrow.trainer.diagnosis.search.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.search.scan import Hypothesis
 from igrow.trainer.diagnosis.validation import correction
 from igrow.trainer.diagnosis.validation.correction import (
     Corrected,
+    corrected_crop,
     corrected_model,
     is_proven,
     same_in_all_regimes,
     until_outdone,
+    without,
 )
 from igrow.trainer.fit import Gaussian
 from igrow.trainer.fit.growth import built_in_crop
@@ -148,3 +156,39 @@ def test_a_name_that_a_pattern_outdoes_goes_and_what_was_found_beside_it() -> No
     course = Hypothesis(Pattern("co2", "05 to 09 h", ("hour",)), Term(0), 9.0, 1.0, 4.0, 0.001)
     assert until_outdone([first, second]) == ([first, second], ())
     assert until_outdone([first, replace(second, outdone_by=course), third]) == ([first], (course,))
+
+
+def stage_of(parameter: str, share: float) -> tuple[Stage, Finding]:
+    """Return the model in force with a parameter that has changed, and what is told of it."""
+    posterior = model_in_force().posterior
+    here = np.array([name == parameter for name in posterior.names])
+    told = parameter_finding(
+        ParameterChange(parameter, Estimate(share, share - 0.1, share + 0.1, "1"), None, 0.01, (parameter,), leads=True)
+    )
+    return Stage(posterior.moved(posterior.mean * (1.0 + share * here)), ()), told
+
+
+def test_without_what_was_found_a_stage_is_as_it_was() -> None:
+    painted, told = stage_of("transmissivity", -0.3)
+    np.testing.assert_allclose(without(painted, told).posterior.mean, model_in_force().posterior.mean)
+    leak, lamps = (ActiveTerm(name, 1.0, {}) for name in ("co2_valve_leak", "lamp_heat"))
+    assert without(replace(painted, terms=(leak, lamps)), finding(cause())).terms == (lamps,)
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_a_cover_that_is_told_to_let_less_light_through_is_growth_that_is_lost(told: bool, quiet_log: Log) -> None:
+    """What recalibration alone has moved may stand for something else: growth stays what it was."""
+    model = model_in_force()
+    stage, change = stage_of("transmissivity", -0.3)
+    known = knowledge_of(model, model.site, DEFAULT)
+    record = quiet_log.record(0.0)
+    crop = corrected_crop(quiet_log, record, known, stage, (change,) if told else (), CROP)
+    was, now = (growth_of(record, values) for values in (model.posterior.values, stage.posterior.values))
+    kept = crop.conversion * now / (CROP.conversion * was)
+    assert kept == pytest.approx(now / was if told else 1.0)
+    assert now < 0.95 * was
+
+
+def growth_of(record: Record, parameters: Mapping[str, float]) -> float:
+    """Return the CO2 that the crop takes up in all, kg m-2."""
+    return float(np.nansum(uptake(record, parameters, {})[0]))

@@ -16,11 +16,20 @@ from igrow.trainer import prepare_log
 from igrow.trainer.data import Log
 from igrow.trainer.data.source import DailyTable
 from igrow.trainer.fit import FittedModel
-from igrow.trainer.fit.growth import built_in_crop, counts_of, growth_days, growth_notes, growth_of_log, growth_since
+from igrow.trainer.fit.growth import (
+    Canopy,
+    built_in_crop,
+    counts_of,
+    growth_days,
+    growth_notes,
+    growth_of_log,
+    growth_since,
+)
 from tests.virtual_log import SITE, virtual_log
 
 DAYS, STEP = 84, 3600.0
 PARAMETERS = FittedModel.described(SITE).posterior.values
+CANOPY = Canopy(PARAMETERS)
 SLOW, HUNGRY = 0.8, 2.0
 """Conversion and maintenance of the crop that grew, over those of the built-in one."""
 
@@ -38,7 +47,7 @@ def before() -> CropStages:
 def grown(telemetry: Telemetry, before: CropStages) -> np.ndarray:
     """Return what a crop of `SLOW` and `HUNGRY` had grown by the end of each local day, kg m-2."""
     log = prepare_log(telemetry, SITE)
-    _, days = growth_days(log.record(), PARAMETERS, SITE.time_zone)
+    _, days = growth_days(log.record(), CANOPY, SITE.time_zone)
     growth = SLOW * before.conversion * days.assimilated - HUNGRY * before.maintenance * days.warmth
     return np.cumsum(np.nan_to_num(growth))
 
@@ -54,10 +63,10 @@ def with_counts(telemetry: Telemetry, running: np.ndarray, name: str, every: int
 
 def test_weekly_counts_of_growth_tell_how_fast_the_crop_grows(telemetry: Telemetry, before: CropStages) -> None:
     log = with_counts(telemetry, grown(telemetry, before), "net_growth", 7)
-    stages, fit = growth_of_log(log, log.record(), PARAMETERS, before)
+    stages, fit = growth_of_log(log, log.record(), CANOPY, before)
     assert fit.counts >= 10
     assert "conversion" in fit.told
-    _, days = growth_days(log.record(), PARAMETERS, SITE.time_zone)
+    _, days = growth_days(log.record(), CANOPY, SITE.time_zone)
     known = np.isfinite(days.assimilated)
     expected = (stages.conversion * days.assimilated - stages.maintenance * days.warmth)[known].sum()
     assert expected == pytest.approx(grown(telemetry, before)[-1], rel=0.05)
@@ -69,7 +78,7 @@ def test_weekly_counts_of_growth_tell_how_fast_the_crop_grows(telemetry: Telemet
 def test_a_total_of_every_hour_is_read_from_midnight_to_midnight(telemetry: Telemetry, before: CropStages) -> None:
     """Read at noon, each day's growth stood beside the light of half another day: light seemed to be worth little."""
     running = grown(telemetry, before)
-    first, _ = growth_days(prepare_log(telemetry, SITE).record(), PARAMETERS, SITE.time_zone)
+    first, _ = growth_days(prepare_log(telemetry, SITE).record(), CANOPY, SITE.time_zone)
     since = (to_local(telemetry.time, SITE.time_zone) - first) / np.timedelta64(1, "D")
     each_hour = np.interp(since, np.arange(len(running) + 1), np.append(0.0, running))
     counts = counts_of(telemetry.with_columns({"net_growth": each_hour}), None, first, len(running), SITE.time_zone)
@@ -89,7 +98,7 @@ def test_a_log_that_counts_nothing_leaves_what_is_known_of_other_crops_and_says_
     telemetry: Telemetry, before: CropStages
 ) -> None:
     log = prepare_log(telemetry, SITE)
-    stages, fit = growth_of_log(log, log.record(), PARAMETERS, before)
+    stages, fit = growth_of_log(log, log.record(), CANOPY, before)
     assert (stages.conversion, stages.maintenance) == (before.conversion, before.maintenance)
     assert stages.covariance is not None
     np.testing.assert_allclose(stages.covariance, prior_of(before))
@@ -113,7 +122,7 @@ def test_growth_beyond_what_any_crop_is_known_for_asks_about_the_site_file(
 ) -> None:
     """A cucumber that is described as a tomato holds three times the water."""
     log = with_counts(telemetry, 5.0 * grown(telemetry, before), "net_growth", 7)
-    _, fit = growth_of_log(log, log.record(), PARAMETERS, before)
+    _, fit = growth_of_log(log, log.record(), CANOPY, before)
     site = replace(SITE, crop=replace(SITE.crop, dry_matter_fraction=0.09))
     assert "dry_matter_fraction (0.09)" in growth_notes(site, before, fit)[1]
 
@@ -135,8 +144,8 @@ def test_growth_that_scatters_from_day_to_day_is_not_underrated(telemetry: Telem
     each = np.diff(grown(telemetry, before), prepend=0.0)
     scattered = np.cumsum(each * (1.0 + 0.6 * (-1.0) ** np.arange(len(each))))
     log = with_counts(telemetry, scattered, "net_growth", 1)
-    stages, _ = growth_of_log(log, log.record(), PARAMETERS, before)
-    first, days = growth_days(log.record(), PARAMETERS, SITE.time_zone)
+    stages, _ = growth_of_log(log, log.record(), CANOPY, before)
+    first, days = growth_days(log.record(), CANOPY, SITE.time_zone)
     counts = counts_of(log.telemetry, None, first, len(days.warmth), SITE.time_zone)
     expected = stages.conversion * days.assimilated - stages.maintenance * days.warmth
     said = sum(expected[one.first : one.last].sum() for one in counts)
@@ -146,9 +155,9 @@ def test_growth_that_scatters_from_day_to_day_is_not_underrated(telemetry: Telem
 def test_growth_stays_where_a_correction_has_moved_the_uptake_of_co2(telemetry: Telemetry, before: CropStages) -> None:
     log = prepare_log(telemetry, SITE)
     record = log.record()
-    moved = {**PARAMETERS, "assimilation_maximum": 0.8 * PARAMETERS["assimilation_maximum"]}
-    stages = growth_since(log, record, (PARAMETERS, moved), before)
-    _, was = growth_days(record, PARAMETERS, SITE.time_zone)
+    moved = Canopy({**PARAMETERS, "assimilation_maximum": 0.8 * PARAMETERS["assimilation_maximum"]})
+    stages = growth_since(log, record, CANOPY, moved, moved, before)
+    _, was = growth_days(record, CANOPY, SITE.time_zone)
     _, now = growth_days(record, moved, SITE.time_zone)
     assert stages.conversion * np.nansum(now.assimilated) == pytest.approx(
         before.conversion * np.nansum(was.assimilated)
@@ -158,7 +167,22 @@ def test_growth_stays_where_a_correction_has_moved_the_uptake_of_co2(telemetry: 
 
 def test_counts_of_a_later_log_change_growth(telemetry: Telemetry, before: CropStages) -> None:
     log = with_counts(telemetry, 0.7 * grown(telemetry, before), "net_growth", 7)
-    stages = growth_since(log, log.record(), (PARAMETERS, PARAMETERS), before)
-    _, days = growth_days(log.record(), PARAMETERS, SITE.time_zone)
+    stages = growth_since(log, log.record(), CANOPY, CANOPY, CANOPY, before)
+    _, days = growth_days(log.record(), CANOPY, SITE.time_zone)
     expected = np.nansum(stages.conversion * days.assimilated - stages.maintenance * days.warmth)
     assert expected == pytest.approx(0.7 * grown(telemetry, before)[-1], rel=0.06)
+
+
+def test_growth_falls_by_what_was_found_to_be_missing_and_not_by_what_was_fitted_beside_it(
+    telemetry: Telemetry, before: CropStages
+) -> None:
+    """A crop that assimilates less had grown as before by the bundle that said so: its growth was fitted back to it."""
+    log = prepare_log(telemetry, SITE)
+    record = log.record()
+    moved = Canopy({**PARAMETERS, "assimilation_maximum": 0.8 * PARAMETERS["assimilation_maximum"]})
+    missing = moved._replace(effects={"photosynthesis_decline": {"loss": 100.0 / DAYS}})
+    stages = growth_since(log, record, CANOPY, missing, moved, before)
+    was, now = (np.nansum(growth_days(record, one, SITE.time_zone)[1].assimilated) for one in (CANOPY, missing))
+    assert 0.3 < stages.conversion * now / (before.conversion * was) < 0.7
+    alone = growth_since(log, record, CANOPY, moved, moved, before)
+    assert stages.conversion == pytest.approx(alone.conversion)

@@ -41,6 +41,7 @@ from igrow.trainer.diagnosis.search.scan import Hypothesis
 from igrow.trainer.diagnosis.validation.correction import (
     Corrected,
     correct,
+    corrected_crop,
     corrected_model,
     until_outdone,
     with_unexplained,
@@ -50,7 +51,7 @@ from igrow.trainer.diagnosis.validation.shipping import shipped
 from igrow.trainer.diagnosis.validation.unseen_errors import errors_of, runs_of, stages_of
 from igrow.trainer.diagnosis.visible_parameters import members
 from igrow.trainer.fit.discrepancy import Discrepancy
-from igrow.trainer.fit.growth import built_in_crop, growth_since
+from igrow.trainer.fit.growth import built_in_crop
 from igrow.trainer.fit.model import FittedModel
 from igrow.trainer.given import MADE, READ, must_be
 from igrow.trainer.progress import Progress, silent
@@ -247,8 +248,8 @@ class _Question:
         runs = runs_of(stages)
         errors = errors_of(runs)
         start, end = log.telemetry.time[0], log.telemetry.time[-1]
-        moved = model.posterior.values, result.stages["corrected"].posterior.values
-        crop = growth_since(log, days.record, moved, model.crop or built_in_crop())
+        known = model.crop or built_in_crop()
+        crop = corrected_crop(log, days.record, around.knowledge, result.stages["corrected"], findings, known)
         corrected = corrected_model(model, result, findings, errors, (start, end), crop)
         possible = {name for one in findings for name in one.confounded}
         not_asked = {*first.design.untestable, *around.of_crop}

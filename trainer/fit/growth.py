@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,8 +18,8 @@ from igrow.core.bundle import Bundle, default_bundle_folder, read_bundle
 from igrow.core.local_time import to_local
 from igrow.core.simulator.crop import CropStages
 from igrow.core.simulator.growth import Count, GrowthDays, GrowthFit, fit_growth, prior_of, warmth
-from igrow.core.simulator.hybrid import climate
-from igrow.core.simulator.hybrid.record import Record, observe
+from igrow.core.simulator.hybrid.climate import ActiveEffects
+from igrow.core.simulator.hybrid.record import Record, uptake
 from igrow.core.site import Site
 from igrow.core.telemetry import Telemetry
 from igrow.trainer.data import Log
@@ -37,6 +39,15 @@ COVERED = 0.8
 """Share of a day that must have been measured for its growth to be told."""
 
 
+class Canopy(NamedTuple):
+    """What takes up CO2, as a model has it."""
+
+    parameters: Mapping[str, float]
+    """Of the climate stage."""
+    effects: ActiveEffects = MappingProxyType({})
+    """Of the model, as `igrow.core.simulator.hybrid.climate` takes them."""
+
+
 def crop_of(bundle: Bundle) -> CropStages:
     """Return the growth and yield stages that a bundle carries; raises BundleError where they cannot be read."""
     stages, _ = stages_from_bytes(bundle.content(CROP_FILE), where=str(bundle.folder / CROP_FILE))
@@ -52,47 +63,45 @@ def built_in_crop() -> CropStages:
     return crop_of(read_bundle(default_bundle_folder()))
 
 
-def growth_of_log(
-    log: Log, record: Record, parameters: Mapping[str, float], before: CropStages
-) -> tuple[CropStages, GrowthFit]:
+def growth_of_log(log: Log, record: Record, canopy: Canopy, before: CropStages) -> tuple[CropStages, GrowthFit]:
     """Return the stages with conversion and maintenance as the log's counts tell them, and how well they are known.
 
     Args:
         log: with the counts, and the site's crop.
         record: of the log.
-        parameters: of the climate stage, whose canopy assimilates.
+        canopy: that assimilates.
         before: what is known before the log.
     """
     site = log.known_site
-    first, days = growth_days(record, parameters, site.time_zone)
+    first, days = growth_days(record, canopy, site.time_zone)
     counts = counts_of(log.telemetry, log.harvests, first, len(days.warmth), site.time_zone)
     return fit_growth(days, counts, before, site.crop)
 
 
-def growth_since(
-    log: Log, record: Record, parameters: tuple[Mapping[str, float], Mapping[str, float]], before: CropStages
-) -> CropStages:
-    """Return the stages for parameters that a later log has moved, with what it counts of growth.
+def growth_since(log: Log, record: Record, was: Canopy, now: Canopy, without: Canopy, before: CropStages) -> CropStages:
+    """Return the stages for a canopy that a later log has moved, with what it counts of growth.
 
     Conversion belongs to the assimilation that it was fitted beside. Where the balance of CO2 has moved that, growth of
-    the log's days stays what it was, and only counts change it.
+    the log's days stays what it was, but for what was found to be missing: light that a cover loses, or assimilation
+    that a crop cannot do any more, is growth that is lost. Counts change it either way.
 
     Args:
         log: the later one.
         record: of it.
-        parameters: of the climate stage, before and after.
-        before: what is known before the log.
+        was: the canopy before the log.
+        now: after it, with all that was found.
+        without: the canopy after it, without what was found.
+        before: what was known of growth.
     """
     site = log.known_site
-    first, was = growth_days(record, parameters[0], site.time_zone)
-    _, now = growth_days(record, parameters[1], site.time_zone)
-    taken_up = float(np.nansum(now.assimilated))
-    share = float(np.nansum(was.assimilated)) / taken_up if taken_up > 0.0 else 1.0
+    (first, old), (_, moved), (_, new) = (growth_days(record, canopy, site.time_zone) for canopy in (was, without, now))
+    taken_up = float(np.nansum(moved.assimilated))
+    share = float(np.nansum(old.assimilated)) / taken_up if taken_up > 0.0 else 1.0
     scale = np.diag([share, 1.0])
     grown = np.diag([(CHANGE * share * before.conversion) ** 2, 0.0])
     known = replace(before, conversion=share * before.conversion, covariance=scale @ prior_of(before) @ scale + grown)
-    counts = counts_of(log.telemetry, log.harvests, first, len(now.warmth), site.time_zone)
-    return fit_growth(now, counts, known, site.crop)[0]
+    counts = counts_of(log.telemetry, log.harvests, first, len(new.warmth), site.time_zone)
+    return fit_growth(new, counts, known, site.crop)[0]
 
 
 def growth_notes(site: Site, before: CropStages, fit: GrowthFit) -> tuple[str, ...]:
@@ -108,14 +117,13 @@ def growth_notes(site: Site, before: CropStages, fit: GrowthFit) -> tuple[str, .
     return tuple(notes)
 
 
-def growth_days(record: Record, parameters: Mapping[str, float], time_zone: str) -> tuple[np.datetime64, GrowthDays]:
+def growth_days(record: Record, canopy: Canopy, time_zone: str) -> tuple[np.datetime64, GrowthDays]:
     """Return the first local day of a record, and what drove growth on each day from then on; NaN where none tells."""
-    states = observe(record, parameters, {})
-    drivers = climate.derive(np, states, record.inputs, parameters, record.lamp_efficacy)
+    assimilated, air_temperature = uptake(record, *canopy)
     day = to_local(record.time, time_zone).astype("datetime64[D]")
     number = (day - day[0]).astype(np.int64)
     hours = record.step / 3600.0
-    known = record.usable & np.isfinite(drivers["assimilation"]) & np.isfinite(states["air_temperature"])
+    known = record.usable & np.isfinite(assimilated) & np.isfinite(air_temperature)
     measured = np.bincount(number, known)
 
     def total(values: Floats) -> Floats:
@@ -124,7 +132,7 @@ def growth_days(record: Record, parameters: Mapping[str, float], time_zone: str)
         whole = 24.0 / np.maximum(measured, 1.0)
         return np.where(measured * hours >= COVERED * 24.0, summed * whole, np.nan)
 
-    return day[0], GrowthDays(total(3600.0 * drivers["assimilation"]), total(warmth(states["air_temperature"])))
+    return day[0], GrowthDays(total(3600.0 * assimilated), total(warmth(air_temperature)))
 
 
 def counts_of(

@@ -9,18 +9,19 @@ lost is priced as the electricity that the lamps would need for as much.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from igrow.core.arrays import Array, Floats
 from igrow.core.economics import co2_cost, electricity_price
 from igrow.core.simulator.hybrid import climate
-from igrow.core.simulator.hybrid.balances import balances
+from igrow.core.simulator.hybrid.balances import balances, in_the_light
 from igrow.core.simulator.hybrid.record import Record, observe
 from igrow.trainer.diagnosis.answer.result import DISCREPANCY, Diagnosis, Finding
 from igrow.trainer.diagnosis.design.freerun import Stage
 from igrow.trainer.diagnosis.knowledge import CROP, activate
+from igrow.trainer.diagnosis.validation.correction import without
 from igrow.trainer.diagnosis.visible_parameters import VISIBLE, members
 
 _WEEK = 604_800.0
@@ -53,9 +54,9 @@ def worth(result: Diagnosis, finding: Finding) -> Worth | None:
     if result.evidence is None or "corrected" not in result.evidence.stages:
         return None
     record, stage, site = result.evidence.log.record, result.evidence.stages["corrected"], result.model.site
-    reduced = _without(stage, finding)
-    if reduced is None:
+    if finding.effect in OF_THE_CROP:
         return None
+    reduced = without(stage, finding)
     since = np.ones(len(record), dtype=bool) if finding.onset is None else record.time >= finding.onset.time
     counted = since & record.usable
     if not counted.any():
@@ -85,20 +86,6 @@ def worth(result: Diagnosis, finding: Finding) -> Worth | None:
     return Worth(1e-6 * sums["heat"], sums["co2"], share * float(np.sum(electricity[counted])), money, _spread(finding))
 
 
-def _without(stage: Stage, finding: Finding) -> Stage | None:
-    """Return the corrected model without what was found; None where nothing of it can be counted."""
-    if finding.effect == DISCREPANCY:
-        return replace(stage, added={})
-    if any(term.effect == finding.effect for term in stage.terms):
-        return replace(stage, terms=tuple(term for term in stage.terms if term.effect != finding.effect))
-    if finding.kind != "parameter" or finding.effect in OF_THE_CROP:
-        return None
-    posterior, changed = stage.posterior, members(finding.effect)
-    here = np.array([name in changed for name in posterior.names])
-    before = posterior.mean / (1.0 + here * finding.parameters["change"].value)
-    return replace(stage, posterior=posterior.moved(before))
-
-
 def _needed(record: Record, stage: Stage) -> dict[str, Floats]:
     """Return what holds the logged climate, (n,): heat, W m-2, and CO2, kg m-2 s-1; and the sun's light that lacks.
 
@@ -117,7 +104,7 @@ def _needed(record: Record, stage: Stage) -> dict[str, Floats]:
     dosed = np.asarray(record.inputs["co2_dosing"]) > 0.0
     short = np.maximum(-_course(net["co2_concentration"][0], record), 0.0) / parameters["dosing_share"]
     co2 = np.where(dosed, short, 0.0)
-    light = -(1.0 - _course(added.get("light_loss", 0.0), record)) * drivers["radiation_inside"] * _PAR_PER_GLOBAL
+    light = -_course(in_the_light(np, drivers, added)["radiation_inside"], record) * _PAR_PER_GLOBAL
     return {"heat": heat, "co2": co2, "light": light}
 
 

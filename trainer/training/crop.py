@@ -13,8 +13,7 @@ from igrow.core.errors import IgrowError
 from igrow.core.quantities import GROWTH, YIELD
 from igrow.core.simulator.crop import GROWTH_DRIVERS, HARVEST_DRIVERS
 from igrow.core.simulator.growth import warmth
-from igrow.core.simulator.hybrid import climate
-from igrow.core.simulator.hybrid.record import Record, observe
+from igrow.core.simulator.hybrid.record import Record, uptake
 from igrow.core.simulator.network import Stage
 from igrow.core.telemetry import Telemetry, to_grid
 from igrow.trainer.progress import Progress, silent
@@ -75,8 +74,7 @@ def fit_net_growth(
     """
     rows, grown = [], []
     for record, season in zip(records, seasons, strict=True):
-        states = observe(record, parameters, {})
-        drivers = climate.derive(np, states, record.inputs, parameters, record.lamp_efficacy)
+        assimilated, air_temperature = uptake(record, parameters, {})
         day = round(86_400.0 / record.step)
         days = len(record) // day
         hours = record.step / 3600.0
@@ -87,8 +85,7 @@ def fit_net_growth(
         cumulative = to_grid(season, int(record.step))["net_growth"]
         end = np.minimum(day * np.arange(1, days + 1), len(cumulative) - 1)
         grown.append(cumulative[end] - cumulative[day * np.arange(days)])
-        respired = total(warmth(states["air_temperature"]))
-        rows.append(np.stack([total(3600.0 * drivers["assimilation"]), -respired], axis=1))
+        rows.append(np.stack([total(3600.0 * assimilated), -total(warmth(air_temperature))], axis=1))
     table, target = np.concatenate(rows), np.concatenate(grown)
     fine = np.isfinite(table).all(axis=1) & np.isfinite(target)
     conversion, maintenance = nnls(table[fine], target[fine])[0]

@@ -54,16 +54,9 @@ def balances(xp: Any, state: Values, drivers: Drivers, parameters: Values, added
     temperature_above, cover = drivers["temperature_above"], drivers["cover_conductance"]
     rail = parameters["rail_pipe_heat_transfer"] * drivers["rail_pipe_excess"]
     grow = parameters["grow_pipe_heat_transfer"] * drivers["grow_pipe_excess"]
-    sun, transpiration, assimilation = (drivers[name] for name in ("radiation_inside", "transpiration", "assimilation"))
-    if "light_loss" in added:
-        # No effect takes more than there is, however long it goes on.
-        light = xp.maximum(1.0 - added["light_loss"], 0.0 * sun)
-        sun = sun * light
-        transpiration = transpiration - (1.0 - light) * drivers["sun_transpiration"]
-        assimilation = assimilation * (1.0 - (1.0 - light) * drivers["sun_share_of_par"])
+    lit = in_the_light(xp, drivers, added)
+    sun, transpiration = lit["radiation_inside"], lit["transpiration"]
     to_mass = parameters["mass_heat_transfer"] * (temperature - mass)
-    if "assimilation" in added:
-        assimilation = xp.maximum(assimilation + added["assimilation"], 0.0 * assimilation)
     dried = drying(xp, state, drivers)
     heat = (
         rail
@@ -103,7 +96,7 @@ def balances(xp: Any, state: Values, drivers: Drivers, parameters: Values, added
     co2_flux = (
         parameters["dosing_share"] * drivers["co2_dosing"] / 3600.0
         - exchange * (co2 - drivers["outdoor_co2_concentration"])
-        - assimilation
+        - lit["assimilation"]
         + respiration
         + added.get("co2", 0.0)
     )
@@ -122,6 +115,34 @@ def balances(xp: Any, state: Values, drivers: Drivers, parameters: Values, added
         for name, (flux, conductance, capacity) in found.items()
     }
     return Balances(of, moistened)
+
+
+def in_the_light(xp: Any, drivers: Drivers, added: Mapping[str, Array]) -> dict[str, Array]:
+    """Return what light brings about, with what effects take from it and add to it: growth follows it as the air does.
+
+    No effect takes more than there is, however long it goes on.
+
+    Args:
+        xp: the array namespace.
+        drivers: from `climate.derive`.
+        added: what effects add, by channel.
+
+    Returns:
+        ``radiation_inside`` (W m-2), ``par`` (umol m-2 s-1), ``transpiration`` and ``assimilation`` (kg m-2 s-1).
+    """
+    found = {name: drivers[name] for name in ("radiation_inside", "par", "transpiration", "assimilation")}
+    if "light_loss" in added:
+        light = xp.maximum(1.0 - added["light_loss"], 0.0 * added["light_loss"])
+        of_par = 1.0 - (1.0 - light) * drivers["sun_share_of_par"]
+        found = {
+            "radiation_inside": found["radiation_inside"] * light,
+            "par": found["par"] * of_par,
+            "transpiration": found["transpiration"] - (1.0 - light) * drivers["sun_transpiration"],
+            "assimilation": found["assimilation"] * of_par,
+        }
+    if "assimilation" in added:
+        found["assimilation"] = xp.maximum(found["assimilation"] + added["assimilation"], 0.0 * found["assimilation"])
+    return found
 
 
 def below_the_air(state: Values, sun: Array, parameters: Values) -> dict[str, tuple[Array, Array, Array]]:

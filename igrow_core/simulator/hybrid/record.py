@@ -17,7 +17,7 @@ from igrow.core.arrays import Array, Floats, Integers, Mask, Times
 from igrow.core.effects import EFFECTS
 from igrow.core.effects.definition import Values
 from igrow.core.simulator.hybrid import climate, measurement
-from igrow.core.simulator.hybrid.balances import below_the_air
+from igrow.core.simulator.hybrid.balances import below_the_air, in_the_light
 from igrow.core.simulator.hybrid.climate import ActiveEffects, Forcing, memory_name
 
 SUBSTEP = 900.0
@@ -100,6 +100,17 @@ def observe(record: Record, parameters: Values, effects: ActiveEffects) -> dict[
         _run_memories(record, state, drivers, effects)
     shape = (len(record),)
     return {name: np.broadcast_to(v, np.broadcast_shapes(np.shape(v), shape)) for name, v in state.items()}
+
+
+def uptake(record: Record, parameters: Values, effects: ActiveEffects) -> tuple[Floats, Floats]:
+    """Return the CO2 that the crop takes up, kg m-2 s-1, and the air's temperature, degC, both (n,), as a log has them.
+
+    Effects count: light that is lost and assimilation that a crop cannot do, and sensors that are off.
+    """
+    state = observe(record, parameters, effects)
+    drivers = climate.derive(np, state, record.inputs, parameters, record.lamp_efficacy)
+    added = climate.contributions(np, drivers, state, effects, record.step)
+    return in_the_light(np, drivers, added)["assimilation"], state["air_temperature"]
 
 
 @np.errstate(over="ignore", invalid="ignore")

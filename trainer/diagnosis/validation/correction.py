@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 
@@ -13,17 +14,21 @@ from igrow.core.effects import EFFECTS
 from igrow.core.local_time import utc_datetime
 from igrow.core.quantities import QUANTITIES
 from igrow.core.simulator.crop import CropStages
-from igrow.trainer.diagnosis.answer.result import Finding
+from igrow.core.simulator.hybrid.record import Record
+from igrow.trainer.data.log import Log
+from igrow.trainer.diagnosis.answer.result import DISCREPANCY, Finding
 from igrow.trainer.diagnosis.design import freerun
 from igrow.trainer.diagnosis.design.candidates import Pattern, pattern_fluxes
 from igrow.trainer.diagnosis.design.freerun import LogDays, Refittable, Stage, cross_validated_skill
-from igrow.trainer.diagnosis.knowledge import Knowledge
+from igrow.trainer.diagnosis.knowledge import Knowledge, activate
 from igrow.trainer.diagnosis.rules import DecisionRules
 from igrow.trainer.diagnosis.search.estimate import Estimated
 from igrow.trainer.diagnosis.search.parameter_change import ParameterChange
 from igrow.trainer.diagnosis.search.refit import REGIMES
 from igrow.trainer.diagnosis.search.scan import Hypothesis
 from igrow.trainer.diagnosis.validation.confirmation import confirmed
+from igrow.trainer.diagnosis.visible_parameters import members
+from igrow.trainer.fit.growth import Canopy, growth_since
 from igrow.trainer.fit.model import FittedModel
 from igrow.trainer.fit.solver import DivergenceError
 
@@ -255,6 +260,42 @@ def corrected_model(
         ],
         crop=crop,
     )
+
+
+def without(stage: Stage, finding: Finding) -> Stage:
+    """Return a stage without what was found: neither the effect, nor the change of a parameter, nor a pattern."""
+    if finding.effect == DISCREPANCY:
+        return replace(stage, added={})
+    if finding.kind != "parameter":
+        return replace(stage, terms=tuple(term for term in stage.terms if term.effect != finding.effect))
+    posterior, changed = stage.posterior, members(finding.effect)
+    here = np.array([name in changed for name in posterior.names])
+    return replace(stage, posterior=posterior.moved(posterior.mean / (1.0 + here * finding.parameters["change"].value)))
+
+
+def corrected_crop(
+    log: Log, record: Record, knowledge: Knowledge, corrected: Stage, findings: Sequence[Finding], before: CropStages
+) -> CropStages:
+    """Return how the crop grows, beside the corrected parameters and with what was found to be missing.
+
+    Args:
+        log: of the diagnosis, with its counts.
+        record: of it.
+        knowledge: of the model in force.
+        corrected: the stage that comes of it.
+        findings: what was told.
+        before: how it grew by the model in force.
+    """
+    found = {one.effect for one in findings}
+    plain = reduce(without, findings, corrected)
+    # What was known to be missing before it was found to be more of it.
+    plain = replace(plain, terms=(*plain.terms, *(one for one in knowledge.terms if one.effect in found)))
+
+    def canopy(stage: Stage) -> Canopy:
+        return Canopy(stage.posterior.values, activate(record, stage.terms))
+
+    was = Stage(knowledge.posterior, knowledge.terms)
+    return growth_since(log, record, canopy(was), canopy(corrected), canopy(plain), before)
 
 
 def effect_record(finding: Finding) -> EffectRecord:
