@@ -26,7 +26,7 @@ class Exchange:
     """Of all leaves to vapour, m s-1."""
     transpired: Any
     """kg m-2 s-1."""
-    able: Any
+    unaffected: Any
     """CO2 that it would take up but for what is hidden, kg m-2 s-1, as are the next."""
     taken: Any
     respired: Any
@@ -59,12 +59,12 @@ def exchange(p: ForeignGreenhouse, s: Values, light: Values, hidden: Any, second
     efficiency = 0.072 * above / (ppm + 2.0 * compensation)
     largest = 1.04 * area * p.assimilation * np.exp(-(((leaf - 24.0) / 13.0) ** 2)) * above / (ppm + 320.0)
     fixed = largest * (1.0 - np.exp(-efficiency * light["absorbed"] / np.maximum(largest, 1e-6)))
-    able = 1e-6 * MOLAR_MASS_CO2 * fixed
-    taken = np.maximum(able + hidden, 0.0)
+    unaffected = 1e-6 * MOLAR_MASS_CO2 * fixed
+    taken = np.maximum(unaffected + hidden, 0.0)
     grown = s["buffer"] / (3600.0 * GROWTH_HOURS)
     respired = p.respiration * 2.0 ** ((leaf - 25.0) / 10.0) + GROWTH_RESPIRATION * grown
     s["buffer"] = np.maximum(s["buffer"] + seconds * (taken - grown), 0.0)
     s["area"] = area + seconds * LEAVES * grown
     conductance = 2.0 * area / (0.9 * p.leaf_resistance + stomata)
     transpired = conductance * (saturation_concentration(np, leaf) - s["vapour"])
-    return Exchange(conductance, transpired, able, taken, respired)
+    return Exchange(conductance, transpired, unaffected, taken, respired)

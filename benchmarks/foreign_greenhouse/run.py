@@ -120,7 +120,7 @@ def _advance(
         one + added.get(name, 0.0) for one, name in zip(disturbed, ("heat", "vapour", "co2"), strict=True)
     )
     climate.advance(p, s, weather, shone, gases, air, (heat, vapour, co2), seconds)
-    s["ventilation"], s["transpiration"], s["assimilation"] = vents, gases.transpired, gases.able
+    s["ventilation"], s["transpiration"], s["assimilation"] = vents, gases.transpired, gases.unaffected
 
 
 def shown(s: Values, weather: WeatherRow, setpoints: Mapping[str, float], shone: Values) -> Values:

@@ -160,9 +160,9 @@ class Plant:
         conductance = canopy.vapour_conductance(p, area, stomata)
         fixed = canopy.photosynthesis(xp, p, light.par_absorbed, ppm, leaf, area)
         fixed = fixed * tomato.assimilation_share(xp, s.crop) * (0.3 + 0.7 * stress)
-        able = 0.04401 * fixed
+        unaffected = 0.04401 * fixed
         # A crop assimilates nothing at the least, whatever is hidden in it.
-        uptake = xp.maximum(able + added.get("assimilation", zero), zero)
+        uptake = xp.maximum(unaffected + added.get("assimilation", zero), zero)
         respired = tomato.CO2_PER_CARBOHYDRATE * s.respiration
 
         heat, vapour, co2 = s.disturbance
@@ -202,7 +202,7 @@ class Plant:
         s.trend = [(after - old) / seconds for after, old in zip(_guided(s.climate), before, strict=True)]
         s.light = light
         s.transpiration = ledger.transpiration / seconds
-        s.assimilation = able
+        s.assimilation = unaffected
         s.assimilated = s.assimilated + uptake * (seconds / tomato.CO2_PER_CARBOHYDRATE)
         s.warmth = s.warmth + s.climate.canopy * seconds
         s.crop_seconds += seconds

@@ -137,6 +137,11 @@ def test_a_greenhouse_without_lamps_is_told_what_a_cause_costs(leak: Diagnosis, 
     assert np.isfinite(json.loads((tmp_path / "unlit" / "diagnosis.json").read_text())["findings"][0]["eur_per_week"])
 
 
+@pytest.mark.parametrize("name", ["co2_valve_leak", "heating_valve_leak", "lamp_heat"])
+def test_what_the_corrected_model_does_not_hold_is_not_priced(name: str, leak: Diagnosis) -> None:
+    assert worth(leak, replace(leak.findings[0], effect=name)) is None
+
+
 def test_a_greenhouse_that_is_never_heated_pays_for_no_heat(leak: Diagnosis) -> None:
     """An unheated tunnel was told which heat a cause takes from it, and at what price."""
     (finding,) = leak.findings

@@ -16,7 +16,7 @@ import numpy as np
 from igrow.core.arrays import Array, Floats
 from igrow.core.economics import co2_cost, electricity_price
 from igrow.core.simulator.hybrid import climate
-from igrow.core.simulator.hybrid.balances import balances, in_the_light
+from igrow.core.simulator.hybrid.balances import affected_drivers, balances
 from igrow.core.simulator.hybrid.record import Record, observe
 from igrow.trainer.diagnosis.answer.result import DISCREPANCY, Diagnosis, Finding
 from igrow.trainer.diagnosis.design.freerun import Stage
@@ -54,7 +54,8 @@ def worth(result: Diagnosis, finding: Finding) -> Worth | None:
     if result.evidence is None or "corrected" not in result.evidence.stages:
         return None
     record, stage, site = result.evidence.log.record, result.evidence.stages["corrected"], result.model.site
-    if finding.effect in OF_THE_CROP:
+    is_effect = finding.kind in ("process", "sensor")
+    if finding.effect in OF_THE_CROP or (is_effect and finding.effect not in {one.effect for one in stage.terms}):
         return None
     reduced = without(stage, finding)
     since = np.ones(len(record), dtype=bool) if finding.onset is None else record.time >= finding.onset.time
@@ -104,7 +105,7 @@ def _needed(record: Record, stage: Stage) -> dict[str, Floats]:
     dosed = np.asarray(record.inputs["co2_dosing"]) > 0.0
     short = np.maximum(-_course(net["co2_concentration"][0], record), 0.0) / parameters["dosing_share"]
     co2 = np.where(dosed, short, 0.0)
-    light = -_course(in_the_light(np, drivers, added)["radiation_inside"], record) * _PAR_PER_GLOBAL
+    light = -_course(affected_drivers(np, drivers, added)["radiation_inside"], record) * _PAR_PER_GLOBAL
     return {"heat": heat, "co2": co2, "light": light}
 
 

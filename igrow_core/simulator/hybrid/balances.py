@@ -54,8 +54,8 @@ def balances(xp: Any, state: Values, drivers: Drivers, parameters: Values, added
     temperature_above, cover = drivers["temperature_above"], drivers["cover_conductance"]
     rail = parameters["rail_pipe_heat_transfer"] * drivers["rail_pipe_excess"]
     grow = parameters["grow_pipe_heat_transfer"] * drivers["grow_pipe_excess"]
-    lit = in_the_light(xp, drivers, added)
-    sun, transpiration = lit["radiation_inside"], lit["transpiration"]
+    affected = affected_drivers(xp, drivers, added)
+    sun, transpiration = affected["radiation_inside"], affected["transpiration"]
     to_mass = parameters["mass_heat_transfer"] * (temperature - mass)
     dried = drying(xp, state, drivers)
     heat = (
@@ -96,7 +96,7 @@ def balances(xp: Any, state: Values, drivers: Drivers, parameters: Values, added
     co2_flux = (
         parameters["dosing_share"] * drivers["co2_dosing"] / 3600.0
         - exchange * (co2 - drivers["outdoor_co2_concentration"])
-        - lit["assimilation"]
+        - affected["assimilation"]
         + respiration
         + added.get("co2", 0.0)
     )
@@ -117,8 +117,8 @@ def balances(xp: Any, state: Values, drivers: Drivers, parameters: Values, added
     return Balances(of, moistened)
 
 
-def in_the_light(xp: Any, drivers: Drivers, added: Mapping[str, Array]) -> dict[str, Array]:
-    """Return what light brings about, with what effects take from it and add to it: growth follows it as the air does.
+def affected_drivers(xp: Any, drivers: Drivers, added: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the drivers of which effects take a part or to which they add: growth follows them as the air does.
 
     No effect takes more than there is, however long it goes on.
 

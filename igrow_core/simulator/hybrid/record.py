@@ -17,7 +17,7 @@ from igrow.core.arrays import Array, Floats, Integers, Mask, Times
 from igrow.core.effects import EFFECTS
 from igrow.core.effects.definition import Values
 from igrow.core.simulator.hybrid import climate, measurement
-from igrow.core.simulator.hybrid.balances import below_the_air, in_the_light
+from igrow.core.simulator.hybrid.balances import affected_drivers, below_the_air
 from igrow.core.simulator.hybrid.climate import ActiveEffects, Forcing, memory_name
 
 SUBSTEP = 900.0
@@ -110,7 +110,7 @@ def uptake(record: Record, parameters: Values, effects: ActiveEffects) -> tuple[
     state = observe(record, parameters, effects)
     drivers = climate.derive(np, state, record.inputs, parameters, record.lamp_efficacy)
     added = climate.contributions(np, drivers, state, effects, record.step)
-    return in_the_light(np, drivers, added)["assimilation"], state["air_temperature"]
+    return affected_drivers(np, drivers, added)["assimilation"], state["air_temperature"]
 
 
 @np.errstate(over="ignore", invalid="ignore")

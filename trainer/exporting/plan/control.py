@@ -7,7 +7,7 @@ from typing import Any
 
 from igrow.core import air
 from igrow.core.simulator import actuation, holding
-from igrow.core.simulator.hybrid.balances import STATES, balances, in_the_light
+from igrow.core.simulator.hybrid.balances import STATES, affected_drivers, balances
 from igrow.core.simulator.hybrid.exponential import heat_and_vapour, moved
 from igrow.core.simulator.hybrid.measurement import PREDICTED
 from igrow.core.simulator.hybrid.parameters import PARAMETERS
@@ -17,8 +17,8 @@ from igrow.trainer.exporting.climate import ClimateBlocks
 
 CARRIED = ("vent_lee", "vent_wind", "energy_screen", "blackout_screen")
 """Positions of the equipment that an hour hands to the next."""
-LIT = ("par", "assimilation")
-"""What growth takes of the light, with what effects do to it."""
+AFFECTED = ("par", "assimilation")
+"""Drivers of growth that effects change."""
 SECONDS = 3600.0 / STEPS_PER_HOUR
 """Length of a step."""
 
@@ -73,7 +73,7 @@ def _equipment(xp: Any, arrays: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _control(xp: Any, arrays: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Heat and CO2 that hold the setpoints, the state at the end of the step, and what light there is for growth."""
+    """Heat and CO2 that hold the setpoints, the state at the end of the step, and what effects leave for growth."""
     named = grouped(arrays)
     state, drivers, settings = named["state"], named["driver"], named["holding"]
     parameters, setpoints = named["parameter"], named["setpoint"]
@@ -101,5 +101,5 @@ def _control(xp: Any, arrays: Mapping[str, Any]) -> Mapping[str, Any]:
         parts[name] = (flux + more, pull, capacity)
     following = moved(xp, state, parts, answers, SECONDS)
     pipes = parameters["rail_pipe_heat_transfer"] + settings["grow_share"] * parameters["grow_pipe_heat_transfer"]
-    lit = {name: one for name, one in in_the_light(xp, drivers, added).items() if name in LIT}
-    return following | lit | {"heat": heat, "co2": dose, "rail_pipe_excess": heat / pipes}
+    affected = {name: one for name, one in affected_drivers(xp, drivers, added).items() if name in AFFECTED}
+    return following | affected | {"heat": heat, "co2": dose, "rail_pipe_excess": heat / pipes}

@@ -14,7 +14,7 @@ from igrow.core.simulator.plan import CLOCK, EQUIPMENT, RESOURCES, STEPS_PER_HOU
 from igrow.trainer.exporting.blocks import tagged
 from igrow.trainer.exporting.climate_wiring import ClimateWiring
 from igrow.trainer.exporting.plan.blocks import PlanBlocks
-from igrow.trainer.exporting.plan.control import CARRIED, LIT, SECONDS
+from igrow.trainer.exporting.plan.control import AFFECTED, CARRIED, SECONDS
 from igrow.trainer.exporting.plan.training_range import RANGED
 from igrow.trainer.exporting.wiring import Wiring
 
@@ -85,7 +85,7 @@ def hour_graph(blocks: PlanBlocks, parameters: Mapping[str, str]) -> GraphProto:
         used["co2"].append(step["co2"])
         used["electricity"].append(set_["lamp_power"])
         for name, parts in means.items():
-            parts.append(step[name] if name in LIT else drivers[name])
+            parts.append(step[name] if name in AFFECTED else drivers[name])
 
     end = stage.derived(state, base | {name: equipment[name] for name in CARRIED})
     shown = stage.measured(end, state)
