@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.foreign_greenhouse import ForeignGreenhouse, begun, simulate
+from benchmarks.foreign_greenhouse.crop import GROWTH_HOURS
 from igrow.core.greenhouse import Disturbances, HiddenEffect, generate_weather
 from igrow.core.greenhouse.weather import WeatherClimate
 from igrow.core.telemetry import Telemetry
@@ -59,6 +60,24 @@ def test_the_same_seed_gives_the_same_log(plain: Telemetry) -> None:
 )
 def test_what_is_hidden_acts(plain: Telemetry, effect: HiddenEffect, quantity: str, sign: float) -> None:
     assert sign * np.mean(run(effects=(effect,))[quantity] - plain[quantity]) > 0.0
+
+
+def test_a_crop_loses_the_share_of_its_assimilation_that_is_hidden_and_no_less() -> None:
+    """All of it: nothing is added to what was taken up before, but in the first step; a half: half as much."""
+    noon, minutes = START + np.timedelta64(12, "h"), 30
+    declines = [
+        (HiddenEffect("photosynthesis_decline", loss, noon - np.timedelta64(100, "D")),) for loss in (0.0, 0.5, 1.0)
+    ]
+    end = noon + np.timedelta64(minutes - 5, "m")
+    whole, half, none = (
+        state["buffer"]
+        for _, state in simulate(
+            [PLANT] * 3, [WEATHER] * 3, noon, end, [begun(PLANT)] * 3, seed=1, effects=declines,
+            disturbances=[QUIET] * 3, tick=60.0,
+        )
+    )  # fmt: skip
+    assert none == pytest.approx(begun(PLANT)["buffer"] * np.exp(-minutes / (60.0 * GROWTH_HOURS)), rel=0.02)
+    assert (whole - half) / (whole - none) == pytest.approx(0.5, abs=0.03)
 
 
 def test_without_lamps_it_is_dark_at_night(plain: Telemetry) -> None:
